@@ -131,7 +131,7 @@ def test_the_blade_passes_points_in_proportion_to_its_travel() -> None:
     # 0.6 m in 2 s, 3 s of rest, 0.4 m in 1 s
     path = ToolPath.of_tip([[0.0, 0.0], [0.6, 0.0], [0.6, 0.0], [1.0, 0.0]], [0.0, 2.0, 5.0, 6.0])
     x = np.array([0.0, 0.15, 0.6, 0.8, 1.0])
-    travel = path.sweep.travel(np.stack([x, np.zeros(5)], axis=1))
+    travel = path.sweep.probed(np.stack([x, np.zeros(5)], axis=1))[:, 2]
     np.testing.assert_allclose(travel, x, atol=1e-15)
     np.testing.assert_allclose(path.time_at(travel), [0.0, 0.5, 2.0, 5.5, 6.0], atol=1e-14)
     assert path.travel_at(3.0) == pytest.approx(0.6)
@@ -176,7 +176,7 @@ def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
     points = np.random.default_rng(4).uniform(-0.5, 1.5, (50, 2))
     jittered = np.insert(tips, at + 1, tips[at] + [0.0, move], axis=0)
     sweeps = ToolPath.of_tip(tips, range(3)).sweep, ToolPath.of_tip(jittered, range(4)).sweep
-    for ask in ("level_set", "depth", "travel"):
+    for ask in ("level_set", "depth", "probed"):
         np.testing.assert_allclose(*(getattr(one, ask)(points) for one in sweeps), atol=4e-16)
 
 

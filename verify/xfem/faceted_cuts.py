@@ -268,13 +268,14 @@ class FacetCut:
 
     def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to the facets, to their tangent plane past the rim."""
-        return self._probe(points)[:, 0]
+        return self.probed(points)[:, 0]
 
     def depth(self, points: Floats) -> Floats:
         """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
-        return self._probe(points)[:, 1]
+        return self.probed(points)[:, 1]
 
-    def _probe(self, points: Floats) -> Floats:
+    def probed(self, points: Floats) -> Floats:
+        """(n, 3): level set, depth, and of a sweep the travel at the nearest point, in metres."""
         at = finite_array(points, f"{self._name}: points", (None, self.arrays.corners.shape[2]))
         return _probe_points(at, self.arrays)
 

@@ -151,17 +151,14 @@ class Sweep(FacetCut):
         """Its facets, as kernels take them."""
         return self.path.surface.arrays
 
-    def travel(self, points: Floats) -> Floats:
-        """How far (n,) the blade has come when it passes a point of the sweep, in metres."""
-        return self._probe(points)[:, 2]
-
     def until(self, travel: float) -> "PartOfSweep":
         """Keep the part that is swept when the blade has come so far."""
         return PartOfSweep(self, travel)
 
-    def _probe(self, points: Floats) -> Floats:
+    def probed(self, points: Floats) -> Floats:
+        """(n, 3): level set, depth, and how far the blade has come as it passes, in metres."""
         if self.path.sweeps:
-            return super()._probe(points)
+            return super().probed(points)
         # nothing is swept: one side everywhere, and no point of the cut anywhere
         at = finite_array(points, "sweep: points", (None, self.path.blades.shape[2]))
         return np.tile([1.0, -np.inf, 0.0], (len(at), 1))
@@ -180,7 +177,7 @@ class PartOfSweep:
 
     def depth(self, points: Floats) -> Floats:
         """Distance to the rim or, along the path, to the blade; negative past either."""
-        probed = self.sweep._probe(points)
+        probed = self.sweep.probed(points)
         return np.minimum(probed[:, 1], self.front - probed[:, 2])
 
 

@@ -8,16 +8,16 @@ is; otherwise the edge on which it was found does.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
+from verify.simulator.arrays.row_numbers import RowNumbers
 from verify.xfem.zero_points import ZeroPoints
 
 _Ints = NDArray[np.int64]
 
 NODES, CUTS = 4, 3  # a point of a tetrahedron has at most that many
+NONE = np.iinfo(np.int64).max  # no further node or cut
 _WIDTH = NODES + CUTS
 
 
@@ -52,7 +52,7 @@ class PointNumbers:
         self.positions = GrowingArray(np.empty((0, space)))
         self.ends = GrowingArray(np.empty((0, 2), dtype=np.int64))
         self.cut = GrowingArray(np.empty(0, dtype=np.int64))
-        self._table = RowNumbers(_WIDTH)
+        self._table = RowNumbers()
         self.met = np.zeros((nodes, 0), dtype=bool)
         self._supports = GrowingArray(np.empty((0, _WIDTH), dtype=np.int64))
 
@@ -73,97 +73,73 @@ class PointNumbers:
         cuts : int array
             Number in the whole list of each cut of the patch.
         """
-        local, more = len(whole_nodes), len(points.ends)
-        numbers = np.empty(local + more, dtype=np.int64)
-        numbers[:local] = whole_nodes
-        if more == 0:
+        local, ends = len(whole_nodes), points.ends
+        numbers = np.concatenate([whole_nodes, np.full(len(ends), -1)])
+        if len(ends) == 0:
             return numbers
         if (beyond := int(cuts.max()) + 1 - self.met.shape[1]) > 0:
             self.met = np.hstack([self.met, np.zeros((self.nodes, beyond), dtype=bool)])
         self.met[whole_nodes[:, None], cuts] = points.values[:local] == 0.0
-        table, known, count = self._table.open_for(more)
-        self._supports.extend(more)
-        after = _number_points(
-            points.ends, cuts[points.cut], numbers, self.met, self._supports.rows, table, known,
-            count,
-        )  # fmt: skip
-        self._table.close(after)
-        self._supports.rows = self._supports.rows[:after]
-        new = first_of_new(numbers[local:], self.nodes + count)  # of equal points the first
-        self.positions.append(points.positions[local + new])
-        self.ends.append(numbers[points.ends[new]])
-        self.cut.append(cuts[points.cut[new]])
+        # ends that are zero points themselves come first
+        while len(rest := np.flatnonzero(numbers[local:] < 0)):
+            ready = rest[(numbers[ends[rest]] >= 0).all(axis=1)]
+            own = numbers[ends[ready]]
+            numbers[local + ready], new = self._number(own, cuts[points.cut[ready]])
+            self.positions.append(points.positions[local + ready[new]])
+            self.ends.append(own[new])
+            self.cut.append(cuts[points.cut[ready[new]]])
         return numbers
 
+    def _number(self, ends: _Ints, cut: _Ints) -> tuple[_Ints, _Ints]:
+        """Numbers (k,) of the zero points of cuts (k,) on edges (k, 2), and the first new ones."""
+        known = self.supports_of(ends)
+        span = distinct_in_rows(known[:, :, :NODES].reshape(-1, 2 * NODES), NODES)
+        on = np.full((len(cut), CUTS), NONE)
+        on[:, 0] = cut
+        first, second = known[:, 0, NODES:], known[:, 1, NODES:]
+        if beyond_one := bool((known[:, :, NODES] < NONE).any()):
+            common = np.where((first[:, :, None] == second[:, None, :]).any(axis=2), first, NONE)
+            on = distinct_in_rows(np.hstack([on, common]), CUTS)
+        key = np.hstack([span, on])
+        edge = (span < NONE).sum(axis=1) != (on < NONE).sum(axis=1) + 1
+        key[edge] = -1
+        key[edge, :3] = np.column_stack([cut, ends])[edge]
+        number, new = self._table.number(key)
+        on = on[new]
+        if beyond_one:
+            # a cut on which one end lies, and that runs exactly through the other
+            others, ends = known[new, ::-1, NODES:], ends[new]
+            at = np.nonzero((ends[:, :, None] < self.nodes) & (others < NONE))
+            through = np.full(others.shape, NONE)
+            through[at] = np.where(self.met[ends[at[:2]], others[at]], others[at], NONE)
+            on = distinct_in_rows(np.hstack([on, through.reshape(-1, 2 * CUTS)]), CUTS)
+        self._supports.append(np.hstack([span[new], on]))
+        return self.nodes + number, new
+
+    def supports_of(self, points: _Ints) -> _Ints:
+        """(..., 7) mesh nodes and cuts of points (...), ascending, padded at the end."""
+        found = np.full((*points.shape, _WIDTH), NONE)
+        zero = points >= self.nodes
+        found[..., 0] = points
+        found[zero] = self.supports[points[zero] - self.nodes]
+        return found
+
     def spans(self, nodes: _Ints, points: _Ints) -> NDArray[np.bool_]:
-        """Whether each of some mesh nodes (q, c) spans the simplex of each point (q, k): q, k, c.
+        """Whether each of some mesh nodes (q, c) spans the simplex of a point (q,).
 
         The weights of the others at the point are zero; its own may round to zero.
         """
-        found: NDArray[np.bool_] = points[:, :, None] == nodes[:, None]
-        zero = points >= self.nodes
-        at, _ = np.nonzero(zero)
-        supports = self.supports[points[zero] - self.nodes, :NODES]
-        found[zero] = (supports[:, None] == nodes[at, :, None]).any(axis=2)
+        spanned = self.supports_of(points)[:, None, :NODES]
+        found: NDArray[np.bool_] = (spanned == nodes[:, :, None]).any(axis=2)
         return found
 
 
-@njit(cache=True)
-def _merge(row, begin, end, value):
-    """Insert a value into an ascending list padded with the largest integer."""
-    for k in range(begin, end):
-        if row[k] == value:
-            return
-        if row[k] > value:
-            value, row[k] = row[k], value
-
-
-@njit(cache=True)
-def _number_points(ends, cut, numbers, met, supports, table, known, count):
-    """Write the numbers of zero points after those of the nodes of a patch; give their count."""
-    local, nodes = len(numbers) - len(ends), len(met)
-    none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(NODES)
-    row = np.empty(_WIDTH, dtype=np.int64)
-    edge = -np.ones(_WIDTH, dtype=np.int64)
-    for z in range(len(ends)):
-        for k in range(_WIDTH):
-            row[k] = none
-        for e in range(2):
-            number = numbers[ends[z, e]]
-            if number < nodes:
-                _merge(row, start, NODES, number)
-                continue
-            for k in range(NODES):
-                if supports[number - nodes, k] < none:
-                    _merge(row, start, NODES, supports[number - nodes, k])
-        _merge(row, middle, _WIDTH, cut[z])
-        first, second = numbers[ends[z, 0]] - nodes, numbers[ends[z, 1]] - nodes
-        if first >= 0 and second >= 0:
-            for i in range(NODES, _WIDTH):
-                for j in range(NODES, _WIDTH):
-                    common = supports[first, i]
-                    if common < none and common == supports[second, j]:
-                        _merge(row, middle, _WIDTH, common)
-        support, on = 0, 0
-        for k in range(NODES):
-            support += row[k] < none
-        for k in range(NODES, _WIDTH):
-            on += row[k] < none
-        before = count
-        if support == on + 1:
-            number, count = number_of_row(row, table, known, count)
-        else:
-            edge[0], edge[1], edge[2] = cut[z], first + nodes, second + nodes
-            number, count = number_of_row(edge, table, known, count)
-        if count > before:
-            # a cut on which one end lies, and that runs exactly through the other
-            for node, other in ((first, second), (second, first)):
-                for k in range(NODES, _WIDTH):
-                    if not node < 0 <= other or supports[other, k] == none:
-                        continue
-                    if met[node + nodes, supports[other, k]]:
-                        _merge(row, middle, _WIDTH, supports[other, k])
-            for k in range(_WIDTH):
-                supports[number, k] = row[k]
-        numbers[local + z] = nodes + number
-    return count
+def distinct_in_rows(rows: _Ints, most: int) -> _Ints:
+    """Distinct integers of each row, ascending, at most so many, padded with `NONE`."""
+    found = np.sort(rows, axis=1)
+    again = found[:, 1:] == found[:, :-1]
+    again &= found[:, 1:] < NONE
+    if again.any():
+        found[:, 1:][again] = NONE
+        found.sort(axis=1)
+    return found[:, :most]

@@ -1,10 +1,9 @@
 """Semi-progressive cutting: an element is split when the tool has crossed it through.
 
-The algorithm of the thesis (section 3.2.3) with its listing corrected: the element tested is the
-neighbour, not the one the tool was in; it is split when *all* edges that the cut crosses have been
-passed (three or four in a tetrahedron, two in a triangle), each counted once. Where the tool comes
-in, it is found through the tree of bounding boxes, asked for what was swept since the last frame;
-from there, and from the elements in which the tool was, the walk goes on to neighbours.
+The rule of the thesis (section 3.2.3): an element is split when *all* edges that the cut crosses
+have been passed (three or four in a tetrahedron, two in a triangle), each counted once. Its walk
+from element to neighbour is not needed: the tree of bounding boxes gives the elements near what was
+swept since the last frame, and those that were not crossed through yet are tested again.
 """
 
 from dataclasses import dataclass

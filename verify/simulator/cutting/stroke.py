@@ -5,10 +5,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.simulator.cutting.blade_walk_kernels import WalkedMesh, WalkState, walk
+from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
-from verify.xfem.crossing import REACH
+from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.cuts import Cut
 from verify.xfem.faceted_cuts import FacetArrays
 from verify.xfem.mesh import SimplexMesh
@@ -18,6 +18,7 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.pieces`
+_NEAR = 1.5  # longest edges: so near to the sweep is every cell that it may part with other cuts
 
 
 class SeenCut:
@@ -85,22 +86,13 @@ class Stroke:
     ) -> None:
         self.path, self.number = path, number
         self.front = -1.0
-        self.near = np.zeros(len(mesh.cells), dtype=bool)
-        self.entry = np.full(len(mesh.cells), np.inf)
-        self.leave = np.full(len(mesh.cells), np.inf)
-        self.recorded = np.zeros(len(mesh.cells), dtype=bool)
-        self._mesh, self._strokes_near = mesh, strokes_near
-        self._margin = REACH * float(size.max())
-        self._snap = _ROUND_OFF * mesh.extent
+        self.near, self.recorded, self._settled = np.zeros((3, len(mesh.cells)), dtype=bool)
+        self.entry, self.leave = np.full((2, len(mesh.cells)), np.inf)
         self.values = np.full(len(mesh.points), np.nan)
         self._fixed = np.zeros(len(mesh.points), dtype=bool)
-        self._walked = WalkedMesh(mesh.cells, mesh.neighbours, mesh.points, size, self._snap)
-        self._state = WalkState(
-            self.values, self.entry, self.leave, np.zeros(len(mesh.cells), dtype=np.int64),
-            np.zeros(len(mesh.cells), dtype=bool), self.recorded, self.near, strokes_near,
-        )  # fmt: skip
-        self._turn = 0
-        self._frontier = np.empty(0, dtype=np.int64)
+        self._mesh, self._size, self._strokes_near = mesh, size, strokes_near
+        self._snap = _ROUND_OFF * mesh.extent
+        self._under_way = np.empty(0, dtype=np.int64)
 
     def advance(self, time: float, elements: BoundingTree) -> _Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
@@ -115,15 +107,50 @@ class Stroke:
         front = self.path.travel_at(time)
         if front <= self.front or not self.path.sweeps:
             return np.empty(0, dtype=np.int64)
-        sweep = self.path.surface.arrays
-        hit = _cells_hit(sweep, self.front, front, self._margin, elements)
+        margin = _NEAR * float(self._size.max())
+        hit = _cells_hit(self.path.surface.arrays, self.front, front, margin, elements)
         self.front = front
-        self._turn += 1
-        seeds = np.concatenate([self._frontier, hit])
-        candidates, self._frontier = walk(
-            seeds, front, self._turn, self._walked, sweep, self._state
-        )
-        return candidates
+        cells = distinct(np.concatenate([self._under_way, hit[~self._settled[hit]]]))
+        cells, through, latest = self._crossed(cells)
+        fresh = cells[~self.near[cells]]
+        self.near[fresh] = True
+        self._strokes_near[fresh] += 1
+        alone, recorded = self._strokes_near[cells] == 1, self.recorded[cells]
+        # what other strokes have left of a cell may be crossed through later than its edges; and
+        # what is crossed through only just may be split only when the blade is farther on
+        settled = alone & (recorded | (latest < front - self._size[cells]))
+        self._settled[cells[settled]] = True
+        self._under_way = cells[~settled]
+        return cells[(through & ~recorded) | ~alone]
+
+    def _crossed(self, cells: _Ints) -> tuple[_Ints, NDArray[np.bool_], _Floats]:
+        """Those of some cells (q,) that the blade is near, if crossed through, latest travel.
+
+        Writes the travel at which the blade entered each, and crossed it through. The tolerances
+        are those of `verify.xfem.pieces`, so that a cell that is crossed through is one that is
+        split.
+        """
+        nodes = self._mesh.cells[cells]
+        self.level_sets(distinct(nodes))
+        above = self.values[nodes] >= 0.0
+        cell, one, other = np.nonzero(above[:, :, None] & ~above[:, None, :])
+        edges, edge = np.unique(nodes[cell, one] << 32 | nodes[cell, other], return_inverse=True)
+        plus, minus = edges >> 32, edges & 0xFFFFFFFF
+        up, down = self.values[plus, None], self.values[minus, None]
+        points = self._mesh.points
+        place = (up * points[minus] - down * points[plus]) / (up - down)
+        level, depth, travel = self.path.sweep.probed(place).T[:, edge]
+        size, away, beyond = self._size[cells[cell]], np.abs(level), np.maximum(-depth, 0.0)
+        beside = (away <= size) & (beyond <= size)
+        passed = (away <= REACH * size) & (beyond <= AT_END * size)
+        passed &= travel <= self.front + AT_END * size
+        near = np.bincount(cell, beside & (travel <= self.front + size), len(cells)) > 0
+        through = near & (np.bincount(cell, ~passed, len(cells)) == 0)
+        latest = np.zeros(len(cells))
+        np.maximum.at(latest, cell[beside], travel[beside])
+        np.minimum.at(self.entry, cells[cell[passed]], travel[passed])
+        self.leave[cells[through]] = latest[through]
+        return cells[near], through[near], latest[near]
 
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""

@@ -70,13 +70,14 @@ class BodySurface:
         ids, at, piece, cell, inner = self._facets_of(cells)
         ids, at, source = self._edges.bisect(ids, at)
         cell = cell[source]
-        nodes = mesh.cells[cell]
-        pieces = np.repeat(piece[source, None], ids.shape[1], axis=1)
+        nodes, corners = mesh.cells[cell], ids.shape[1]
+        pieces = np.repeat(piece[source, None], corners, axis=1)
         self.surface.retire(ranges(self._facet_range[cells]))
         self._facet_range[cells] = 0
         self.surface.add(
-            ids, at @ mesh.points[nodes], at, body.points.spans(nodes, ids), pieces, inner[source],
-            body.piece_cells.rows, cell, self._facet_range,
+            ids, at @ mesh.points[nodes], at,
+            lambda rows: body.points.spans(nodes[rows // corners], ids.ravel()[rows]), pieces,
+            inner[source], body.piece_cells.rows, cell, self._facet_range,
         )  # fmt: skip
 
     def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:

@@ -186,7 +186,8 @@ class EmbeddedSurface:
         corners.inside[divided] = found.inside
         self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
-            parts.ids, material, corners.weights, corners.weights != 0.0,
+            parts.ids, material, corners.weights,
+            lambda rows: corners.weights.reshape(-1, corners.weights.shape[2])[rows] != 0.0,
             self._pieces(corners, parts.label), np.zeros(len(parts.ids), dtype=bool),
             self._cutter.body.piece_cells.rows, parts.source, self._facet_range,
         )  # fmt: skip

@@ -6,13 +6,14 @@ back by the transpose, so that the virtual work of a force on the surface and of
 gets is the same.
 """
 
+from collections.abc import Callable
+
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
+from verify.simulator.arrays.row_numbers import RowNumbers
 from verify.xfem.arrays import check_floats
 from verify.xfem.errors import XfemError
 
@@ -54,14 +55,14 @@ class MovingSurface:
         self.facet_piece = GrowingArray(np.empty(0, dtype=np.int64))
         self.inner = GrowingArray(np.empty(0, dtype=bool))
         self.retired: int = 0
-        self._keys = RowNumbers(corners + 1)
+        self._keys = RowNumbers()
 
     def add(
         self,
         point: _Ints,
         material: _Floats,
         weights: _Floats,
-        counts: NDArray[np.bool_],
+        counts: Callable[[_Ints], NDArray[np.bool_]],
         piece: _Ints,
         inner: NDArray[np.bool_],
         piece_cells: _Ints,
@@ -78,9 +79,9 @@ class MovingSurface:
             Where it is, in metres.
         weights : (q, k, c) float array
             Of the dof nodes of its piece.
-        counts : (q, k, c) bool array
-            Whether a corner moves with a node: where it is not, the weight is zero; where it is,
-            the weight may still round to zero.
+        counts : callable
+            Whether corners (n,), counted through all facets, move with each node (n, c): where not,
+            the weight is zero; where so, the weight may still round to zero.
         piece : (q, k) int array
             Piece of each corner; that of the first is the facet's.
         inner : (q,) bool array
@@ -93,15 +94,18 @@ class MovingSurface:
         """
         if len(point) == 0:
             return
-        count, begin = len(self.material), len(self.facets)
-        table, known, _ = self._keys.open_for(point.size)
-        vertex, after = _number_corners(point, piece, counts, piece_cells, table, known, count)
-        self._keys.close(after)
-        new = first_of_new(vertex, count)
-        self.material.append(material.reshape(point.size, -1)[new])
-        self.nodes.append(piece_cells[piece.ravel()[new]])
-        self.weights.append(weights.reshape(point.size, -1)[new])
-        self.facets.append(vertex.reshape(point.shape))
+        # one vertex for a point and the nodes from which it moves
+        pairs = point.ravel() << 32 | piece.ravel()
+        _, first, pair = np.unique(pairs, return_index=True, return_inverse=True)
+        nodes = piece_cells[piece.ravel()[first]]
+        moved = np.sort(np.where(counts(first), nodes, -1))
+        vertex, new = self._keys.number(np.column_stack([point.ravel()[first], moved]))
+        corner = first[new]
+        begin = len(self.facets)
+        self.material.append(material.reshape(point.size, -1)[corner])
+        self.nodes.append(nodes[new])
+        self.weights.append(weights.reshape(point.size, -1)[corner])
+        self.facets.append(vertex[pair].reshape(point.shape))
         self.facet_piece.append(piece[:, 0])
         self.inner.append(inner)
         change = np.flatnonzero(np.diff(owner, prepend=-1))
@@ -211,21 +215,3 @@ class MovingSurface:
             known = csr_array((self.weights.rows.ravel(), nodes.ravel(), starts), shape)
             self._known_mapping = known
         return known
-
-
-@njit(cache=True)
-def _number_corners(point, piece, counts, piece_cells, table, known, count):
-    """Vertex (q * k,) of each corner: one for a point and the nodes that count; how many."""
-    size, corners = piece_cells.shape[1], point.shape[1]
-    vertex, key = np.empty(point.size, dtype=np.int64), np.empty(size + 1, dtype=np.int64)
-    for f in range(len(point)):
-        for c in range(corners):
-            key[0] = point[f, c]
-            for a in range(size):
-                node, k = piece_cells[piece[f, c], a] if counts[f, c, a] else -1, a
-                while k > 0 and key[k] > node:
-                    key[k + 1] = key[k]
-                    k -= 1
-                key[k + 1] = node
-            vertex[f * corners + c], count = number_of_row(key, table, known, count)
-    return vertex, count
