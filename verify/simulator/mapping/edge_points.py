@@ -145,7 +145,8 @@ class EdgePoints:
 
     def _parts(self, corners: list[int], at: _Floats) -> list[tuple[list[int], _Floats]]:
         """Bisect a triangle until no edge has a point inside."""
-        rest, done = [(corners, at)], []
+        rest = [(corners, at)]
+        done: list[tuple[list[int], _Floats]] = []
         while rest:
             if len(rest) + len(done) > _MOST:
                 raise XfemError(f"points on the edges of facet {corners} are in no order")
