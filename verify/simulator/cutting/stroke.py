@@ -127,7 +127,7 @@ class Stroke:
         """Those of some cells (q,) that the blade is near, if crossed through, latest travel.
 
         Writes the travel at which the blade entered each, and crossed it through. The tolerances
-        are those of `verify.xfem.pieces`, so that a cell that is crossed through is one that is
+        are those of `verify.xfem.crossing`, so that a cell that is crossed through is one that is
         split.
         """
         nodes = self._mesh.cells[cells]
