@@ -16,12 +16,7 @@ from numba import njit
 from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradient_kernels import invert_blocks
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.symmetric_sweep_kernels import (
-    solve_lower,
-    solve_upper,
-    take_upper,
-    upper_pattern,
-)
+from verify.accelerated.symmetric_sweep_kernels import solve_lower, solve_upper, upper_pattern
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
@@ -103,11 +98,9 @@ def test_an_iteration_s_two_sweeps_run_at_four_tenths_of_the_memory_bandwidth_or
     """There and back over the half of the matrix above the diagonal, with the inverse blocks."""
     _, pattern, _, blocks, load = system()
     inverse = np.zeros((pattern.node_count, 3, 3))
-    assert invert_blocks(blocks, pattern.diagonal, inverse) < 0
-    places = upper_pattern(pattern.starts, pattern.columns, pattern.diagonal)
-    above = np.empty((len(places[1]), 3, 3))
-    take_upper(pattern.starts, pattern.diagonal, blocks, above)
-    matrix = (*places, above, inverse)
+    assert invert_blocks(blocks[pattern.diagonal], inverse) < 0
+    starts, columns, above = upper_pattern(pattern.starts, pattern.columns, pattern.diagonal)
+    matrix = (starts, columns, blocks[above], inverse)
     p, t, e, u, s = (np.zeros((len(load), 3)) for _ in range(5))
     p[:] = load
 
@@ -178,7 +171,6 @@ import numpy as np
 import test_xfem_scale as scale
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.structured_meshes import box_mesh
-from verify.accelerated.symmetric_sweep_kernels import solve_lower, solve_upper
 
 def peak():
     lines = Path("/proc/self/status").read_text().splitlines()

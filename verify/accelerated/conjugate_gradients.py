@@ -6,16 +6,13 @@ them either.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.accelerated.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
-from verify.accelerated.symmetric_sweep_kernels import take_upper, upper_pattern
-from verify.xfem.arrays import check_floats
+from verify.accelerated.symmetric_sweep_kernels import upper_pattern
+from verify.xfem.arrays import Floats, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
-
-_Floats = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 1e-200, 1e200  # squares of loads that are solved for as they are
 
@@ -49,49 +46,65 @@ class ConjugateGradients(LinearSolver):
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
         self._pattern, self.tolerance, self.limit = pattern, tolerance, limit
-        self._rows, self._columns = upper_pattern(pattern.starts, pattern.columns, pattern.diagonal)
-        self._upper = np.empty((len(self._columns), block, block))
-        self._inverse = np.zeros((pattern.node_count, block, block))
-        self._work = np.zeros((8, pattern.node_count, block))
+        sparsity = pattern.starts, pattern.columns, pattern.diagonal
+        self._rows, self._columns, self._above = upper_pattern(*sparsity)
+        # blocks of three, whatever those of the matrix are
+        self._upper = np.zeros((len(self._columns), 3, 3))
+        self._diagonal = np.tile(np.eye(3), (pattern.node_count, 1, 1))
+        self._inverse = np.empty_like(self._diagonal)
+        self._work = np.zeros((8, pattern.node_count, 3))
         self._block = block
-        self._blocks: _Floats | None = None
+        self._is_factorised = False
         self.iterations = 0
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Take the matrix and invert its diagonal blocks; see `LinearSolver`."""
-        check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
-        failed = invert_blocks(blocks, self._pattern.diagonal, self._inverse)
+        size = self._block
+        check_floats("blocks", blocks, (len(self._pattern.columns), size, size))
+        if size == 3:
+            np.take(blocks, self._above, axis=0, out=self._upper, mode="clip")
+        else:
+            self._upper[:, :size, :size] = blocks[self._above]
+        self._diagonal[:, :size, :size] = blocks[self._pattern.diagonal]
+        failed = invert_blocks(self._diagonal, self._inverse)
+        self._is_factorised = failed < 0
         if failed >= 0:
             raise SingularStiffnessError(failed)
-        self._blocks = np.ascontiguousarray(blocks)
-        take_upper(self._pattern.starts, self._pattern.diagonal, self._blocks, self._upper)
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`. With room for the solution, nothing is allocated."""
-        if self._blocks is None:
+        if not self._is_factorised:
             raise RuntimeError("solve before factorize")
-        pattern, nodes = self._pattern, self._pattern.node_count
+        nodes = self._pattern.node_count
         load = nodal_vector(load, "right-hand side", nodes, self._block)
         x = np.zeros(load.shape) if x is None else x
         if nodal_vector(x, "first guess", nodes, self._block) is not x:
             raise XfemError("first guess with gaps, or not of floats; expected room for x")
-        if not _SMALLEST < np.vdot(load, load) < _LARGEST and load.any():
+        if not load.any():
+            self.iterations, x[:] = 0, 0.0
+            return x
+        size = float(np.vdot(load, load))
+        if not _SMALLEST < size < _LARGEST:
             scale = 2.0 ** -np.frexp(np.abs(load).max())[1]
             x *= scale
             self.solve(scale * load, x)
             x /= scale
             return x
-        iterations, residual = conjugate_gradients(
-            pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._rows,
-            self._columns, self._upper, self._inverse, load, x, not x.any(), self._work,
-            self._work.reshape(len(self._work), -1), self.tolerance, self.limit,
+        guess, residual = self._work[:2, :, : self._block]
+        guess[:], residual[:] = x, load
+        iterations, square = conjugate_gradients(
+            self._rows, self._columns, self._upper, self._diagonal, self._inverse, not x.any(),
+            self._work, self._work.reshape(len(self._work), -1), self.tolerance**2 * size,
+            self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)
-        if residual > self.tolerance:
+        if iterations > 0:
+            x[:] = guess
+        if square > self.tolerance**2 * size:
             raise NotConvergedError(
-                f"conjugate gradients: residual {residual:.3g} after {iterations} iterations; "
-                f"expected {self.tolerance:g}"
+                f"conjugate gradients: residual {np.sqrt(square / size):.3g} after {iterations} "
+                f"iterations; expected {self.tolerance:g}"
             )
         self.iterations = iterations
         return x

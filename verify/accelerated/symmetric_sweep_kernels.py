@@ -1,8 +1,8 @@
 """Gauß–Seidel sweeps over a symmetric matrix in nodal blocks, K = L + D + Lᵀ.
 
 They read the blocks above the diagonal, which lie one after the other in a memory of their own:
-read forwards and backwards without gaps, they arrive before they are asked for. Blocks of three are
-written out, so that sums stay in registers.
+read forwards and backwards without gaps, they arrive before they are asked for. Blocks are of
+three, written out, so that sums stay in registers; smaller ones are filled up with zeros.
 """
 
 import numpy as np
@@ -12,25 +12,16 @@ _FUSED = {"contract"}  # multiply and add in one, rounded once
 
 
 def upper_pattern(starts, columns, diagonal):
-    """First block and columns of each row above the diagonal; unsigned, no index is negative."""
-    above = columns > np.repeat(np.arange(len(diagonal)), np.diff(starts))
+    """First block and columns of each row above the diagonal, and the places of these blocks.
+
+    Columns are unsigned: no index is negative.
+    """
+    above = np.flatnonzero(columns > np.repeat(np.arange(len(diagonal)), np.diff(starts)))
     count = starts[1:] - diagonal - 1
-    return np.concatenate([[0], np.cumsum(count)]), columns[above].astype(np.uint32)
+    return np.concatenate([[0], np.cumsum(count)]), columns[above].astype(np.uint32), above
 
 
-@njit(cache=True)
-def take_upper(starts, diagonal, blocks, upper):
-    """Copy the blocks (B, d, d) above the diagonal."""
-    size, count = blocks.shape[1], 0
-    for row in range(len(diagonal)):
-        for at in range(diagonal[row] + 1, starts[row + 1]):
-            for k in range(size):
-                for l in range(size):
-                    upper[count, k, l] = blocks[at, k, l]
-            count += 1
-
-
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def solve_upper(starts, columns, upper, inverse, p, t, e, u):
     """Find t = (D + Lᵀ)⁻¹ p, with e = Lᵀ t and u = D t = p − e.
 
@@ -38,33 +29,14 @@ def solve_upper(starts, columns, upper, inverse, p, t, e, u):
     ----------
     starts, columns : int arrays
         As of `upper_pattern`.
-    upper : (B, d, d) float array
+    upper : (B, 3, 3) float array
         Blocks above the diagonal.
-    inverse : (N, d, d) float array
+    inverse : (N, 3, 3) float array
         Of the diagonal blocks.
-    p : (N, d) float array
-    t, e, u : (N, d) float array
+    p : (N, 3) float array
+    t, e, u : (N, 3) float array
         Overwritten.
     """
-    size = upper.shape[1]
-    if size == 3:
-        _solve_upper_3(starts, columns, upper, inverse, p, t, e, u)
-        return
-    for row in range(len(inverse) - 1, -1, -1):
-        for k in range(size):
-            e[row, k] = 0.0
-            for at in range(starts[row], starts[row + 1]):
-                for l in range(size):
-                    e[row, k] += upper[at, k, l] * t[columns[at], l]
-            u[row, k] = p[row, k] - e[row, k]
-        for k in range(size):
-            t[row, k] = 0.0
-            for l in range(size):
-                t[row, k] += inverse[row, k, l] * u[row, l]
-
-
-@njit(cache=True, fastmath=_FUSED)
-def _solve_upper_3(starts, columns, upper, inverse, p, t, e, u):
     for row in range(len(inverse) - 1, -1, -1):
         a = b = c = 0.0
         # backwards: the neighbour whose value is the last to be known comes last
@@ -81,7 +53,7 @@ def _solve_upper_3(starts, columns, upper, inverse, p, t, e, u):
             t[row, k] = inverse[row, k, 0] * a + inverse[row, k, 1] * b + inverse[row, k, 2] * c
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def solve_lower(starts, columns, upper, inverse, g, s):
     """Find s = (D + L)⁻¹ g; of g only D s is left.
 
@@ -89,28 +61,11 @@ def solve_lower(starts, columns, upper, inverse, g, s):
     ----------
     starts, columns, upper, inverse
         As for `solve_upper`.
-    g : (N, d) float array
+    g : (N, 3) float array
         Right-hand side.
-    s : (N, d) float array
+    s : (N, 3) float array
         Overwritten.
     """
-    size = upper.shape[1]
-    if size == 3:
-        _solve_lower_3(starts, columns, upper, inverse, g, s)
-        return
-    for row in range(len(inverse)):
-        for k in range(size):
-            s[row, k] = 0.0
-            for l in range(size):
-                s[row, k] += inverse[row, k, l] * g[row, l]
-        for at in range(starts[row], starts[row + 1]):
-            for k in range(size):
-                for l in range(size):
-                    g[columns[at], l] -= upper[at, k, l] * s[row, k]
-
-
-@njit(cache=True, fastmath=_FUSED)
-def _solve_lower_3(starts, columns, upper, inverse, g, s):
     for row in range(len(inverse)):
         a, b, c = g[row, 0], g[row, 1], g[row, 2]
         x = inverse[row, 0, 0] * a + inverse[row, 0, 1] * b + inverse[row, 0, 2] * c
@@ -126,12 +81,23 @@ def _solve_lower_3(starts, columns, upper, inverse, g, s):
             g[j, 0], g[j, 1], g[j, 2] = a, b, c
 
 
-@njit(cache=True)
+@njit(inline="always")
 def add_lower_product(starts, columns, upper, s, out):
-    """Add L s (N, d) to `out`."""
-    size = upper.shape[1]
+    """Add L s (N, 3) to `out`."""
     for row in range(len(s)):
         for at in range(starts[row], starts[row + 1]):
-            for k in range(size):
-                for l in range(size):
+            for k in range(3):
+                for l in range(3):
                     out[columns[at], l] += upper[at, k, l] * s[row, k]
+
+
+@njit(inline="always")
+def subtract_product(starts, columns, upper, diagonal, x, out):
+    """Subtract K x (N, 3) from `out`, with the diagonal blocks (N, 3, 3)."""
+    for row in range(len(x)):
+        for k in range(3):
+            for l in range(3):
+                out[row, k] -= diagonal[row, k, l] * x[row, l]
+                for at in range(starts[row], starts[row + 1]):
+                    out[row, k] -= upper[at, k, l] * x[columns[at], l]
+                    out[columns[at], l] -= upper[at, k, l] * x[row, k]
