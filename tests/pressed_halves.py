@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay, HalfspaceIntersection
 
+from verify.compare.simplices import EDGES
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -56,8 +57,6 @@ def pressed(d: int, n: int, moves: list[tuple[Array, Array]], order: int = 1, se
 
 def quadratic(points: Array, cells: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
     """Add mid-edge nodes in VTK's order."""
-    from verify.compare.simplices import EDGES
-
     pairs = np.concatenate([cells[:, list(edge)] for edge in EDGES[points.shape[1]]])
     edges, inverse = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
     middle = len(points) + inverse.reshape(-1, len(cells)).T

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from verify.compare.hooke import hooke
+from verify.compare.strain_energy import strain_energy
 from verify.solvers.xfem import XfemSolver
 
 
@@ -16,9 +18,6 @@ class Stating(XfemSolver):
     factor = 1.0
 
     def solve(self, scene, level, repetitions=1):
-        from verify.compare.hooke import hooke
-        from verify.compare.strain_energy import strain_energy
-
         solution = super().solve(scene, level, repetitions)
         energy = strain_energy(solution, hooke(scene.material))
         return replace(solution, ledger={"strain": np.array([self.factor * energy])})

@@ -11,20 +11,21 @@ import numpy as np
 import pytest
 from case_texts import body_text, support_text, weight_text
 
+from reference.exact import exact_solution
 from verify.cli import main
 from verify.errors import InputError
 from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
 from verify.result import Status, Verdict
 from verify.result_files import read_result
 from verify.scene import load_scene
+from verify.solution import write_solution
+from verify.solvers.xfem import XfemSolver
 
 CASE = "statics/f1_patch"
 
 
 def answer(folder, level, factor=1.0):
     """Answer the patch test exactly, by the field itself at the nodes of the conforming mesh."""
-    from reference.exact import exact_solution
-
     scene = load_scene(CASE)
     problem = problem_of(scene, level, conforming=True)
     exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
@@ -83,9 +84,6 @@ SPACE = (
 
 def test_a_motion_in_space_goes_out_and_its_time_series_comes_back(tmp_path):
     """Another program's answer: here the compact solver's, through the files alone."""
-    from verify.solution import write_solution
-    from verify.solvers.xfem import XfemSolver
-
     (tmp_path / "fall.toml").write_text(SPACE)
     scene = load_scene(tmp_path / "fall.toml")
     export_case(scene, tmp_path / "out")
@@ -198,8 +196,6 @@ def test_a_program_is_a_solver_with_its_wall_time(tmp_path):
 
 def test_several_materials_go_out_and_a_program_solves_their_patch_test(tmp_path):
     pytest.importorskip("skfem")
-    from reference.exact import exact_solution
-
     scene = load_scene("material/layers_patch")
     export_case(scene, tmp_path / "out", [0], conforming=True)
     case = json.loads((tmp_path / "out/case.json").read_text())

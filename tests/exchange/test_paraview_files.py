@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import pyvista
 
+from reference.exact import exact_solution
 from verify.compare.hooke import law_of
 from verify.compare.locate import SolutionField
 from verify.compare.strain_energy import strain_energy
@@ -133,8 +134,6 @@ def test_stress_is_that_of_the_material_of_the_cell():
 
 
 def test_error_and_reference_are_those_of_the_side_of_the_cut_on_which_a_node_lies(tmp_path):
-    from reference.exact import exact_solution
-
     scene = load_scene("statics/f1_patch")
     exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
     scene, solution = moved("statics/f1_patch", lambda x, _: np.zeros_like(x))

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from verify.exchange import export_case
+from verify.exchange import export_case, read_answers
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
@@ -98,8 +98,6 @@ def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, 
     export_case(scene, tmp_path, [0], conforming=True)
     laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
     modules["motion"].run_engine(laid, newmark(modules["example"]))
-    from verify.exchange import read_answers
-
     found = read_answers(scene, tmp_path).solutions[0]
     expected = find_solver("conforming").solve(scene, 0, repetitions=1)
     assert_same_motion(found, expected, 1e-9)

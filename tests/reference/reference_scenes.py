@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from verify.scene import Scene
+from verify.solvers import find_solver
 
 # looked up and not imported: the DOLFINx wheel loads only behind `dolfinx_solver`
 _MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
@@ -17,6 +18,11 @@ needs_fenicsx = [
 
 def polyline(name, *points):
     return {"kind": "polyline", "name": name, "points": [list(p) for p in points]}
+
+
+def arc(name, centre, radius, start=0.0, sweep=360.0):
+    return {"kind": "arc", "name": name, "centre": list(centre), "radius": radius, "start": start,
+            "sweep": sweep}  # fmt: skip
 
 
 def square(cuts=(), **changes):
@@ -72,7 +78,5 @@ def exterior_facets(mesh):
 
 def energy_of(scene, solver="reference", level=0, **parameters):
     """Strain energy that a solver of the FEniCSx side adds up, J/m."""
-    from verify.solvers import find_solver
-
     solution = find_solver(solver).solve(scene, level, repetitions=0, **parameters)
     return float(solution.ledger["strain"][0])

@@ -7,7 +7,6 @@ from reference_scenes import needs_fenicsx, square
 from reference.exact import exact_solution
 from reference.fracture import no_tip, stress_intensity, tips
 from verify.assess.stress_intensity import exact_intensity
-from verify.scene import Scene
 from verify.solvers import find_solver
 
 
@@ -15,25 +14,19 @@ def plate_with_an_arc(start=-20.0, sweep=100.0):
     """Give a plate with an arc in it, held all around as in an infinite one under tension."""
     circle = {"centre": [1.45, 1.1], "radius": 0.5}
     covered = {"angle": start + sweep / 2, "half_angle": sweep / 2}
-    return Scene.model_validate(
-        {
-            "title": "arc",
-            "requirement": "none",
-            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [3, 2.2]},
-            "mesh": {"pattern": "unstructured", "sizes": [0.2, 0.1]},
-            "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-            "supports": [{"where": "boundary", "displacement": "exact"}],
-            "cuts": [{"kind": "arc", **circle, "start": start, "sweep": sweep}],
-            "exact": {
-                "solution": "arc_crack",
-                "parameters": {**circle, **covered, "stress": [0.3, 1.0, 0.2]},
-            },
-            "quantities": [
-                {"kind": "stress_intensity", "name": f"K_{mode} {end}", "end": end, "mode": mode}
-                for end in ("start", "end")
-                for mode in ("I", "II")
-            ],
-        }
+    parameters = {**circle, **covered, "stress": [0.3, 1.0, 0.2]}
+    return square(
+        [{"kind": "arc", **circle, "start": start, "sweep": sweep}],
+        geometry={"kind": "rectangle", "lower": [0, 0], "upper": [3, 2.2]},
+        mesh={"pattern": "unstructured", "sizes": [0.2, 0.1]},
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        loads=[],
+        exact={"solution": "arc_crack", "parameters": parameters},
+        quantities=[
+            {"kind": "stress_intensity", "name": f"K_{mode} {end}", "end": end, "mode": mode}
+            for end in ("start", "end")
+            for mode in ("I", "II")
+        ],
     )
 
 

@@ -5,16 +5,16 @@ import pytest
 from reference_scenes import areas, energy_of, exterior_facets, needs_fenicsx, polyline, square
 
 from reference.exact import exact_solution
+from reference.meshing import Grading, conforming_mesh, singular_points
 from verify.assess.richardson import extrapolate
 from verify.errors import InputError
-from verify.scene import Scene, load_scene
+from verify.scene import load_scene
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 
 
 def energies(case, solver):
-    from verify.solvers import find_solver
-
     scene, found = load_scene(case), find_solver(solver)
     exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
     values = [
@@ -40,8 +40,6 @@ SHAPES = {
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("graded", [False, True])
 def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape, graded):
-    from reference.meshing import Grading, conforming_mesh, singular_points
-
     cuts, extra = SHAPES[shape]
     scene = square(cuts)
     points = singular_points(scene) if graded else np.zeros((0, 2))
@@ -58,8 +56,6 @@ def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape,
 @pytest.mark.parametrize("sweep", [180.0, 270.0, 359.0, 360.0])
 def test_an_arc_is_cut_as_far_as_it_goes(sweep):
     """Chords of a circle are short by (h/R)²/24."""
-    from reference.meshing import Grading, conforming_mesh
-
     arc = {"kind": "arc", "centre": [0.51, 0.47], "radius": 0.31, "start": 20.0, "sweep": sweep}
     mesh = conforming_mesh(square([arc]), Grading(0.06, np.zeros((0, 2)), 0.5))
     ends = mesh.realised_cut
@@ -69,8 +65,6 @@ def test_an_arc_is_cut_as_far_as_it_goes(sweep):
 
 
 def test_the_same_scene_gives_the_same_mesh_twice():
-    from reference.meshing import Grading, conforming_mesh, singular_points
-
     scene = square(SHAPES["X"][0])
     one, two = (conforming_mesh(scene, Grading(0.1, singular_points(scene), 0.5)) for _ in "ab")
     assert np.array_equal(one.points, two.points)
@@ -107,8 +101,6 @@ def test_ungraded_linear_elements_show_the_half_order_of_the_tip():
 
 
 def test_a_piece_that_nothing_holds_is_named_and_not_solved():
-    from verify.solvers import find_solver
-
     disc = {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2}
     with pytest.raises(InputError, match="support"):
         find_solver("reference").solve(square([disc]), 0)
@@ -167,20 +159,14 @@ def test_an_exact_body_force_is_applied_on_each_side_of_the_cut(plane):
 
 
 def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
-    from verify.solvers import find_solver
-
     # without lateral contraction u_y = −ρg (Ly − y²/2)/E from the held end down: in P2's space
     rho, g, length = 1000.0, 9.8, 2.0
-    scene = Scene.model_validate(
-        {
-            "title": "bar",
-            "requirement": "none",
-            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [0.5, length]},
-            "mesh": {"cells": [[2, 8]]},
-            "material": {"young": 1e4, "poisson": 0.0, "plane": "strain", "density": rho},
-            "supports": [{"where": "top", "displacement": [0, 0]}],
-            "loads": [{"kind": "gravity", "acceleration": [0, -g]}],
-        }
+    scene = square(
+        geometry={"kind": "rectangle", "lower": [0, 0], "upper": [0.5, length]},
+        mesh={"cells": [[2, 8]]},
+        material={"young": 1e4, "poisson": 0.0, "plane": "strain", "density": rho},
+        supports=[{"where": "top", "displacement": [0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0, -g]}],
     )
     for solution in (
         find_solver("conforming").solve(scene, 0, repetitions=0, degree=2),
@@ -193,8 +179,6 @@ def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
 
 
 def test_the_graded_reference_converges_with_order_two_in_the_number_of_unknowns():
-    from verify.solvers import find_solver
-
     scene, found = load_scene("statics/griffith_inside"), find_solver("reference")
     levels = [found.solve(scene, level, repetitions=0) for level in range(2)]
     errors = [abs(one.ledger["strain"][0] / exact_energy(scene) - 1) for one in levels]

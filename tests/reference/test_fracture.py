@@ -10,6 +10,7 @@ from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
 from verify.scene import Material, load_scene
 from verify.solution import Solution
+from verify.solvers import find_solver
 
 STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
 MODULUS = 1 / (1 - 0.3**2)
@@ -113,8 +114,6 @@ class TestOnTheReference:
     pytestmark = needs_fenicsx
 
     def solve(self, scene, level, solver="reference"):
-        from verify.solvers import find_solver
-
         return find_solver(solver).solve(scene, level, repetitions=0)
 
     @pytest.mark.parametrize("case", ["griffith_edges", "griffith_inside"])

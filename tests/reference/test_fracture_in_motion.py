@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_scenes import needs_fenicsx
+from reference_scenes import needs_fenicsx, polyline, square
 from test_fracture import ALONG_X, ORIGIN, interpolated_tip
 from test_front_fracture import FRONT, prism
 
 from reference.exact.hooke import hooke
 from reference.fracture import front_intensity, stress_intensity, tips
-from verify.scene import Material, Scene
+from verify.assess.quantities import Measured
+from verify.assess.reference import known_quantity, size_of
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.scene import Material
 from verify.solvers import find_solver
 
 MOVING = Material(young=1.0, poisson=0.3, plane="strain", density=2.0)
@@ -100,39 +104,22 @@ def opened_suddenly(angle=20.0, reach=0.9, size=0.4):
     """
     ahead = 0.5 * np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
     middle = np.array([1.5, 1.0])
-    return Scene.model_validate(
-        {
-            "title": "opened suddenly",
-            "requirement": "none",
-            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [3, 2]},
-            "mesh": {"pattern": "unstructured", "sizes": [0.1]},
-            "material": {"young": 1.0, "poisson": POISSON, "density": 1.0, "plane": "strain"},
-            "supports": [
-                {"where": "bottom", "components": ["y"], "displacement": [0]},
-                {"where": "left", "components": ["x"], "displacement": [0]},
-            ],
-            "loads": [{"kind": "traction", "where": "top", "traction": [0, 1]}],
-            "cuts": [
-                {
-                    "kind": "polyline",
-                    "points": [(middle - ahead).tolist(), (middle + ahead).tolist()],
-                }
-            ],
-            "initial": {"kind": "equilibrium"},
-            "analysis": {
-                "kind": "dynamic",
-                "kinematics": "linear",
-                "duration": reach / PRESSURE_WAVE,
-                "outputs": 4,
-            },
-            "reference": {"size": size},
-            "quantities": [
-                {"kind": "stress_intensity", "name": "K_I", "end": "end"},
-                {"kind": "stress_intensity", "name": "K_I before", "end": "end",
-                 "time": reach / PRESSURE_WAVE / 3},
-            ],
-        }
-    )  # fmt: skip
+    duration = reach / PRESSURE_WAVE
+    factor = {"kind": "stress_intensity", "name": "K_I", "end": "end"}
+    return square(
+        [polyline("cut 0", middle - ahead, middle + ahead)],
+        geometry={"kind": "rectangle", "lower": [0, 0], "upper": [3, 2]},
+        mesh={"pattern": "unstructured", "sizes": [0.1]},
+        supports=[
+            {"where": "bottom", "components": ["y"], "displacement": [0]},
+            {"where": "left", "components": ["x"], "displacement": [0]},
+        ],
+        loads=[{"kind": "traction", "where": "top", "traction": [0, 1]}],
+        initial={"kind": "equilibrium"},
+        analysis={"kind": "dynamic", "kinematics": "linear", "duration": duration, "outputs": 4},
+        reference={"size": size},
+        quantities=[factor, {**factor, "name": "K_I before", "time": duration / 3}],
+    )
 
 
 def sudden_factor(time, pressure=1.0):
@@ -163,11 +150,6 @@ class TestOnTheReference:
     @pytest.mark.heavy
     @pytest.mark.parametrize("angle", [0.0, 20.0])
     def test_the_stated_uncertainty_of_a_suddenly_opened_crack_covers_the_exact_factor(self, angle):
-        from verify.assess.quantities import Measured
-        from verify.assess.reference import known_quantity, size_of
-        from verify.compare.body import body_of
-        from verify.compare.hooke import law_of
-
         scene = opened_suddenly(angle)
         body, law = body_of(scene), law_of(scene)
         solver = find_solver("reference")

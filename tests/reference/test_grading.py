@@ -8,9 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, square
 
+from reference.fracture import tips
+from reference.fracture.domain import ring
+from reference.meshing import background_mesh, conforming_mesh
 from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
+from verify.solution import Solution
+from verify.solvers.conforming_meshes import reference_mesh
 
 UNIT = ((0.0, 0.0), (1.0, 1.0), (8, 8))
 
@@ -97,8 +102,6 @@ class TestOnUnstructuredMeshes:
 
     @pytest.mark.parametrize("name", CUTS)
     def test_a_cut_in_any_place_keeps_area_and_pieces(self, name):
-        from reference.meshing import background_mesh
-
         polylines, pieces = CUTS[name]
         outline = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
         mesh = cut_square(*polylines, mesh=background_mesh(outline, 0.15))
@@ -107,8 +110,6 @@ class TestOnUnstructuredMeshes:
         assert mesh.pieces.max() + 1 == pieces
 
     def test_a_background_mesh_is_uniform_deterministic_and_ignores_cuts(self):
-        from reference.meshing import background_mesh
-
         outline = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2.0], [0, 2.0]])
         points, cells = background_mesh(outline, 0.1)
         again, _ = background_mesh(outline, 0.1)
@@ -171,8 +172,6 @@ class TestNearerThanTheMeshGeneratorCanGo:
     pytestmark = needs_fenicsx
 
     def test_rings_carry_the_grading_on_to_both_tips(self):
-        from reference.meshing import conforming_mesh
-
         scene = square([polyline("a", (0.3, 0.43), (0.7, 0.61))])
         # few cells, but as small at the tips as those of level 5
         grading = Grading(0.1, singular_points(scene), 4.0, 0.86)
@@ -218,11 +217,6 @@ class TestAroundShortBranches:
     pytestmark = needs_fenicsx
 
     def test_domains_fit_around_every_tip_on_the_coarsest_level_too(self, cuts, level):
-        from reference.fracture import tips
-        from reference.fracture.domain import ring
-        from verify.solution import Solution
-        from verify.solvers.conforming_meshes import reference_mesh
-
         scene = square(cuts, **WIDE, quantities=factors_of(cuts))
         mesh, _ = reference_mesh(scene, level)
         field = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))

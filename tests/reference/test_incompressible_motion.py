@@ -5,6 +5,8 @@ import pytest
 from reference_scenes import needs_fenicsx, polyline
 from test_motion import moving, spread
 
+from verify.solvers import conforming, find_solver
+
 pytestmark = needs_fenicsx
 
 SLIT = polyline("slit", [0.5, 0.4], [0.5, 1.1])
@@ -24,8 +26,6 @@ def swinging(cuts=(SLIT,), poisson=0.4999, duration=0.2, time_step=0.01, **chang
 
 
 def solved(scene, level=0):
-    from verify.solvers import find_solver
-
     return find_solver("reference").solve(scene, level, repetitions=0)
 
 
@@ -57,8 +57,6 @@ def test_the_account_closes_and_a_cut_that_opens_on_the_way_costs_next_to_nothin
 
 def test_a_pressure_halves_the_error_of_a_coarse_mesh_in_motion(monkeypatch):
     """Held on three sides, so that what sinks has to rise beside: 10 and 27 % of the energy."""
-    from verify.solvers import conforming
-
     walls = [{"where": w, "displacement": [0, 0]} for w in ("bottom", "left", "right")]
     scene = swinging(supports=walls, time_step=0.02, duration=0.3)
 

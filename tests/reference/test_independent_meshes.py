@@ -3,7 +3,12 @@
 import pytest
 from reference_scenes import needs_fenicsx
 
+from verify.assess.quantities import Measured
+from verify.assess.reference import known_quantity, size_of
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
 from verify.scene import list_cases, load_scene, load_scenes
+from verify.solvers import find_solver
 
 # other kinds of gmsh's algorithms: Delaunay for frontal and back; Delaunay for HXT
 OTHER = {"Mesh.Algorithm": {5.0: 6.0, 6.0: 5.0}, "Mesh.Algorithm3D": {10.0: 1.0, 1.0: 10.0}}
@@ -43,12 +48,6 @@ def other_meshes(monkeypatch):
 
 def known(scene):
     """Every quantity with its half-width, and the numbers of cells, by three levels."""
-    from verify.assess.quantities import Measured
-    from verify.assess.reference import known_quantity, size_of
-    from verify.compare.body import body_of
-    from verify.compare.hooke import law_of
-    from verify.solvers import find_solver
-
     body, law, solver = body_of(scene), law_of(scene), find_solver("reference")
     levels = [solver.solve(scene, level, repetitions=0) for level in range(scene.reference.levels)]
     sizes = [size_of(level) for level in levels]

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from reference_scenes import square
+from solid_scenes import cube, polygon
 
 from reference.meshing import Grading, conforming_mesh, singular_points
 from verify.compare.hooke import law_of
@@ -16,14 +18,13 @@ HELD = [{"where": "bottom", "displacement": [0.0, 0.0]}]
 
 def scene(regions: list[dict], **changes) -> Scene:
     given = {
-        "title": "t",
-        "requirement": "r",
         "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1.0, 0.8]},
         "mesh": {"cells": [[5, 4]]},
         "material": {**SOFT, "regions": regions},
         "supports": HELD,
+        "loads": [],
     }
-    return Scene.model_validate(given | changes)
+    return square(**given | changes)
 
 
 def area(one: Scene, mesh, number: int) -> float:
@@ -71,25 +72,13 @@ def test_a_corner_of_a_region_and_an_interface_at_the_outline_are_singular() -> 
 
 
 def test_an_inclined_plane_between_two_solids_crosses_no_cell() -> None:
-    one = Scene.model_validate(
-        {
-            "title": "t",
-            "requirement": "r",
-            "geometry": {"kind": "box", "lower": [0, 0, 0], "upper": [1.0, 0.7, 0.6]},
-            "mesh": {"cells": [[2, 2, 2]]},
-            "material": {
-                "young": 1.0,
-                "poisson": 0.3,
-                "regions": [{"where": "z > 0.2 + 0.3 * x - 0.1 * y", "young": 4.0}],
-            },
-            "supports": [{"where": "bottom", "displacement": [0.0, 0.0, 0.0]}],
-            "cuts": [
-                {
-                    "kind": "polygon",
-                    "points": [[0.43, -1, -1], [0.43, 2, -1], [0.43, 2, 0.4], [0.43, -1, 0.4]],
-                }
-            ],
-        }
+    region = {"where": "z > 0.2 + 0.3 * x - 0.1 * y", "young": 4.0}
+    one = cube(
+        [polygon("cut", (0.43, -1, -1), (0.43, 2, -1), (0.43, 2, 0.4), (0.43, -1, 0.4))],
+        geometry={"kind": "box", "lower": [0, 0, 0], "upper": [1.0, 0.7, 0.6]},
+        mesh={"cells": [[2, 2, 2]]},
+        material={"young": 1.0, "poisson": 0.3, "regions": [region]},
+        loads=[],
     )
     mesh = mesh_of(one, 0.3)
     assert not crossed_by_interfaces(one.material, mesh.points, mesh.cells).any()

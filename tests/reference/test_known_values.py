@@ -12,8 +12,14 @@ import numpy as np
 import pytest
 from reference_scenes import TENSION, needs_fenicsx, plate, polyline, square
 
+from reference.exact import exact_solution
 from reference.fracture import stress_intensity, tips
+from verify.assess.quantities import Measured
+from verify.calibration import kernel_seconds
+from verify.compare.body import body_of
+from verify.compare.hooke import hooke
 from verify.scene import Scene
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 ALONG = 1 / np.sqrt(2)
@@ -116,8 +122,6 @@ ROWS = [pytest.param(name, marks=known.marks) for name, known in VALUES.items()]
 
 @cache
 def solved(name, level=None):
-    from verify.solvers import find_solver
-
     known = VALUES[name]
     level = known.level if level is None else level
     return find_solver("reference").solve(known.scene, level, repetitions=0)
@@ -136,10 +140,6 @@ def factors(name, level=None):
 
 @pytest.mark.parametrize("name", ROWS)
 def test_intensities_energies_and_openings_are_the_known_ones(name):
-    from verify.assess.quantities import Measured
-    from verify.compare.body import body_of
-    from verify.compare.hooke import hooke
-
     known = VALUES[name]
     pairs = factors(name)
     assert pairs
@@ -159,8 +159,6 @@ def test_intensities_energies_and_openings_are_the_known_ones(name):
 
 @pytest.mark.timing
 def test_a_notch_is_known_to_a_millionth_in_seconds_and_to_a_thousandth_in_one():
-    from verify.calibration import kernel_seconds
-
     name = "single edge .5"
     solved(name, 0)  # compiles the forms
     for level, accuracy, kernels in ((2, 1e-6, 500), (0, 1e-3, 100)):
@@ -174,9 +172,6 @@ def test_a_notch_is_known_to_a_millionth_in_seconds_and_to_a_thousandth_in_one()
 
 
 def test_a_faceted_circle_converges_with_the_square_of_its_facets():
-    from reference.exact import exact_solution
-    from verify.solvers import find_solver
-
     # a quarter of the body, so that the supports hold both pieces
     scene = square(
         [{"kind": "arc", "name": "a", "centre": [0, 0], "radius": 0.4, "start": -9, "sweep": 108}],

@@ -2,95 +2,63 @@
 
 import numpy as np
 import pytest
+from large_bodies import lame, on_ends, rolled, solve, space_of, turn
 from reference_scenes import needs_fenicsx, polyline, square
 
-from reference.meshing.imprint import imprint, structured_triangles
-from reference.meshing.opening import open_cut
-from verify.scene import Material
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 
-STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
-LAM, MU = 0.3 / (1.3 * 0.4), 1 / 2.6
 
-
-def body(degree, counts, lower=(0.0, 0.0), upper=(1.0, 1.0), cuts=()):
-    from reference.space import conforming_space
-
-    points, cells = structured_triangles(lower, upper, counts)
-    mesh = open_cut(*imprint(points, cells, [np.array(cut) for cut in cuts]))
-    return conforming_space(mesh, degree)
-
-
-def solve(space, nodes, prescribed, **parameters):
-    from reference.large_strain import solve_large_strain
-
-    unknowns = (2 * nodes[:, None] + [0, 1]).ravel().astype(np.int32)
-    return solve_large_strain(
-        STRAIN, space, unknowns, lambda factor: prescribed(factor).ravel(), **parameters
-    )
-
-
-def ends(space, length=1.0):
-    y = space.node_points[:, 1]
-    return np.flatnonzero((y < 1e-12) | (y > length - 1e-12))
-
-
-def turned_and_stretched(points, turn, stretch):
-    """Displacement of a uniform stretch in y with free sides, then a rotation by `turn`."""
-    across = (2 * (LAM + MU) - LAM * stretch) / (LAM + 2 * MU)
-    c, s = np.cos(turn), np.sin(turn)
-    return points @ (np.array([[c, -s], [s, c]]) @ np.diag([across, stretch])).T - points
-
-
-def test_halves_turned_each_by_its_own_rotation_are_stretched_exactly():
-    # a patch test at large strain: W per volume 0.137362637 at stretch 1.5, free sides
-    space = body(1, (8, 8), cuts=[[[0.5, -0.1], [0.5, 1.1]]])
-    nodes, points = ends(space), space.node_points
+@pytest.mark.parametrize(
+    ("d", "degree", "poisson", "energy"),
+    [
+        (2, 1, 0.3, "corotated"),
+        (3, 1, 0.3, "corotated"),
+        (3, 2, 0.3, "corotated"),
+        (2, 2, 0.49, "corotated_mixed"),
+        (3, 2, 0.49, "corotated_mixed"),
+    ],
+)
+def test_halves_turned_each_by_its_own_rotation_are_stretched_exactly(d, degree, poisson, energy):
+    """Sides are free: 2μ (a − 1) + λ tr (U − I) = 0 for the stretch a across the pull."""
+    line, plane = [(0.5, -1), (0.5, 2)], [(0.5, -1, -1), (0.5, 2, -1), (0.5, 2, 2), (0.5, -1, 2)]
+    space = space_of(degree, (8, 8) if d == 2 else (2, 2, 2), cuts=[line if d == 2 else plane])
+    points, (lam, mu) = space.node_points, lame(poisson)
     left = np.zeros(len(points), dtype=bool)
     left[space.cell_nodes[space.centroids[:, 0] < 0.5]] = True
 
+    def strains(factor):
+        across = -lam * 0.5 * factor / (2 * mu + (d - 1) * lam)
+        return np.array([across, 0.5 * factor, across][:d])
+
     def field(factor):
-        one = turned_and_stretched(points, 1.2 * factor, 1 + 0.5 * factor)
-        two = turned_and_stretched(points, -0.7 * factor, 1 + 0.5 * factor)
+        stretched = points * (1 + strains(factor))
+        one, two = (stretched @ turn(d, angle * factor).T - points for angle in (1.2, -1.9))
         return np.where(left[:, None], one, two)
 
-    found = solve(space, nodes, lambda factor: field(factor)[nodes])
-    assert found.strain_energy == pytest.approx(0.137362637, rel=1e-8)
-    assert found.displacement == pytest.approx(field(1.0), abs=1e-10)
-
-
-def rolled(points, curvature, height):
-    """Displacement of a strip |X| < height/2 bent to a curvature, sides free of traction."""
-    if curvature == 0.0:
-        return np.zeros_like(points)
-    X, Y = points.T
-    b = 2 * (LAM + MU) / (LAM + 2 * MU)
-    D = 2 * (LAM + MU) - LAM * b
-    B = D * (LAM + 2 * MU) / ((LAM + 2 * MU) ** 2 - LAM**2)
-    B /= curvature * np.cosh(curvature * height / 2)
-    A = -LAM * B / (LAM + 2 * MU)
-    r = A * np.cosh(curvature * X) + B * np.sinh(curvature * X) + b / curvature
-    middle = A + b / curvature
-    return np.column_stack([r * np.cos(curvature * Y) - middle - X, r * np.sin(curvature * Y) - Y])
+    found = solve(space, on_ends(space), field, poisson, energy=energy)
+    stored = mu * np.sum(strains(1.0) ** 2) + lam / 2 * np.sum(strains(1.0)) ** 2
+    assert found.strain_energy == pytest.approx(stored, rel=1e-9)
+    assert found.displacement == pytest.approx(field(1.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("degree, order", [(1, 2.0), (2, 4.0)])
 def test_bending_converges_with_twice_the_degree(degree, order):
     errors = []
     for n in (2, 4):
-        space = body(degree, (n * (3 - degree), 10 * n * (3 - degree)), (-0.05, 0.0), (0.05, 1.0))
-        nodes = ends(space)
+        rows = n * (3 - degree)
+        space = space_of(degree, (rows, 10 * rows), (-0.05, 0.0), (0.05, 1.0))
         found = solve(
-            space, nodes, lambda f, s=space, k=nodes: rolled(s.node_points[k], f * np.pi, 0.1)
+            space, on_ends(space), lambda f, x=space.node_points: rolled(x, f * np.pi, 0.1)
         )
         errors.append(found.strain_energy / 4.4748894293e-4 - 1)
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
 
 
 def test_a_split_strip_peels_into_opposite_half_circles():
-    space = body(2, (16, 160), (-0.05, 0.0), (0.05, 1.0), [[[0.0, -0.1], [0.0, 1.1]]])
-    nodes, points = ends(space), space.node_points
+    space = space_of(2, (16, 160), (-0.05, 0.0), (0.05, 1.0), [[[0.0, -0.1], [0.0, 1.1]]])
+    points = space.node_points
     right = np.zeros(len(points), dtype=bool)
     right[space.cell_nodes[space.centroids[:, 0] > 0]] = True
     mirror = np.where(right, 1.0, -1.0)[:, None] * [1.0, 0.0] + [0.0, 1.0]
@@ -99,13 +67,11 @@ def test_a_split_strip_peels_into_opposite_half_circles():
         own = points * mirror - [0.025, 0.0]  # both halves as the right one, about its middle
         return rolled(own, -factor * np.pi, 0.05) * mirror
 
-    found = solve(space, nodes, lambda factor: field(factor)[nodes])
+    found = solve(space, on_ends(space), field)
     assert found.strain_energy == pytest.approx(1.12698177e-4, rel=1e-6)
 
 
 def test_small_loads_give_the_linear_answer():
-    from verify.solvers import find_solver
-
     cut = polyline("cut", (-0.1, 0.5), (0.5, 0.5))
     opening = [{"kind": "opening", "name": "mouth", "at": 0.2}]
     held = [{"where": "bottom", "displacement": [0, 0]}]
@@ -124,8 +90,6 @@ def test_small_loads_give_the_linear_answer():
 
 
 def test_what_turns_inside_out_at_a_tip_is_measured_and_stays_a_point():
-    from verify.solvers import find_solver
-
     # the corotated energy has no barrier: strains like r^-1/2 invert the cells next to a tip
     cut = polyline("cut", (-0.1, 0.5), (0.5, 0.5))
     scene = square(
@@ -144,8 +108,7 @@ def test_what_turns_inside_out_at_a_tip_is_measured_and_stays_a_point():
 
 
 def test_a_load_beyond_any_equilibrium_says_how_far_it_came_and_why():
-    space = body(1, (4, 4))
-    nodes = ends(space)
+    space = space_of(1, (4, 4))
     with pytest.raises(RuntimeError, match=r"no equilibrium beyond load factor 0\.\d+: at 0\.\d+"):
         # pressed to nothing and through itself
-        solve(space, nodes, lambda f: -1.5 * f * space.node_points[nodes] * [0, 1])
+        solve(space, on_ends(space), lambda f: -1.5 * f * space.node_points * [0, 1])

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from reference_scenes import square
 
+from reference.exact import exact_solution
 from verify.compare.hooke import law_of
 from verify.compare.kinetic import density_of, kinetic
 from verify.compare.strain_energy import strain_energy
@@ -17,21 +19,17 @@ CUT = {"kind": "polyline", "points": [[0.33, -0.1], [0.52, 1.1]]}
 
 def scene(**changes) -> Scene:
     given = {
-        "title": "t",
-        "requirement": "r",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1.0, 1.0]},
         "mesh": {"cells": [[5, 5]]},
         "material": SOFT,
         "supports": [{"where": "bottom", "displacement": [0.0, 0.0]}],
+        "loads": [],
         "reference": {"size": 0.3},
     }
-    return Scene.model_validate(given | changes)
+    return square(**given | changes)
 
 
 @pytest.fixture(scope="module")
 def patch() -> tuple[Scene, object]:
-    from reference.exact import exact_solution
-
     case = load_scene("material/layers_patch")
     assert case.exact is not None
     return case, exact_solution(case.exact.solution, case.exact.parameters, case.material)

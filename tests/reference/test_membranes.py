@@ -4,10 +4,15 @@ import meshio
 import numpy as np
 import pytest
 from case_texts import cut_text, sheet_text, support_text, weight_text
-from reference_scenes import needs_fenicsx
+from reference_scenes import needs_fenicsx, square
 from scipy.optimize import brentq
 
+from reference.dynamics_law import CorotatedLaw
 from reference.meshing import imprint_surface, open_cut
+from reference.space import conforming_space
+from verify.assess.quantities import Measured
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
 from verify.compare.kinetic import kinetic
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
@@ -35,21 +40,18 @@ def test_plane_stress_stretches_the_sheet_as_in_the_plane(tmp_path):
     sides = support_text("boundary") + support_text("x > 0.999999", (0.1, 0, 0))
     two = solve(tmp_path, [3, 3], lambda x, y: (x, y, 0 * x), sides, poisson=0.3)
     assert two.displacement[0][:, 2] == pytest.approx(0.0, abs=1e-12)
-    flat = {
-        "title": "sheet",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-        "mesh": {"cells": [[3, 3]]},
-        "material": {"young": YOUNG, "poisson": 0.3, "plane": "stress"},
-        "analysis": {"kinematics": "corotational"},
-        "supports": [
-            {"where": "boundary", "displacement": [0, 0]},
-            {"where": "x > 0.999999", "displacement": [0.1, 0]},
-        ],
-    }
-    from verify.scene import Scene
-
-    plane = find_solver("conforming").solve(Scene.model_validate(flat), 0, repetitions=0)
+    drawn = [
+        {"where": "boundary", "displacement": [0, 0]},
+        {"where": "x > 0.999999", "displacement": [0.1, 0]},
+    ]
+    flat = square(
+        mesh={"cells": [[3, 3]]},
+        material={"young": YOUNG, "poisson": 0.3, "plane": "stress"},
+        analysis={"kinematics": "corotational"},
+        supports=drawn,
+        loads=[],
+    )
+    plane = find_solver("conforming").solve(flat, 0, repetitions=0)
     energy = THICKNESS * plane.ledger["strain"][0]
     assert two.ledger["strain"][0] == pytest.approx(energy, rel=1e-10)
 
@@ -156,9 +158,6 @@ def moved(scene, name="conforming", level=0, **parameters):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_mean_force_on_a_membrane_is_a_discrete_gradient_and_turns_nothing(degree):
-    from reference.dynamics_law import CorotatedLaw
-    from reference.space import conforming_space
-
     space = conforming_space(open_cut(*bowl(2), NONE), degree)
     mechanics, x = CorotatedLaw(SKIN, space), space.node_points
     random = np.random.default_rng(1)
@@ -210,10 +209,6 @@ def test_a_bowl_that_is_let_go_moves_as_that_of_the_compact_solver(tmp_path):
 @pytest.mark.parametrize("name, off", [("reference", 0.002), ("xfem", 0.03)])
 def test_the_lips_of_a_tear_fly_apart_with_the_elastic_wave(name, off):
     """Without lateral contraction the motion is linear along the band at any stretch."""
-    from verify.assess.quantities import Measured
-    from verify.compare.body import body_of
-    from verify.compare.hooke import law_of
-
     scene = load_scene("dynamics/membrane_torn")
     level = 1 if name == "reference" else 0
     found = Measured(moved(scene, name, level), body_of(scene), law_of(scene), scene)

@@ -6,10 +6,17 @@ from ranks_of_tests import on_ranks
 from reference_scenes import needs_fenicsx, polyline, square
 from scipy.sparse.linalg import eigsh
 
+from reference.dynamics import inherit
+from reference.linear_system import linear_system
+from reference.meshing import Grading, conforming_mesh, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
+from reference.space import conforming_space
 from verify.errors import InputError
 from verify.scene import Scene, load_scene
+from verify.solvers import find_solver
+from verify.solvers.conforming import ConformingSolver
+from verify.solvers.xfem import XfemSolver
 
 pytestmark = needs_fenicsx
 
@@ -19,27 +26,14 @@ MIDDLE = polyline("middle", [-0.1, 0.5], [1.1, 0.5])
 
 def moving(cuts=(), kinematics="linear", duration=0.5, outputs=6, **changes):
     """Give a free unit square of tissue."""
-    content = {
-        "title": "square",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-        "mesh": {"cells": [[4, 4]]},
-        "material": {"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0},
-        "cuts": list(cuts),
-        "analysis": {
-            "kind": "dynamic",
-            "kinematics": kinematics,
-            "duration": duration,
-            "time_step": 0.01,
-            "outputs": outputs,
-        },
-    }
-    return Scene.model_validate(content | changes)
+    analysis = {"kind": "dynamic", "kinematics": kinematics, "duration": duration,
+                "time_step": 0.01, "outputs": outputs}  # fmt: skip
+    tissue = {"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0}
+    free = {"mesh": {"cells": [[4, 4]]}, "supports": [], "loads": []}
+    return square(cuts, **{"material": tissue, "analysis": analysis, **free} | changes)
 
 
 def solved(scene, solver="conforming", level=0, **parameters):
-    from verify.solvers import find_solver
-
     return find_solver(solver).solve(scene, level, repetitions=0, **parameters)
 
 
@@ -176,10 +170,6 @@ CUTS = {
 
 def frequencies(cuts, count, size=0.05, graded=True):
     """Lowest angular frequencies, rad/s, of a beam of length 1 and depth 0.2."""
-    from reference.linear_system import linear_system
-    from reference.meshing import Grading, conforming_mesh, singular_points
-    from reference.space import conforming_space
-
     scene = square(
         cuts,
         geometry={"kind": "rectangle", "lower": [0, 0], "upper": [1, 0.2]},
@@ -206,16 +196,12 @@ HALVED = np.array([[0.0, -1.0], [0.0, 1.0]])
 
 def spaces(lower, upper, counts, cut, degree=1):
     """Give one mesh twice: with its cut closed, and open."""
-    from reference.space import conforming_space
-
     points, cells, facets = imprint(*structured_triangles(lower, upper, counts), [cut])
     none = np.zeros((0, 2), dtype=np.int64)
     return [conforming_space(open_cut(points, cells, f), degree) for f in (none, facets)]
 
 
 def test_a_state_is_not_carried_over_to_another_mesh():
-    from reference.dynamics import inherit
-
     closed, _ = spaces((-1.0, 0.0), (1.0, 1.0), (4, 4), HALVED)
     other, _ = spaces((-1.0, 0.0), (1.0, 1.0), (6, 4), HALVED)
     with pytest.raises(InputError, match="does not have the cells"):
@@ -224,9 +210,6 @@ def test_a_state_is_not_carried_over_to_another_mesh():
 
 @pytest.mark.parametrize("kinematics, rho", [("linear", 0.3), ("corotational", 0.6)])
 def test_both_solvers_find_the_same_motion(kinematics, rho):
-    from verify.solvers.conforming import ConformingSolver
-    from verify.solvers.xfem import XfemSolver
-
     scene = square(
         supports=[{"where": "left", "displacement": [0, 0]}],
         material={"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0},

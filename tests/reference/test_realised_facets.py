@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
-from solid_scenes import cube, polygon, volumes
+from solid_scenes import area, cube, cylinder, polygon, swept, volumes
 
-from reference.meshing import imprint_facets, open_cut, structured_tetrahedra
+from reference.meshing import ConformingMesh, imprint_facets, open_cut, structured_tetrahedra
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 
@@ -18,46 +19,21 @@ CUTS = {
         polygon("a", (-1, -1, 0.43), (2, -1, 0.45), (2, 2, 0.57), (-1, 2, 0.55)),
         polygon("b", (0.41, -1, -1), (0.45, 2, -1), (0.57, 2, 2), (0.53, -1, 2)),
     ],
-    "swept": [
-        {
-            "kind": "swept",
-            "name": "a",
-            "points": [[-0.2, 0.2, 0.0], [0.5, 0.63, 0.0], [1.2, 0.3, 0.0]],
-            "along": [0.1, 0.0, 2.0],
-        }
-    ],
-    "cylinder": [
-        {
-            "kind": "cylinder",
-            "name": "a",
-            "base": [0.5, 0.48, -0.2],
-            "axis": [0.0, 0.0, 1.0],
-            "radius": 0.33,
-            "height": 1.5,
-        }
-    ],
+    "swept": [swept((0.1, 0.0, 2.0), (-0.2, 0.2, 0.0), (0.5, 0.63, 0.0), (1.2, 0.3, 0.0))],
+    "cylinder": [cylinder((0.5, 0.48, -0.2), 1.5, 0.33)],
 }
 
 
 def judged(cuts, **changes):
-    from verify.solvers import find_solver
-
     scene = cube(cuts, mesh={"cells": [[4, 4, 4]]}, supports=HELD, loads=WEIGHT, **changes)
     return scene, find_solver("xfem").solve(scene, 0, repetitions=0)
 
 
 def piece_volumes(points, cells):
     """Volumes of the parts of a mesh that no node joins, ascending."""
-    from reference.meshing import ConformingMesh
-
     none = np.zeros((0, 2), dtype=np.int64)
     mesh = ConformingMesh(points, cells, np.arange(len(points)), none, none)
     return np.sort(np.bincount(mesh.pieces, volumes(mesh)))
-
-
-def area(corner):
-    spread = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return 0.5 * float(np.linalg.norm(spread, axis=1).sum())
 
 
 @pytest.mark.parametrize("name", CUTS)
@@ -75,8 +51,6 @@ def test_pieces_and_faces_are_those_of_the_solver_that_realised_the_cut(name):
 
 def test_the_conforming_and_refined_energies_on_the_realised_cut_enclose_that_of_xfem():
     """P1 on the split mesh can do all that XFEM can, and quadratic elements on halves more."""
-    from verify.solvers import find_solver
-
     scene, field = judged(CUTS["ending inside"])
     triangles = [polygon(f"t{i}", *corners) for i, corners in enumerate(field.cut_facets)]
     realised = cube(

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from reference_scenes import areas, energy_of, needs_fenicsx, polyline, square
+from reference_scenes import arc, areas, energy_of, needs_fenicsx, polyline, square
 
+from reference.meshing import Grading, conforming_mesh, singular_points
 from verify.assess.richardson import extrapolate
 from verify.errors import InputError
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 
 
 def graded(scene, level=0):
-    from reference.meshing import Grading, conforming_mesh, singular_points
-
     grading = Grading(1 / 12, singular_points(scene), 0.5, strip=1.0)
     return conforming_mesh(scene, grading.halved(level))
 
@@ -35,46 +35,17 @@ CLOSE = {
         "1e-08",
     ),
     "an arc that almost touches the boundary between its ends": (
-        [
-            {
-                "kind": "arc",
-                "name": "a",
-                "centre": [0.5, 0.2 + 1e-8],
-                "radius": 0.2,
-                "start": 250.0,
-                "sweep": 50.0,
-            }
-        ],
+        [arc("a", (0.5, 0.2 + 1e-8), 0.2, 250.0, 50.0)],
         "cut 'a' and the boundary",
         "1e-08",
     ),
     "two arcs back to back": (
-        [
-            {
-                "kind": "arc",
-                "name": "a",
-                "centre": [0.3, 0.5],
-                "radius": 0.1,
-                "start": -30.0,
-                "sweep": 90.0,
-            },
-            {
-                "kind": "arc",
-                "name": "b",
-                "centre": [0.5 + 1e-8, 0.5],
-                "radius": 0.1,
-                "start": 150.0,
-                "sweep": 90.0,
-            },
-        ],
+        [arc("a", (0.3, 0.5), 0.1, -30.0, 90.0), arc("b", (0.5 + 1e-8, 0.5), 0.1, 150.0, 90.0)],
         "cut 'a' and cut 'b'",
         "1e-08",
     ),
     "an arc and a line": (
-        [
-            {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2, "sweep": 180.0},
-            polyline("b", (0.5, 0.7 + 1e-8), (0.5, 0.9)),
-        ],
+        [arc("a", (0.5, 0.5), 0.2, 0.0, 180.0), polyline("b", (0.5, 0.7 + 1e-8), (0.5, 0.9))],
         "cut 'a' and cut 'b'",
         "1e-08",
     ),
@@ -85,7 +56,7 @@ CLOSE = {
 def test_what_is_too_close_to_mesh_apart_is_refused_with_its_distance(what):
     cuts, names, distance = CLOSE[what]
     with pytest.raises(InputError) as caught:
-        graded(square([cut if isinstance(cut, dict) else cut.model_dump() for cut in cuts]))
+        graded(square(cuts))
     assert names in str(caught.value)
     assert f"within {distance} m" in str(caught.value)
     assert "resolves 1e-06 m" in str(caught.value)
@@ -123,29 +94,23 @@ def test_the_reference_of_a_narrow_strip_knows_its_error():
     assert known.half_width < 2e-4 * values[3]
 
 
-def circle(name, x, y, radius, start=0.0, sweep=360.0):
-    centre = [x, y]
-    return {"kind": "arc", "name": name, "centre": centre, "radius": radius, "start": start,
-            "sweep": sweep}  # fmt: skip
-
-
 TANGENT = {
     # half of this circle used to be taken for the boundary, and stayed uncut without a word
-    "a circle and the boundary": ([circle("a", 0.5, 0.2, 0.2)], "cut 'a' and the boundary"),
+    "a circle and the boundary": ([arc("a", (0.5, 0.2), 0.2)], "cut 'a' and the boundary"),
     "an arc and the boundary": (
-        [circle("a", 0.5, 0.2, 0.2, 200.0, 140.0)],
+        [arc("a", (0.5, 0.2), 0.2, 200.0, 140.0)],
         "cut 'a' and the boundary",
     ),
     "an arc and a line": (
-        [circle("a", 0.5, 0.3, 0.2, 30.0, 120.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
+        [arc("a", (0.5, 0.3), 0.2, 30.0, 120.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
         "cut 'a' and cut 'b'",
     ),
     "an arc that ends on a line": (
-        [circle("a", 0.5, 0.3, 0.2, 30.0, 60.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
+        [arc("a", (0.5, 0.3), 0.2, 30.0, 60.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
         "cut 'a' and cut 'b'",
     ),
     "two circles": (
-        [circle("a", 0.3, 0.5, 0.1, 200.0, 320.0), circle("b", 0.6, 0.5, 0.2, 20.0, 320.0)],
+        [arc("a", (0.3, 0.5), 0.1, 200.0, 320.0), arc("b", (0.6, 0.5), 0.2, 20.0, 320.0)],
         "cut 'a' and cut 'b'",
     ),
 }
@@ -200,15 +165,11 @@ HUNG = {"analysis": MOVING, "initial": {"kind": "equilibrium", "cuts": "open"}}
 )
 def test_a_needle_too_slender_for_round_off_is_named_by_its_place(scene):
     """Its bending stiffness falls with the cube of its width."""
-    from verify.solvers import find_solver
-
     with pytest.raises(InputError, match=r"around \(0\.\d+, 0\.5\d*\).*slender"):
         find_solver("reference").solve(scene, 0, 0)
 
 
 def test_its_inertia_holds_a_needle_in_a_motion():
-    from verify.solvers import find_solver
-
     scene = needle(1.2e-3, analysis=MOVING)
     ledger = find_solver("reference").solve(scene, 0, 0).ledger
     assert ledger["kinetic"][-1] > 0

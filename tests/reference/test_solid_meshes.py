@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
-from solid_scenes import CURVED, SHAPES, area, cube, disc, volumes
+from solid_scenes import CURVED, SHAPES, area, cube, cylinder, disc, polygon, volumes
 
 from reference.meshing import (
     Grading,
+    conforming_mesh,
     imprint_polygons,
     open_cut,
     refine_uniformly,
     structured_tetrahedra,
+    structured_triangles,
 )
 from reference.meshing.edge_splitting import mesh_edges, split_edges
 from reference.meshing.opening import cell_facets
@@ -23,7 +25,7 @@ def check(mesh, expected_area, pieces, tolerance):
     volume = volumes(mesh)
     assert volume.min() > 0
     assert volume.sum() == pytest.approx(1.0, rel=1e-12)
-    assert area(mesh) == pytest.approx(expected_area, rel=tolerance)
+    assert area(mesh.realised_cut) == pytest.approx(expected_area, rel=tolerance)
     assert mesh.pieces.max() + 1 == pieces
     facets = np.unique(cell_facets(mesh.cells), axis=0, return_counts=True)[1]
     assert facets.max() <= 2
@@ -35,8 +37,6 @@ class TestMadeAnew:
 
     @pytest.mark.parametrize("name", [*SHAPES, *CURVED])
     def test_every_cut_opens_with_its_area_and_leaves_the_volume(self, name):
-        from reference.meshing import conforming_mesh
-
         cuts, expected, pieces = (SHAPES | CURVED)[name]
         # plane facets are exact; a circle of chords h loses h²/24R² of its length, and a disc
         # h²/6R² of its area
@@ -45,25 +45,19 @@ class TestMadeAnew:
         check(conforming_mesh(cube(cuts), UNIFORM), expected, pieces, tolerance)
 
     def test_a_finer_mesh_facets_a_curved_cut_with_an_error_of_order_two(self):
-        from reference.meshing import conforming_mesh
-
         errors = []
         for size in (0.1, 0.05):
             mesh = conforming_mesh(cube(CURVED["cylinder"][0]), Grading(size, np.zeros((0, 3))))
-            errors.append(1 - area(mesh) / CURVED["cylinder"][1])
+            errors.append(1 - area(mesh.realised_cut) / CURVED["cylinder"][1])
         assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.4)
 
     def test_the_same_scene_gives_the_same_mesh_twice(self):
-        from reference.meshing import conforming_mesh
-
         grading = Grading(0.2, np.zeros((0, 3)), 0.5, 2 / 3, curves=True)
         one, two = (conforming_mesh(cube([disc()]), grading) for _ in "ab")
         assert np.array_equal(one.points, two.points)
         assert np.array_equal(one.cells, two.cells)
 
     def test_grading_refines_fronts_and_ends_of_supports_and_nothing_else(self):
-        from reference.meshing import conforming_mesh
-
         grading = Grading(0.15, np.zeros((0, 3)), 0.5, 2 / 3, curves=True)
         part = [{"where": "z < 1e-9 and x < 0.4", "displacement": [0, 0, 0]}]
         mesh = conforming_mesh(cube([disc(0.2, (0.5, 0.5, 0.6))], supports=part), grading)
@@ -79,8 +73,6 @@ class TestMadeAnew:
             assert size_near(smooth) > 0.1
 
     def test_a_part_that_ends_along_an_oblique_line_is_refused(self):
-        from reference.meshing import conforming_mesh
-
         part = [{"where": "x + y < 0.3", "displacement": [0, 0, 0]}]
         with pytest.raises(UnsupportedSceneError, match="curved or oblique"):
             conforming_mesh(cube(supports=part), UNIFORM)
@@ -137,8 +129,6 @@ class TestImprinted:
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_splitting_any_edges_keeps_a_mesh_conforming(d):
-    from reference.meshing import structured_triangles
-
     make = structured_triangles if d == 2 else structured_tetrahedra
     points, cells = make((0,) * d, (1,) * d, (3,) * d)
     edges = mesh_edges(cells)
@@ -177,17 +167,10 @@ class TestBadGeometry:
     pytestmark = needs_fenicsx
 
     def mesh(self, cuts, size=0.1):
-        from reference.meshing import conforming_mesh
-
         return conforming_mesh(cube(cuts), Grading(size, np.zeros((0, 3))))
 
     def discs(self, apart):
-        low, high = (
-            {"kind": "disc", "name": name, "centre": [0.5, 0.5, z], "normal": [0.0, 0, 1],
-             "radius": 0.2}
-            for name, z in (("low", 0.5), ("high", 0.5 + apart))
-        )  # fmt: skip
-        return [low, high]
+        return [disc(0.2, (0.5, 0.5, 0.5 + z), name=f"at {z}") for z in (0.0, apart)]
 
     @pytest.mark.parametrize("apart", [1e-8, 1e-7])
     def test_two_discs_that_would_be_merged_are_refused_by_name(self, apart):
@@ -200,16 +183,13 @@ class TestBadGeometry:
         check(self.mesh(self.discs(apart)), 2 * np.pi * 0.04, 1, 1.2 * 0.1**2 / (6 * 0.2**2))
 
     def test_a_rim_that_touches_the_surface_of_the_body_keeps_its_area(self):
-        rim = {"kind": "disc", "name": "d", "centre": [0.5, 0.5, 0.2], "normal": [1.0, 0, 0],
-               "radius": 0.2}  # fmt: skip
+        rim = disc(0.2, (0.5, 0.5, 0.2), (1.0, 0.0, 0.0))
         check(self.mesh([rim]), np.pi * 0.04, 1, 1.2 * 0.1**2 / (6 * 0.2**2))
 
     def test_a_tube_that_touches_the_surface_along_a_line_frees_its_core(self):
-        tube = {"kind": "cylinder", "name": "c", "base": [0.5, 0.2, -0.1], "axis": [0.0, 0, 1],
-                "radius": 0.2, "height": 1.2}  # fmt: skip
+        tube = cylinder((0.5, 0.2, -0.1), 1.2, 0.2)
         check(self.mesh([tube]), 0.4 * np.pi, 2, 1.2 * 0.1**2 / (6 * 0.2**2))
 
     def test_a_cut_through_a_support_opens_it(self):
-        plane = {"kind": "polygon", "name": "p", "points": [
-            [0.5, -0.1, -0.1], [0.5, 1.1, -0.1], [0.5, 1.1, 0.5], [0.5, -0.1, 0.5]]}  # fmt: skip
+        plane = polygon("p", (0.5, -0.1, -0.1), (0.5, 1.1, -0.1), (0.5, 1.1, 0.5), (0.5, -0.1, 0.5))
         check(self.mesh([plane]), 0.5, 1, 1e-12)

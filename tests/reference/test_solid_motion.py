@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
-from solid_scenes import polygon
+from solid_scenes import cube, polygon
 
+from reference import dynamics_body, nodal_algebra
+from reference.dynamics_law import CorotatedLaw
 from reference.meshing import open_cut, structured_tetrahedra
-from verify.scene import Material, Scene
+from reference.space import conforming_space
+from verify.scene import Material
+from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
 
@@ -23,34 +27,18 @@ SPIN = {
 
 def moving(cuts=(), duration=0.5, **changes):
     """Give a free unit cube of tissue."""
-    content = {
-        "title": "cube",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
-        "mesh": {"cells": [[2, 2, 2]]},
-        "material": {"young": 1e4, "poisson": 0.3, "density": 1000.0},
-        "cuts": list(cuts),
-        "analysis": {
-            "kind": "dynamic",
-            "kinematics": "corotational",
-            "duration": duration,
-            "time_step": 0.01,
-            "outputs": 6,
-        },
-    }
-    return Scene.model_validate(content | changes)
+    analysis = {"kind": "dynamic", "kinematics": "corotational", "duration": duration,
+                "time_step": 0.01, "outputs": 6}  # fmt: skip
+    tissue = {"young": 1e4, "poisson": 0.3, "density": 1000.0}
+    free = {"mesh": {"cells": [[2, 2, 2]]}, "supports": [], "loads": []}
+    return cube(cuts, **{"material": tissue, "analysis": analysis, **free} | changes)
 
 
 def solved(scene, **parameters):
-    from verify.solvers import find_solver
-
     return find_solver("conforming").solve(scene, 0, repetitions=0, **parameters)
 
 
 def law(degree, counts=(1, 1, 1)):
-    from reference.dynamics_law import CorotatedLaw
-    from reference.space import conforming_space
-
     mesh = open_cut(*structured_tetrahedra((0, 0, 0), (1, 1, 1), counts), NONE)
     space = conforming_space(mesh, degree)
     return CorotatedLaw(TISSUE, space), space.node_points
@@ -132,8 +120,6 @@ def test_steps_by_conjugate_gradients_are_those_of_factorisations_while_facets_o
     kinematics, monkeypatch
 ):
     """Also where one takes over at once, since it is said to cost nothing."""
-    from reference import dynamics_body, nodal_algebra
-
     analysis = {"kind": "dynamic", "kinematics": kinematics, "duration": 0.08, "outputs": 3}
     scene = moving(
         [BLADE],

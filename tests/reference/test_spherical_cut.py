@@ -15,19 +15,15 @@ CENTRE, RADIUS = np.array([-0.06, -0.03, -0.04]), 0.6
 
 def shell(cells):
     """Cut a part of a ball out of a corner of a cube, so that the supports hold both pieces."""
+    parameters = {"centre": list(CENTRE), "radius": RADIUS, "outward": 0.1, "at": 1.0}
     cut = {"kind": "sphere", "centre": list(CENTRE), "radius": RADIUS, "expected": "through"}
     return cube(
         [cut],
         mesh={"cells": [[n, n, n] for n in cells]},
         supports=EXACT,
         loads=[],
-        exact={
-            "solution": "spherical_cut",
-            "parameters": {
-                "centre": list(CENTRE), "radius": RADIUS, "outward": 0.1, "at": 1.0,
-            },
-        },
-    )  # fmt: skip
+        exact={"solution": "spherical_cut", "parameters": parameters},
+    )
 
 
 def energy(scene):

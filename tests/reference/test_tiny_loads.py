@@ -9,6 +9,8 @@ import pytest
 from reference_scenes import needs_fenicsx, polyline, square
 from solid_scenes import cube, polygon
 
+from verify.solvers import find_solver
+
 pytestmark = needs_fenicsx
 
 MOTION = {"kind": "dynamic", "duration": 0.4, "time_step": 0.1, "outputs": 2}
@@ -32,8 +34,6 @@ def scene(dimension, kinematics, tension, analysis, poisson):
 
 def per_load(*arguments, solver="reference", **parameters):
     """Last displacement per unit of tension."""
-    from verify.solvers import find_solver
-
     asked = scene(*arguments)
     field = find_solver(solver).solve(asked, 0, repetitions=0, **parameters)
     return field.displacement[-1] / max(arguments[2], 1e-300)

@@ -7,6 +7,11 @@ from reference_scenes import energy_of, needs_fenicsx, polyline, square
 from reference.exact import exact_solution
 from verify.exchange import problem_of
 from verify.scene import BodyForce
+from verify.solvers.body_of_scene import background_mesh
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.loads_of_scene import loads_of
+from verify.solvers.xfem import XfemSolver
+from verify.xfem.phantom import cut_mesh
 
 POINT, SLOPE, GRADIENT, POISSON = (0.4, 0.55), 0.31, 0.8, 0.3
 C, S = np.array([1.0, SLOPE]) / np.hypot(1.0, SLOPE)
@@ -30,15 +35,10 @@ def bar(written_out):
         # along the bar, where no traction acts, and beside its axis
         [polyline("cut", (-0.1, 0.5 - 0.6 * SLOPE), (1.1, 0.5 + 0.6 * SLOPE))],
         material={"young": 1.0, "poisson": POISSON, "plane": "strain"},
-        exact={
-            "solution": "bending",
-            "parameters": {
-                "point": list(POINT),
-                "slope": SLOPE,
-                "stress_gradient": [GRADIENT, GRADIENT],
-                "shift": [0.0, 0.0],
-            },
-        },
+        exact={"solution": "bending", "parameters": {
+            "point": list(POINT), "slope": SLOPE, "stress_gradient": [GRADIENT, GRADIENT],
+            "shift": [0.0, 0.0],
+        }},
         supports=[
             {"where": w, "displacement": DISPLACEMENT if written_out else "exact"}
             for w in ("bottom", "top")
@@ -47,7 +47,7 @@ def bar(written_out):
             {"kind": "traction", "where": side, "traction": t if written_out else "exact"}
             for side, t in tractions.items()
         ],
-    )
+    )  # fmt: skip
 
 
 def test_the_exchange_gives_the_nodal_forces_of_the_exact_tractions():
@@ -57,19 +57,12 @@ def test_the_exchange_gives_the_nodal_forces_of_the_exact_tractions():
 
 
 def test_the_compact_solver_answers_as_under_the_exact_tractions():
-    from verify.solvers.xfem import XfemSolver
-
     formulas, exact = (XfemSolver().solve(bar(way), 0) for way in (True, False))
     scale = np.abs(exact.displacement).max()
     np.testing.assert_allclose(formulas.displacement, exact.displacement, atol=1e-13 * scale)
 
 
 def test_a_varying_body_force_has_its_integral_on_both_sides_of_a_cut():
-    from verify.solvers.body_of_scene import background_mesh
-    from verify.solvers.cuts_of_scene import cuts_of
-    from verify.solvers.loads_of_scene import loads_of
-    from verify.xfem.phantom import cut_mesh
-
     scene = bar(True).model_copy(
         update={"loads": [BodyForce(kind="body_force", force=["x*y", "y**2"])]}
     )

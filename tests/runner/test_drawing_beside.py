@@ -10,7 +10,7 @@ import pytest
 
 from verify.report import render, rendering
 from verify.report.figures.style import Palette
-from verify.runner import Options, run_cases
+from verify.runner import Options, RunStoppedError, drawing, run_cases
 from verify.scene import load_scene
 
 
@@ -73,8 +73,6 @@ def test_a_case_that_was_drawn_in_other_colours_is_drawn_again(drawn, tmp_path):
 
 def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypatch):
     """The run is stopped as soon as a case is being drawn; all that it started ends with it."""
-    from verify.runner import RunStoppedError, drawing
-
     started = []
     real = drawing.Child
 

@@ -15,7 +15,7 @@ from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, Verd
 from verify.runner import selection
 from verify.runner.families import Families
 from verify.runner.selection import select_cases
-from verify.scene import load_scene, load_scenes
+from verify.scene import load_scene, load_scenes, loading
 from verify.solvers import named
 from verify.study.variants import variant_of
 
@@ -103,8 +103,6 @@ CASES = {
 
 @pytest.fixture(autouse=True)
 def _project(tmp_path, monkeypatch, case_text):
-    from verify.scene import loading
-
     for name, (title, tags) in CASES.items():
         path = tmp_path / f"{name}.toml"
         path.parent.mkdir(exist_ok=True)

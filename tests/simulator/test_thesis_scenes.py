@@ -8,6 +8,7 @@ from thesis_stages import CASES, stage
 
 from verify.scene import load_scene
 from verify.simulator import Session, quality_of, stage_of
+from verify.solvers.interface import find_solver
 
 G, H = 9.8, 0.005
 
@@ -104,8 +105,6 @@ def test_the_incision_in_the_face_opens_and_the_face_keeps_its_nodes() -> None:
 
 
 def test_no_solver_takes_a_played_scene() -> None:
-    from verify.solvers.interface import find_solver
-
     scene = load_scene(CASES / "hand_straight.toml")
     assert find_solver("xfem").refuses(scene)
     assert Path(scene.file).is_file()

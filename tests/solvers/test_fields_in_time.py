@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reference.exact import exact_solution
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -104,8 +105,6 @@ def _strip(cuts, **changes):
 
 
 def _strip_error(found, scene):
-    from reference.exact import exact_solution
-
     exact = exact_solution("blade_strip", scene["exact"]["parameters"],
                            Scene.model_validate(scene).material)  # fmt: skip
     middles = found.points[found.cells[:, :4]].mean(axis=1)

@@ -7,6 +7,7 @@ from case_texts import body_text, cut_text, sheet_text, support_text, weight_tex
 
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
+from verify.xfem.structured_meshes import rectangle_mesh
 
 CUBE = body_text(
     "A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[4, 4, 4], [8, 8, 8]], density="1.0"
@@ -123,8 +124,6 @@ ACROSS = cut_text([0.47, -0.1, -1.0], [0.43, 1.1, -1.0], [0.43, 1.1, 1.0], [0.47
 
 
 def sheet(folder, height):
-    from verify.xfem.structured_meshes import rectangle_mesh
-
     mesh = rectangle_mesh([6, 6])
     points = np.column_stack([mesh.points, height(*mesh.points.T)])
     meshio.Mesh(points, [("triangle", mesh.cells)]).write(folder / "sheet.vtu")

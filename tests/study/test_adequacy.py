@@ -9,7 +9,7 @@ from verify.assess.accuracy import assess_accuracy
 from verify.assess.adequacy import adequacy_notice, other_scene
 from verify.compare.hooke import law_of
 from verify.compare.strain_energy import strain_energy
-from verify.result import NoticeKind
+from verify.result import NoticeKind, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver
@@ -55,8 +55,6 @@ def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:
 
 
 def _record(solution):
-    from verify.result import SolveRecord, Status
-
     return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
 
 

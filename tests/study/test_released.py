@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reference.exact import exact_solution
 from verify.assess.motion_account import motion_account
 from verify.assess.released import advance, released_metrics
 from verify.compare.difference_energy import difference_energy, short_wave_energy
@@ -10,6 +11,7 @@ from verify.compare.hooke import Hooke, law_of
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
+from verify.solvers import find_solver
 
 POINTS = np.array([[0, 0], [2, 0], [2, 1], [0, 1]], dtype=float)
 CELLS = np.array([[0, 1, 2], [0, 2, 3]])
@@ -120,9 +122,6 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most
     add up but for their product. That changes with the same delay where the sides of the body
     move, in the inclined part of the strip: by 1.3 h/b, a ninth.
     """
-    from reference.exact import exact_solution
-    from verify.solvers import find_solver
-
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
     scene = strip(angle=angle)

@@ -7,6 +7,24 @@ from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.phantom import PhantomMesh
 
 
+def sphere(levels):
+    """Vertices and outward triangles of the unit sphere: an octahedron, divided and projected."""
+    points = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    cells = np.array(
+        [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]]
+    )
+    for _ in range(levels):
+        edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, back = np.unique(edges, axis=0, return_inverse=True)
+        middle = points[unique].mean(axis=1)
+        (a, b, c), (ab, bc, ca) = cells.T, (len(points) + back.reshape(-1, 3)).T
+        points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1)[:, None]])
+        cells = np.concatenate(
+            [np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return points, cells
+
+
 def loose_edges(facets: NDArray[np.int64]) -> int:
     """Edges (2D: vertices) that are not used as often in one direction as in the other."""
     if facets.shape[1] == 2:

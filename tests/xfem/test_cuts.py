@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from surface_measures import sphere
 
 from verify.compare.splitting import measures
 from verify.simulator.collision.surface_collider import SurfaceCollider
@@ -53,36 +54,15 @@ def test_a_polygon_patch_ends_at_its_outline():
     assert cut.depth(notch) == pytest.approx([-np.sqrt(0.125)])
 
 
-def icosphere(levels=3):
-    """Unit sphere: an octahedron, divided and projected."""
-    points = [np.array(p, float) for p in np.concatenate([np.eye(3), -np.eye(3)])]
-    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
-    for _ in range(levels):
-        middle, divided = {}, []
-        for a, b, c in faces:
-            new = []
-            for p, q in ((a, b), (b, c), (c, a)):
-                key = (min(p, q), max(p, q))
-                if key not in middle:
-                    middle[key] = len(points)
-                    m = points[p] + points[q]
-                    points.append(m / np.linalg.norm(m))
-                new.append(middle[key])
-            ab, bc, ca = new
-            divided += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-        faces = divided
-    return TriangulatedSurface(np.array(points), np.array(faces))
-
-
 def test_a_closed_surface_is_the_distance_to_the_sphere_up_to_its_facets():
-    sphere = icosphere()
+    ball = TriangulatedSurface(*sphere(3))
     points = np.random.default_rng(1).uniform(-1.5, 1.5, (300, 3))
     exact = np.linalg.norm(points, axis=1) - 1.0
     # a facet of circumradius R = h/√3 lies up to R²/2 below the sphere
-    corners = sphere.points[sphere.triangles]
+    corners = ball.points[ball.triangles]
     h = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
-    assert np.abs(sphere.level_set(points) - exact).max() < 1.05 * h**2 / 6.0
-    assert np.isinf(sphere.depth(points)).all()
+    assert np.abs(ball.level_set(points) - exact).max() < 1.05 * h**2 / 6.0
+    assert np.isinf(ball.depth(points)).all()
 
 
 def test_a_flat_triangulated_patch_is_its_plane_and_ends_at_its_rim():

@@ -205,12 +205,9 @@ def _claims(dim: int, most: int):
     return claim
 
 
-def test_random_strokes_in_the_plane() -> None:
-    QUICK(_claims(2, 4))()
-
-
-def test_random_strokes_in_space() -> None:
-    QUICK(_claims(3, 3))()
+@pytest.mark.parametrize(("dim", "most"), [(2, 4), (3, 3)])
+def test_random_strokes_leave_sound_bodies(dim, most) -> None:
+    QUICK(_claims(dim, most))()
 
 
 @pytest.mark.heavy

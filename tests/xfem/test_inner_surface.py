@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from surface_measures import enclosed_by_body, loose_edges, pinched_edges, volume_by_body
+from surface_measures import enclosed_by_body, loose_edges, pinched_edges, sphere, volume_by_body
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
@@ -120,26 +120,6 @@ PATHS = [
 ]
 
 
-def _sphere(refinements, centre, radius):
-    """An octahedron refined: vertices and outward triangles, not those of any mesh here."""
-    points = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
-    cells = np.array(
-        [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]]
-    )
-    for _ in range(refinements):
-        edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, back = np.unique(edges, axis=0, return_inverse=True)
-        middle = points[unique].mean(axis=1)
-        number = len(points) + back.reshape(-1, 3)
-        points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1)[:, None]])
-        a, b, c = cells.T
-        ab, bc, ca = number.T
-        cells = np.concatenate(
-            [np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-        )
-    return centre + radius * points, cells
-
-
 def _own_boundary(mesh):
     outer = BodySurface(SemiProgressiveCutter(mesh).body).surface
     heaviest = np.abs(outer.weights.rows).argmax(axis=1)
@@ -164,8 +144,8 @@ def _cut(mesh, paths, surface_points=None, facets=None):
 
 @pytest.mark.parametrize("refinements", [1, 3])
 def test_an_affine_motion_moves_every_vertex_as_it_moves_the_material(refinements) -> None:
-    points, facets = _sphere(refinements, 0.5, 0.45)
-    cutter, _, embedded = _cut(box_mesh((4, 5, 3)), PATHS, points, facets)
+    points, facets = sphere(refinements)
+    cutter, _, embedded = _cut(box_mesh((4, 5, 3)), PATHS, 0.5 + 0.45 * points, facets)
     gradient, shift = np.random.default_rng(6).normal(size=(3, 3)), np.array([1.0, -2.0, 3.0])
     nodes = cutter.mesh.points[cutter.body.node_parent.rows]
     moved = embedded.surface.positions(nodes @ gradient + shift)
@@ -205,8 +185,8 @@ def test_the_mesh_boundary_embedded_opens_exactly_as_the_material_does(mesh, pat
 
 
 def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
-    points, facets = _sphere(3, 0.5, 0.45)
-    cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, points, facets)
+    points, facets = sphere(3)
+    cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, 0.5 + 0.45 * points, facets)
     rng = np.random.default_rng(8)
     motion = rng.normal(size=(cutter.body.node_count, 3))
     for surface in (embedded.surface, body.surface):

@@ -56,27 +56,6 @@ def test_the_scaled_condition_number_does_not_see_slivers(dim):
     assert scaled_condition_number(body(dim, 1e-9)) == pytest.approx(conforming, rel=1e-6)
 
 
-@pytest.mark.parametrize("size", SLIVERS)
-def test_the_patch_test_holds_for_every_sliver(size):
-    """F1 turned to a horizontal cut: constant stress along it, each half its own."""
-    phantom = body(2, size)
-    level = 0.5 + size / 8
-
-    def stretched(x, side):
-        strain = np.where(side[:, 0] > 0, 0.1, -0.05)
-        gap = np.where(side[:, 0] > 0, 0.0, -0.02)
-        across = gap - exact.ETA * strain * (x[:, 1] - level)
-        return np.stack([strain * (x[:, 0] - 0.5), across], axis=1)
-
-    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(phantom.mesh), stretched)
-    solution = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports)
-    want = stretched(phantom.node_points, phantom.node_side)
-    assert np.abs(solution.displacement - want).max() < 1e-14
-    plane = 1.0 / (1.0 - 0.3**2)  # E' in plane strain
-    energy = 0.5 * plane * (0.1**2 * (1.0 - level) + 0.05**2 * level)
-    assert solution.strain_energy == pytest.approx(energy, rel=1e-12)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_solution_is_continuous_in_the_position_of_the_cut_at_a_node(dim):
     """From above, exactly on and from below the nodes: the same body to the size moved."""

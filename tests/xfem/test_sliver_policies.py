@@ -23,45 +23,6 @@ from verify.xfem.supports import Supports
 POLICIES = ["keep", "drop", "merge"]
 
 
-def randomly_cut(dim, seed):
-    random = np.random.default_rng(1000 + seed)
-    mesh = shaken(rectangle_mesh((6, 6)) if dim == 2 else box_mesh((3, 3, 3)), seed)
-    cuts = [Plane(random.uniform(0.3, 0.7, dim), random.normal(size=dim)) for _ in range(2)]
-    return cut_mesh(mesh, cuts)
-
-
-@pytest.mark.parametrize("policy", ["drop", "merge"])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, policy):
-    """Two crossing planes at random; sums to round-off of as many terms."""
-    absorbed = 0
-    for seed in range(6):
-        phantom = randomly_cut(dim, seed)
-        treated, report = treat_slivers(phantom, policy)
-        absorbed += report.dropped + report.aggregated
-        assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-13)
-        assert treated.shape_integrals.sum() == pytest.approx(1.0, abs=1e-13)
-        assert side_wise_mass(treated, 3.0).weights.sum() == pytest.approx(3.0, abs=1e-12)
-        assert consistent_mass(treated, 3.0).matrix.sum() == pytest.approx(3.0, abs=1e-12)
-        pulled = traction(treated, treated.mesh.boundary_facets, np.ones(dim))
-        assert pulled.sum(axis=0) == pytest.approx(np.full(dim, 2.0 * dim), abs=1e-12)
-        divided = subdivide(treated)
-        corners = divided.points[divided.cells]
-        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(dim)
-        assert volumes.min() > 0.0
-        assert volumes.sum() == pytest.approx(1.0, abs=1e-13)
-        # a linear field is continued exactly
-        assert divided.interpolation @ treated.node_points == pytest.approx(
-            divided.points, abs=1e-13
-        )
-        extended = report.extension @ treated.node_points
-        assert extended == pytest.approx(phantom.node_points, abs=1e-13)
-        # what is left is no sliver, unless it is said
-        left = (treated.fraction < DEFAULT_THRESHOLD).sum()
-        assert left <= report.kept + report.aggregated
-    assert absorbed > 10 * dim
-
-
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("size", SLIVERS)
 @pytest.mark.parametrize("dim", [2, 3])
@@ -161,25 +122,37 @@ def degenerate_cuts(mesh, seed):
     return cuts
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_any_crossing_and_degenerate_cuts_keep_volume_points_and_bodies(seed):
-    """Slivers beside slivers, in parallelograms too, with thresholds up to 0.4."""
-    mesh = rectangle_mesh((5, 5)) if seed % 2 else box_mesh((3, 3, 3))
-    mesh = shaken(mesh, seed) if seed % 3 else mesh
-    phantom = cut_mesh(mesh, degenerate_cuts(mesh, seed))
-    for policy in ("drop", "merge"):
+@pytest.mark.parametrize("policy", ["drop", "merge"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_any_crossing_and_degenerate_cuts_keep_volume_mass_loads_points_and_bodies(dim, policy):
+    """Slivers beside slivers, in parallelograms too; sums to round-off of as many terms."""
+    absorbed = 0
+    for seed in range(20):
+        mesh = rectangle_mesh((5, 5)) if dim == 2 else box_mesh((3, 3, 3))
+        mesh = shaken(mesh, seed) if seed % 3 else mesh
+        phantom = cut_mesh(mesh, degenerate_cuts(mesh, seed))
         for threshold in (0.02, 0.1, 0.4):
             treated, report = treat_slivers(phantom, policy, threshold)
+            absorbed += report.dropped + report.aggregated
+            assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-12)
+            assert treated.shape_integrals.sum() == pytest.approx(1.0, abs=1e-12)
+            assert side_wise_mass(treated, 3.0).weights.sum() == pytest.approx(3.0, abs=1e-12)
+            assert consistent_mass(treated, 3.0).matrix.sum() == pytest.approx(3.0, abs=1e-12)
+            pulled = traction(treated, mesh.boundary_facets, np.ones(dim))
+            assert pulled.sum(axis=0) == pytest.approx(np.full(dim, 2.0 * dim), abs=1e-12)
             divided = subdivide(treated)
             corners = divided.points[divided.cells]
-            volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(mesh.dim)
+            volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(dim)
             assert volumes.min() >= 0.0
             assert volumes.sum() == pytest.approx(1.0, abs=1e-12)
-            assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-12)
+            # a linear field is continued exactly
             moved = divided.interpolation @ treated.node_points
             assert np.abs(moved - divided.points).max() < 1e-12
             extended = report.extension @ treated.node_points
             assert np.abs(extended - phantom.node_points).max() < 1e-12
-            used = np.unique(treated.cells)
-            assert np.array_equal(used, np.arange(treated.corners.node_count))
+            if threshold == DEFAULT_THRESHOLD:  # what is left is no sliver, unless it is said
+                left = (treated.fraction < threshold).sum()
+                assert left <= report.kept + report.aggregated
+            assert np.array_equal(np.unique(treated.cells), np.arange(treated.corners.node_count))
             assert treated.bodies.max() <= phantom.bodies.max()
+    assert absorbed > 100 * dim

@@ -78,38 +78,33 @@ def test_each_half_of_a_cut_membrane_passes_the_patch_test_in_its_plane():
 STIFFNESS, WEIGHT = 20.0, 19.6  # E times thickness, N/m; weight, N/m²
 
 
-def sheet(counts, height, cuts=(), width=1.0):
-    flat = rectangle_mesh(counts)
+def cut_bowl(n):
+    """A hanging bowl that is cut across, and which of its nodes are held: those of its rim."""
+    flat = rectangle_mesh((n, n))
     x, y = flat.points.T
-    points = np.column_stack([x, width * y, height(x, y)])
-    return cut_mesh(SimplexMesh(points, flat.cells), list(cuts))
+    points = np.column_stack([x, y, -3.0 * x * (1 - x) * y * (1 - y)])
+    bowl = cut_mesh(SimplexMesh(points, flat.cells), [Plane([0.52, 0.5, 0.0], [1.0, -0.04, 0.0])])
+    x, y = bowl.node_points[:, :2].T
+    return bowl, (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
 
 
-def area(phantom):
-    return float(phantom.volumes.sum())
-
-
-def hang(phantom, poisson, held, prescribed=None, load_steps=1, weight=WEIGHT):
+def hang(phantom, poisson, held, load_steps=1, weight=WEIGHT):
     force = InternalForce(phantom, isotropic(STIFFNESS, poisson, "plane stress"))
     load = side_wise_mass(phantom, weight / 9.8).weight([0.0, 0.0, -9.8])
-    fixed = np.repeat(held[:, None], 3, axis=1)
-    path = None if prescribed is None else lambda share: share * prescribed
-    return static_equilibrium(force, fixed, path, load, load_steps)
+    return static_equilibrium(force, np.repeat(held[:, None], 3, axis=1), None, load, load_steps)
 
 
 @pytest.mark.parametrize("n", [6, 24])
 def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
     """Parts of it are slack on their way: halving the residual ended at 7 % of the forces."""
-    bowl = sheet([n, n], lambda x, y: -3.0 * x * (1 - x) * y * (1 - y),
-                 [Plane([0.52, 0.5, 0.0], [1.0, -0.04, 0.0])])  # fmt: skip
-    x, y = bowl.node_points[:, :2].T
-    held = (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
+    bowl, held = cut_bowl(n)
     found = hang(bowl, 0.3, held)
     # the exact stiffness ends it: a corner of held nodes, across which it is round-off below
     # zero, had it refused, and 31 corrections were needed, under three times the weight 504
     assert found.iterations[0] < 16
     assert hang(bowl, 0.3, held, weight=3.0 * WEIGHT).iterations[0] < 16
-    assert found.reactions.sum(axis=0) == pytest.approx([0.0, 0.0, WEIGHT * area(bowl)], abs=1e-7)
+    pull = [0.0, 0.0, WEIGHT * bowl.volumes.sum()]
+    assert found.reactions.sum(axis=0) == pytest.approx(pull, abs=1e-7)
     # and the same by another way there
     other = hang(bowl, 0.3, held, load_steps=3)
     assert other.energy == pytest.approx(found.energy, rel=1e-10)
@@ -117,11 +112,7 @@ def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
 
 def test_under_ten_times_its_weight_a_piece_of_the_bowl_is_named_that_has_narrowed_to_nothing():
     """It is stretched by more than 1 + 1/ν = 4.33; with a smaller ν the bowl finds its place."""
-    n = 24
-    bowl = sheet([n, n], lambda x, y: -3.0 * x * (1 - x) * y * (1 - y),
-                 [Plane([0.52, 0.5, 0.0], [1.0, -0.04, 0.0])])  # fmt: skip
-    x, y = bowl.node_points[:, :2].T
-    held = (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
+    bowl, held = cut_bowl(24)
     for poisson in (0.0, 0.1, 0.2):
         assert hang(bowl, poisson, held, weight=10.0 * WEIGHT).iterations[0] < 16
     with pytest.raises(NotInEquilibriumError, match="1 of 1199 pieces have collapsed"):
@@ -250,6 +241,13 @@ def area_and_normals(skin):
     return np.linalg.norm(normals, axis=1).sum(), normals
 
 
+def used_once(skin):
+    """Directed edges of one facet only."""
+    facets = skin.surface.facets.rows[skin.surface.used]
+    edges = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]).tolist()
+    return {tuple(edge) for edge in edges} - {tuple(edge[::-1]) for edge in edges}
+
+
 def loops(edges):
     """Number of closed loops that directed edges make; each vertex must be left once."""
     follow = dict(edges.tolist())
@@ -284,18 +282,14 @@ def test_a_cut_gives_a_membrane_two_rims_of_its_length_and_no_inner_surface(diag
     assert lengths[forward].sum() == pytest.approx(lengths[~forward].sum(), rel=1e-12)
     assert lengths[forward].sum() > 0.4
     # no edge hangs: every edge is used twice, or once at an edge of the membrane or at a rim
-    facets = skin.surface.facets.rows[skin.surface.used]
-    edges = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
-    once = {tuple(edge) for edge in edges.tolist()} - {tuple(edge[::-1]) for edge in edges.tolist()}
+    once = used_once(skin)
     outer = once - {tuple(edge) for edge in rims.tolist()}
     assert len(outer) == len(cutter.mesh.boundary_facets)
 
 
 def test_two_strokes_through_a_membrane_leave_four_parts_with_rims_of_their_own() -> None:
     _, skin = stroked(curved(), THROUGH, ACROSS)
-    facets = skin.surface.facets.rows[skin.surface.used]
-    edges = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
-    once = {tuple(edge) for edge in edges.tolist()} - {tuple(edge[::-1]) for edge in edges.tolist()}
+    once = used_once(skin)
     assert loops(np.array(sorted(once))) == 4
     assert len(skin.rims) > 0
 
