@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import scenes
 from numpy.typing import NDArray
 
 from verify.scene import Scene
@@ -13,22 +14,12 @@ from verify.solution import Solution
 Array = NDArray[np.float64]
 Map = Callable[[Array], Array]
 
-UNIT = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
 STRAIGHT = {"kind": "polyline", "points": [[-0.1, 0.3], [1.1, 0.7]]}
 
 
 def scene(cuts: Sequence[dict[str, Any]], **more: Any) -> Scene:
     """A unit square under plane strain with the given cuts."""
-    content: dict[str, Any] = {
-        "title": "a test",
-        "requirement": "it shall hold",
-        "geometry": UNIT,
-        "mesh": {"cells": [[8, 8], [16, 16], [32, 32]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-        "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}],
-        "cuts": list(cuts),
-    }
-    return Scene.model_validate({**content, **more})
+    return scenes.scene(cuts, **{"mesh": {"cells": [[8, 8], [16, 16], [32, 32]]}, **more})
 
 
 def grid(nx: int, ny: int) -> tuple[Array, NDArray[np.int64]]:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import scenes
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
@@ -159,15 +160,11 @@ def moved_parts(scene: Scene, mesh: SimplexMesh, size: float) -> tuple[Solution,
 
 def parted_square(random: np.random.Generator, n: int) -> tuple[Scene, AnyBody, Solution, set[int]]:
     """A square with random cuts, and its parts moved."""
-    from cut_meshes import scene as plane_scene
-
-    scene = plane_scene(random_curves(random))
+    scene = scenes.scene(random_curves(random))
     return scene, body_of(scene), *moved_parts(scene, random_square(n, random), 1.0 / n)
 
 
 def parted_cube(random: np.random.Generator, n: int) -> tuple[Scene, AnyBody, Solution, set[int]]:
     """A cube with random cuts, and its parts moved."""
-    from solid_meshes import solid_scene
-
-    scene = solid_scene(random_surfaces(random))
+    scene = scenes.scene(random_surfaces(random), 3)
     return scene, body_of(scene), *moved_parts(scene, random_cube(n, random), 1.0 / n)

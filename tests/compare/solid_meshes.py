@@ -6,6 +6,7 @@ from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
+import scenes
 from numpy.typing import NDArray
 
 from verify.compare.patches import patches_of
@@ -15,8 +16,6 @@ from verify.scene.spatial_cuts import PolygonCut
 
 Array = NDArray[np.float64]
 Height = Callable[[Array], Array]
-
-CUBE = {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]}
 
 
 def height(points: Array) -> Array:
@@ -33,16 +32,8 @@ def inclined(lift: float = 0.0, name: str = "cut") -> dict[str, Any]:
 
 def solid_scene(cuts: Sequence[dict[str, Any]], **more: Any) -> Scene:
     """A unit cube with the given cuts."""
-    content: dict[str, Any] = {
-        "title": "a test",
-        "requirement": "it shall hold",
-        "geometry": CUBE,
-        "mesh": {"cells": [[4, 4, 4], [8, 8, 8], [16, 16, 16]]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "supports": [{"where": "boundary", "displacement": [0.0, 0.0, 0.0]}],
-        "cuts": list(cuts),
-    }
-    return Scene.model_validate({**content, **more})
+    cells = [[4, 4, 4], [8, 8, 8], [16, 16, 16]]
+    return scenes.scene(cuts, 3, **{"mesh": {"cells": cells}, **more})
 
 
 def sliver_body(gap: float) -> SolidBody:

@@ -3,12 +3,12 @@
 import meshio
 import numpy as np
 import pytest
+import scenes
 
 from verify.compare.body import body_of
 from verify.compare.opening import opening
 from verify.compare.realised import field_of
 from verify.compare.slabs import area_rule
-from verify.scene import Scene
 from verify.solvers import find_solver
 
 HOLE, CUT = 0.2, 0.4
@@ -29,29 +29,20 @@ def ring(around, across):
     return points.reshape(-1, 2), cells
 
 
-def scene(folder, around, across, held=True):
+def scene(folder, around, across):
     points, cells = ring(around, across)
     meshio.Mesh(points, [("triangle", cells)]).write(folder / "ring.vtu")
-    found = Scene.model_validate(
-        {
-            "title": "ring",
-            "requirement": "none",
-            "geometry": {"kind": "file", "file": "ring.vtu"},
-            "mesh": {"pattern": "given"},
-            "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-            "supports": [
-                {"where": "hypot(x, y) < 0.3", "displacement": [0, 0]},
-                {"where": "hypot(x, y) > 0.9", "displacement": "exact"},
-            ],
-            "exact": {
-                "solution": "circular_cut",
-                "parameters": {"radius": CUT, "outward": 0.1, "at": 1.0},
-            },
-            "cuts": [
-                {"kind": "arc", "centre": [0, 0], "radius": CUT, "start": 0.0, "sweep": 360.0}
-            ],
-            "quantities": [{"kind": "opening", "name": "gap", "at": 0.3}],
-        }
+    parameters = {"radius": CUT, "outward": 0.1, "at": 1.0}
+    found = scenes.scene(
+        [{"kind": "arc", "centre": [0, 0], "radius": CUT, "start": 0.0, "sweep": 360.0}],
+        geometry={"kind": "file", "file": "ring.vtu"},
+        mesh={"pattern": "given"},
+        supports=[
+            {"where": "hypot(x, y) < 0.3", "displacement": [0, 0]},
+            {"where": "hypot(x, y) > 0.9", "displacement": "exact"},
+        ],
+        exact={"solution": "circular_cut", "parameters": parameters},
+        quantities=[{"kind": "opening", "name": "gap", "at": 0.3}],
     )
     found._file = folder / "case.toml"
     return found

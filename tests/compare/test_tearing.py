@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
 from verify.assess.blade_intensity import blade_front, blade_intensity
 from verify.assess.stress_intensity import intensity_defect
 from verify.compare.body import body_of
 from verify.compare.motion import ExactMotion
-from verify.scene import Scene
 from verify.scene.acceptance import StressIntensityQuantity
 
 
@@ -18,23 +18,21 @@ def _strip(speed, angle, upwards=True):
     blade = 1.0
     if not upwards:
         start, end, blade = [*start[:2], 0.03], [*end[:2], 0.03], -1.0
-    return Scene.model_validate({
-        "title": "strip",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [-0.3, -0.05, 0.0], "upper": [0.3, 0.05, 0.02]},
-        "mesh": {"cells": [[8, 3, 1]]},
-        "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},
-        "analysis": {"kind": "dynamic", "duration": 0.1},
-        "supports": [{"where": "boundary", "displacement": "exact"}],
-        "exact": {"solution": "blade_strip",
-                  "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed,
-                                 "angle": angle, "tip": [0.02, 0.01]}},
-        "initial": {"kind": "field", "displacement": "exact", "velocity": "exact"},
-        "cuts": [{"kind": "tool_path", "points": [start, end], "speed": speed,
-                  "starts_at": -0.6 / speed, "depth": 0.05, "direction": [0.0, 0.0, blade]}],
-        "quantities": [{"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III",
-                        "radius": 0.03, "time": 0.05}],
-    })  # fmt: skip
+    return scenes.scene(
+        [{"kind": "tool_path", "points": [start, end], "speed": speed,
+          "starts_at": -0.6 / speed, "depth": 0.05, "direction": [0.0, 0.0, blade]}],
+        geometry=scenes.box([0.3, 0.05, 0.02], [-0.3, -0.05, 0.0]),
+        mesh={"cells": [[8, 3, 1]]},
+        material={"young": 2500.0, "poisson": 0.25, "density": 1000.0},
+        analysis={"kind": "dynamic", "duration": 0.1},
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        exact={"solution": "blade_strip",
+               "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed, "angle": angle,
+                              "tip": [0.02, 0.01]}},
+        initial={"kind": "field", "displacement": "exact", "velocity": "exact"},
+        quantities=[{"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III",
+                     "radius": 0.03, "time": 0.05}],
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("upwards", [True, False])
@@ -55,16 +53,9 @@ def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
 
 def test_modes_1_and_2_are_not_measured_at_a_tip_that_advances():
     """Their fields are not those of a tip at rest; after it has stopped they are."""
-    content = {
-        "title": "plate",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-        "mesh": {"cells": [[4, 4]]},
-        "material": {"young": 1.0, "poisson": 0.3, "density": 1.0, "plane": "strain"},
-        "analysis": {"kind": "dynamic", "duration": 2.0, "outputs": 5},
-        "cuts": [{"kind": "tool_path", "points": [[-0.5, 0.2], [0.5, 0.4]], "times": [-1.0, 1.0]}],
-    }
-    scene = Scene.model_validate(content)
+    path = {"kind": "tool_path", "points": [[-0.5, 0.2], [0.5, 0.4]], "times": [-1.0, 1.0]}
+    analysis = {"kind": "dynamic", "duration": 2.0, "outputs": 5}
+    scene = scenes.scene([path], material=scenes.soft(density=1.0), analysis=analysis)
     for time, refused in ((0.5, True), (1.0, True), (1.5, False)):
         asked = StressIntensityQuantity(kind="stress_intensity", name="K", end="end", time=time)
         assert ("a tip that advances" in (intensity_defect(scene, asked) or "")) == refused

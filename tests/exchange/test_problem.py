@@ -4,30 +4,29 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import scenes
 
 from verify.exchange import problem_of
-from verify.scene import Scene, load_scene
+from verify.scene import load_scene
 
 needs_gmsh = pytest.mark.skipif(find_spec("gmsh") is None, reason="needs gmsh")
 
 
 def scene(**parts):
     content = {
-        "title": "a test",
-        "requirement": "it shall hold",
-        "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [2.0, 1.0]},
+        "geometry": scenes.box([2.0, 1.0]),
         "mesh": {"cells": [[5, 4]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 3.0},
+        "material": scenes.soft(density=3.0),
         "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
         "cuts": [{"kind": "polyline", "points": [[-0.1, 0.37], [2.1, 0.61]]}],
     }
-    return Scene.model_validate({**content, **parts})
+    return scenes.scene(**content | parts)
 
 
 BOX = {
-    "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [2.0, 1.0, 0.5]},
+    "geometry": scenes.box([2.0, 1.0, 0.5]),
     "mesh": {"cells": [[3, 2, 2]]},
-    "material": {"young": 1.0, "poisson": 0.3, "density": 3.0},
+    "material": scenes.soft(3, density=3.0),
     "supports": [{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
     "cuts": [],
 }
@@ -133,13 +132,8 @@ def test_a_piece_that_too_little_holds_is_found_where_it_is():
     assert len(problem_of(scene(**BOX), 0).free_pieces()) == 0
 
 
-REGIONS = {
-    "young": 1.0,
-    "poisson": 0.3,
-    "plane": "stress",
-    "density": 3.0,
-    "regions": [{"where": "y > 0.5", "young": 5.0}, {"where": "x > 1.2", "density": 7.0}],
-}
+LAYERS = [{"where": "y > 0.5", "young": 5.0}, {"where": "x > 1.2", "density": 7.0}]
+REGIONS = scenes.soft(density=3.0, regions=LAYERS) | {"plane": "stress"}
 
 
 @pytest.mark.parametrize("conforming", [False, True])

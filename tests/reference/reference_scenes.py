@@ -4,8 +4,8 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import scenes
 
-from verify.scene import Scene
 from verify.solvers import find_solver
 
 # looked up and not imported: the DOLFINx wheel loads only behind `dolfinx_solver`
@@ -28,16 +28,11 @@ def arc(name, centre, radius, start=0.0, sweep=360.0):
 def square(cuts=(), **changes):
     """Give a unit square, clamped all around, under its weight."""
     content = {
-        "title": "square",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
         "mesh": {"cells": [[8, 8]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
-        "supports": [{"where": "boundary", "displacement": [0, 0]}],
+        "material": scenes.soft(density=1.0),
         "loads": [{"kind": "gravity", "acceleration": [0, -1]}],
-        "cuts": list(cuts),
     }
-    return Scene.model_validate(content | changes)
+    return scenes.scene(cuts, **content | changes)
 
 
 TENSION = {"top": [0, 1], "bottom": [0, -1]}

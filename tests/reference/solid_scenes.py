@@ -1,8 +1,7 @@
 """Scenes in space that the tests of the FEniCSx side share."""
 
 import numpy as np
-
-from verify.scene import Scene
+import scenes
 
 
 def polygon(name, *points):
@@ -17,16 +16,11 @@ def disc(radius=0.25, centre=(0.5, 0.5, 0.5), normal=(0.0, 0.0, 1.0), name="disc
 def cube(cuts=(), **changes):
     """Give a unit cube, clamped below, under its weight."""
     content = {
-        "title": "cube",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
-        "mesh": {"cells": [[4, 4, 4]]},
-        "material": {"young": 1.0, "poisson": 0.3, "density": 1.0},
+        "material": scenes.soft(3, density=1.0),
         "supports": [{"where": "bottom", "displacement": [0, 0, 0]}],
         "loads": [{"kind": "gravity", "acceleration": [0, 0, -1]}],
-        "cuts": list(cuts),
     }
-    return Scene.model_validate(content | changes)
+    return scenes.scene(cuts, 3, **content | changes)
 
 
 EXACT = [{"where": "boundary", "displacement": "exact"}]

@@ -107,7 +107,7 @@ def opened_suddenly(angle=20.0, reach=0.9, size=0.4):
     duration = reach / PRESSURE_WAVE
     factor = {"kind": "stress_intensity", "name": "K_I", "end": "end"}
     return square(
-        [polyline("cut 0", middle - ahead, middle + ahead)],
+        [polyline("cut", middle - ahead, middle + ahead)],
         geometry={"kind": "rectangle", "lower": [0, 0], "upper": [3, 2]},
         mesh={"pattern": "unstructured", "sizes": [0.1]},
         supports=[

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from verify.errors import InputError
-from verify.scene import Scene, parse_expression
+from verify.scene import parse_expression
 
 POINTS = np.random.default_rng(3).uniform(-1, 1, (50, 3))
 
@@ -21,19 +22,9 @@ def test_a_formula_has_the_value_of_its_arithmetic(text, value):
     np.testing.assert_allclose(parse_expression(text, 3)(POINTS), value(*POINTS.T), rtol=1e-14)
 
 
-def content(**changes):
-    return {
-        "title": "a square",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-        "mesh": {"cells": [[4, 4]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-        "supports": [{"where": "left", "displacement": ["0.1*y", 0.0]}],
-    } | changes
-
-
 def test_a_support_moves_by_its_formula_times_the_factor_of_its_history():
-    support = Scene.model_validate(content()).supports[0]
+    moved = [{"where": "left", "displacement": ["0.1*y", 0.0]}]
+    support = scenes.scene(supports=moved).supports[0]
     points = np.array([[0.0, 0.5], [0.0, 1.0]])
     np.testing.assert_allclose(support.values(points, 0.5), [[0.025, 0], [0.05, 0]], atol=1e-17)
     rates = support.velocities(points, 0.5, 2.0, 0.0)
@@ -64,16 +55,13 @@ def test_what_stands_still_has_no_rate_where_its_slope_is_infinite():
         parse_expression("sqrt(t)", 2, timed=True).rate(at, 0.0)
 
 
-MOTION = {
-    "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
-    "analysis": {"kind": "dynamic", "duration": 1.0},
-}
+MOTION = {"material": scenes.soft(density=1.0), "analysis": {"kind": "dynamic", "duration": 1.0}}
 
 
 def test_the_time_belongs_to_a_dynamic_analysis():
     swung = [{"where": "left", "displacement": ["0.1*y*sin(t)", 0.0]}]
-    assert Scene.model_validate(content(**MOTION, supports=swung)).supports[0].timed
+    assert scenes.scene(**MOTION, supports=swung).supports[0].timed
     with pytest.raises(
         ValueError, match=r"supports\[0\].displacement: 't' in .* a formula in x, y"
     ):
-        Scene.model_validate(content(supports=swung))
+        scenes.scene(supports=swung)

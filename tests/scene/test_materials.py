@@ -1,21 +1,13 @@
 """Materials by region: what a case may say, and which material is where."""
 
 import numpy as np
+import scenes
 
-from verify.scene import Scene, crossed_by_interfaces, scene_hash
-
-CASE = {
-    "title": "t",
-    "requirement": "r",
-    "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1.0, 1.0]},
-    "mesh": {"cells": [[2, 2]]},
-    "supports": [{"where": "bottom", "displacement": [0.0, 0.0]}],
-}
+from verify.scene import crossed_by_interfaces, scene_hash
 
 
-def scene(regions: list[dict], **material) -> Scene:
-    given = {"young": 1.0, "poisson": 0.3, "plane": "strain", **material}
-    return Scene.model_validate(CASE | {"material": given | {"regions": regions}})
+def scene(regions, **material):
+    return scenes.scene(material=scenes.soft(regions=regions, **material))
 
 
 def test_a_region_inherits_what_it_does_not_name_and_the_last_one_counts() -> None:
@@ -31,9 +23,7 @@ def test_a_region_inherits_what_it_does_not_name_and_the_last_one_counts() -> No
 
 def test_a_scene_of_one_material_keeps_its_hash() -> None:
     """Stored references stay valid: a key that is not given does not count."""
-    whole = Scene.model_validate(
-        CASE | {"material": {"young": 1.0, "poisson": 0.3, "plane": "strain"}}
-    )
+    whole = scenes.scene()
     assert scene_hash(scene([])) == scene_hash(whole)
     assert scene_hash(scene([{"where": "x > 0.5", "young": 2.0}])) != scene_hash(whole)
 

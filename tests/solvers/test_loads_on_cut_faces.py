@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
-from verify.scene import Scene
 from verify.solvers import find_solver
 
 FENICSX = [pytest.param(name, marks=pytest.mark.fenicsx) for name in ("reference", "conforming")]
@@ -14,21 +14,13 @@ STRESS = np.array([[0.3, 0.2, -0.1], [0.2, -0.5, 0.4], [-0.1, 0.4, 0.1]])
 
 def body(dimension, cuts, loads, **changes):
     content = {
-        "title": "faces",
-        "requirement": "none",
-        "geometry": {
-            "kind": "rectangle" if dimension == 2 else "box", "lower": [0.0] * dimension,
-            "upper": [1.0] * dimension,
-        },
         "mesh": {"cells": [[5] * dimension]},
-        "material": {"young": 1.0, "poisson": 0.3, "density": 2.0}
-        | ({"plane": "strain"} if dimension == 2 else {}),
+        "material": scenes.soft(dimension, density=2.0),
         "supports": [{"where": "boundary", "displacement": "exact"}],
-        "cuts": cuts,
         "loads": loads,
         "reference": {"size": 0.35 if dimension == 2 else 0.6},
-    }  # fmt: skip
-    return Scene.model_validate(content | changes)
+    }
+    return scenes.scene(cuts, dimension, **content | changes)
 
 
 def uniform(dimension):

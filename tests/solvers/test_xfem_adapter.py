@@ -3,10 +3,11 @@
 import meshio
 import numpy as np
 import pytest
+import scenes
 from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Scene, load_scene
+from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.structured_meshes import rectangle_mesh
@@ -156,22 +157,17 @@ def parted(normal, point, ends, further=()):
     height = " + ".join(
         f"{n!r}*({x} - {p!r})" for n, x, p in zip(normal, "xyz", point, strict=False)
     )
-    return Scene.model_validate({
-        "title": "parted",
-        "requirement": "none",
-        "geometry": {
-            "kind": "rectangle" if d == 2 else "box", "lower": [0.0] * d, "upper": [1.0] * d
-        },
-        "mesh": {"cells": [[5] * d]},
-        "material": {"young": 1.0, "poisson": 0.3} | ({"plane": "strain"} if d == 2 else {}),
-        "supports": [
-            *({"where": f"{height} {sign} 0", "displacement": MOVES[side][:d]}
-              for side, sign in (("above", ">"), ("below", "<"))),
-            *further,
-        ],
-        "cuts": [{"kind": "polyline" if d == 2 else "polygon", "points": ends}],
-        "reference": {"size": 0.3 if d == 2 else 0.5},
-    })  # fmt: skip
+    moved = [
+        {"where": f"{height} {sign} 0", "displacement": MOVES[side][:d]}
+        for side, sign in (("above", ">"), ("below", "<"))
+    ]
+    return scenes.scene(
+        [{"kind": "polyline" if d == 2 else "polygon", "points": ends}],
+        d,
+        mesh={"cells": [[5] * d]},
+        supports=[*moved, *further],
+        reference={"size": 0.3 if d == 2 else 0.5},
+    )
 
 
 def inclined():
@@ -218,18 +214,12 @@ def _three_cuts(gap, kinematics="linear"):
         along = np.array([-normal[1], normal[0]])
         ends = _MIDDLE + gap * normal + np.array([[-2.0], [2.0]]) * along
         cuts.append({"kind": "polyline", "name": f"cut {k}", "points": ends.tolist()})
-    content = {
-        "title": "three cuts",
-        "requirement": "they are solved",
-        "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
-        "mesh": {"cells": [[5, 4]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-        "analysis": {"kinematics": kinematics},
-        "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}],
-        "loads": [{"kind": "body_force", "force": [0.0, -0.01]}],
-        "cuts": cuts,
-    }
-    return Scene.model_validate(content)
+    return scenes.scene(
+        cuts,
+        mesh={"cells": [[5, 4]]},
+        analysis={"kinematics": kinematics},
+        loads=[{"kind": "body_force", "force": [0.0, -0.01]}],
+    )
 
 
 def _speck(solution):

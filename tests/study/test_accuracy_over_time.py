@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from cut_meshes import STRAIGHT, layered, scene
+from judged_fields import judged
 
-from verify.assess.accuracy import assess_accuracy
-from verify.result import SolveRecord, Status, Verdict
+from verify.result import Verdict
 from verify.solution import Solution
-from verify.verdict import with_verdicts
 
 DURATION = 2.0
 
@@ -67,12 +66,7 @@ def assess(checks, solvers, exact=None, **more):
         material={"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 2.0},
         **content, **more,
     )  # fmt: skip
-    rows = [
-        SolveRecord("a test", name, level, Status.SOLVED, size=s.size)
-        for name, own in solvers.items()
-        for level, s in own.items()
-    ]
-    return with_verdicts(asked, assess_accuracy(asked, rows, solvers, exact))
+    return judged(asked, solvers, exact)
 
 
 TIMES = np.linspace(0, DURATION, 9)

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import scenes
 from pydantic import ValidationError
 
 from verify.assess.accuracy import assess_accuracy
@@ -15,9 +16,7 @@ from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver
 
 CASE = {
-    "title": "t",
-    "requirement": "r",
-    "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [0.4, 0.1]},
+    "geometry": scenes.box([0.4, 0.1]),
     "mesh": {"cells": [[4, 2]]},
     "material": {"young": 1e3, "poisson": 0.3, "plane": "strain", "density": 100.0},
     "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
@@ -31,7 +30,7 @@ CASE = {
 
 
 def scene(**changes) -> Scene:
-    return Scene.model_validate(CASE | changes)
+    return scenes.scene(**CASE | changes)
 
 
 def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:

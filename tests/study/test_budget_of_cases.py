@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status
-from verify.scene import Scene, load_scene
+from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.study.budget.links import Solved
 from verify.study.budget.study import budget_study
@@ -70,12 +71,9 @@ def test_what_both_methods_reproduce_has_no_part_at_all(name):
         assert max(map(abs, parts(study, metric).values())) < 1e-11
 
 
+ENERGY = {"kind": "strain_energy"}
 BURIED = {
-    "title": "A tilted crack in a block whose surface moves as in infinite space",
-    "requirement": "It shall open.",
-    "geometry": {"kind": "box", "lower": [-1.0, -1.0, -1.0], "upper": [1.0, 1.0, 1.0]},
-    "mesh": {"cells": [[4, 4, 4]]},
-    "material": {"young": 1.0, "poisson": 0.3},
+    "geometry": scenes.box([1.0] * 3, [-1.0] * 3),
     "exact": {"solution": "penny", "parameters": {"a": 0.52, "tension": 1.0,
               "centre": [0.03, 0.02, 0.05], "normal": [0.1, 0.2, 1.0]}},
     "supports": [{"where": side, "displacement": "exact"}
@@ -83,14 +81,14 @@ BURIED = {
     "cuts": [{"kind": "disc", "centre": [0.03, 0.02, 0.05], "normal": [0.1, 0.2, 1.0],
               "radius": 0.52}],
     "reference": {"degree": 1},
-    "quantities": [{"kind": "strain_energy"}],
+    "quantities": [ENERGY],
 }  # fmt: skip
 
 
 def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_method():
     """The elements of the front are not split: the crack that XFEM makes is much smaller, which
     conforming elements with the same crack show as well."""
-    study = budget_of(Scene.model_validate(BURIED))
+    study = budget_of(scenes.scene(d=3, **BURIED))
     assert study.missing == []
     found = parts(study, "displacement_l2")
     assert found.keys() == {CUT, MESH, METHOD, "total"}
@@ -101,23 +99,18 @@ def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_
     assert energy[CUT] > 0.9 * total  # relative to what is released by the larger crack
 
 
-UNCUT = {
-    "title": "A block without any cut, pulled and bent",
-    "requirement": "It shall stretch.",
-    "material": {"young": 1e4, "poisson": 0.3},
-    "quantities": [{"kind": "strain_energy"}],
-}
 PLANE = {
-    "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 0.5]},
+    "geometry": scenes.box([1.0, 0.5]),
     "mesh": {"cells": [[4, 2]]},
-    "material": {**UNCUT["material"], "plane": "strain"},
+    "material": scenes.soft() | {"young": 1e4},
     "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
     "loads": [{"kind": "traction", "where": "right", "traction": [10.0, 3.0]}],
     "reference": {"size": 0.25},
 }
 SOLID = {
-    "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 0.5, 0.5]},
+    "geometry": scenes.box([1.0, 0.5, 0.5]),
     "mesh": {"cells": [[4, 2, 2]]},
+    "material": {"young": 1e4, "poisson": 0.3},
     "supports": [{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
     "loads": [{"kind": "traction", "where": "right", "traction": [10.0, 3.0, 0.0]}],
     "reference": {"size": 0.5, "degree": 1},
@@ -126,15 +119,13 @@ SOLID = {
 
 @pytest.mark.parametrize("body", [PLANE, SOLID], ids=["plane", "solid"])
 def test_without_a_cut_xfem_is_the_conforming_elements_and_all_is_the_mesh(body):
-    found = parts(budget_of(Scene.model_validate(UNCUT | body)), "displacement_l2")
+    found = parts(budget_of(scenes.scene(quantities=[ENERGY], **body)), "displacement_l2")
     assert CUT not in found
     assert found[METHOD] < 1e-10 < 1e-2 < found[MESH]
 
 
 SETTLING = {
-    "title": "A block, cut halfway, is loaded and comes to rest",
-    "requirement": "It shall come to rest.",
-    "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 0.5]},
+    "geometry": scenes.box([1.0, 0.5]),
     "mesh": {"cells": [[4, 2], [8, 4]]},
     "material": {"young": 1e4, "poisson": 0.3, "density": 1000.0, "plane": "strain"},
     "analysis": {"kind": "dynamic", "duration": 8.0, "time_step": 0.1, "outputs": 5,
@@ -152,7 +143,7 @@ SETTLING = {
 
 @pytest.mark.parametrize("metric, adequate", [("end", True), ("early", False)])
 def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_way(metric, adequate):
-    study = budget_of(Scene.model_validate(SETTLING), tolerance=0.15, metric=metric)
+    study = budget_of(scenes.scene(**SETTLING), tolerance=0.15, metric=metric)
     static = [c for c in study.candidates if c.analysis == "static"]
     assert len(static) == 2
     assert any(c.high <= 0.15 for c in static) == adequate
@@ -172,7 +163,7 @@ BRIEF = {**SETTLING, "analysis": {**SETTLING["analysis"], "duration": 2.0}}
 
 
 def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
-    scene = Scene.model_validate(BRIEF)
+    scene = scenes.scene(**BRIEF)
     study = budget_of(scene, metric="early")
     found = parts(study, "early")
     steps = ["consistent → lumped mass", "fine → own time step"]
@@ -183,7 +174,7 @@ def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
     halved = {**BRIEF, "analysis": {**BRIEF["analysis"], "time_step": 0.05}}
     coarse, fine = (
         parts(one, "displacement_l2_mean")[steps[1]]
-        for one in (study, budget_of(Scene.model_validate(halved)))
+        for one in (study, budget_of(scenes.scene(**halved)))
     )
     assert 0.15 < fine / coarse < 0.5
     (left,) = study.missing

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
@@ -12,23 +13,14 @@ from verify.assess.quantities import Measured
 from verify.assess.richardson import place_uncertainty
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
-from verify.scene import Scene
 from verify.solution import Solution
 
 SIZES = [0.4, 0.2, 0.1]
 POINT = {"kind": "displacement", "name": "u", "point": [0.31, 0.83], "component": "x"}
 OPENING = {"kind": "opening", "name": "open", "at": 0.4}
-SCENE = Scene.model_validate(
-    {
-        "title": "halves",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-        "mesh": {"cells": [[8, 8]]},
-        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
-        "supports": [{"where": "boundary", "displacement": [0, 0]}],
-        "cuts": [{"kind": "polyline", "points": [[-0.1, 0.5], [1.1, 0.5]]}],
-        "quantities": [POINT, OPENING, {**OPENING, "name": "slide", "component": "tangential"}],
-    }
+SCENE = scenes.scene(
+    [{"kind": "polyline", "points": [[-0.1, 0.5], [1.1, 0.5]]}],
+    quantities=[POINT, OPENING, {**OPENING, "name": "slide", "component": "tangential"}],
 )
 U, OPEN, SLIDE = SCENE.quantities
 

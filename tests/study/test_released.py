@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
 from verify.assess.motion_account import motion_account
@@ -9,7 +10,6 @@ from verify.assess.released import advance, released_metrics
 from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Hooke, law_of
 from verify.errors import InputError
-from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
 
@@ -67,9 +67,7 @@ def strip(speed=0.6, cells=(45, 11, 1), angle=0.0, **changes):
     c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     start, end = ([TIP[0] + r * c, TIP[1] + r * s, -0.001] for r in (-0.5, 0.15 * speed))
     content = {
-        "title": "strip",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [-0.2, -0.05, 0.0], "upper": [0.2, 0.05, 0.01]},
+        "geometry": scenes.box([0.2, 0.05, 0.01], [-0.2, -0.05, 0.0]),
         "mesh": {"cells": [list(cells)]},
         "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},
         "analysis": {"kind": "dynamic", "duration": 0.15, "time_step": 0.005, "outputs": 3},
@@ -87,25 +85,16 @@ def strip(speed=0.6, cells=(45, 11, 1), angle=0.0, **changes):
         "cuts": [{"kind": "tool_path", "points": [start, end], "speed": speed,
                   "starts_at": -0.5 / speed, "depth": 0.012, "direction": [0.0, 0.0, 1.0]}],
     }  # fmt: skip
-    return Scene.model_validate(content | changes)
+    return scenes.scene(**content | changes)
 
 
 @pytest.mark.parametrize("angle", [0.0, 17.0])
 def test_the_advance_of_a_blade_is_what_it_sweeps_inside_the_body(angle):
     """Of the blade, 0.012 m deep, 0.01 m are in the slab; what it swept before 0 does not count."""
     assert advance(strip(0.6, angle=angle)) == pytest.approx(0.6 * 0.15 * 0.01, rel=1e-9)
-    plane = Scene.model_validate(
-        {
-            "title": "plate",
-            "requirement": "none",
-            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
-            "mesh": {"cells": [[4, 4]]},
-            "material": {"young": 1.0, "poisson": 0.3, "density": 1.0, "plane": "strain"},
-            "analysis": {"kind": "dynamic", "duration": 2.0},
-            "cuts": [{"kind": "tool_path", "points": [[-0.5, 0.2], [1.0, 0.575]],
-                      "times": [-1.0, 2.0]}],
-        }
-    )  # fmt: skip
+    path = {"kind": "tool_path", "points": [[-0.5, 0.2], [1.0, 0.575]], "times": [-1.0, 2.0]}
+    moving = {"kind": "dynamic", "duration": 2.0}
+    plane = scenes.scene([path], material=scenes.soft(density=1.0), analysis=moving)
     # at the time 0 it is at (0, 0.325), on its way to (1, 0.575)
     assert advance(plane) == pytest.approx(np.hypot(1.0, 0.25), rel=1e-9)
 

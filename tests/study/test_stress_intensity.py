@@ -4,6 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
 from verify.assess.quantities import Measured, unit_of
@@ -218,11 +219,8 @@ def straight(n, *asked, **changes):
     point = np.array([0.04, -0.03, 0.0])
     corners = [point + a * along - b * ahead for a, b in ((-2, 0), (2, 0), (2, 3), (-2, 3))]
     content = {
-        "title": "box",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [-0.5] * 3, "upper": [0.5] * 3},
+        "geometry": scenes.box([0.5] * 3, [-0.5] * 3),
         "mesh": {"cells": [[n, n, n]]},
-        "material": {"young": 1.0, "poisson": 0.3},
         "supports": [{"where": "boundary", "displacement": "exact"}],
         "exact": {
             "solution": "straight_front",
@@ -235,7 +233,7 @@ def straight(n, *asked, **changes):
             for i, one in enumerate(asked)
         ],
     }  # fmt: skip
-    return Scene.model_validate(content | changes)
+    return scenes.scene(d=3, **content | changes)
 
 
 def sampled(scene, n):

@@ -1,0 +1,28 @@
+"""Scenes that tests build: of each only what its claim needs is said."""
+
+from verify.scene import Scene
+
+
+def box(upper, lower=None):
+    """Geometry of a rectangle or box, from the origin unless said otherwise."""
+    kind = "rectangle" if len(upper) == 2 else "box"
+    return {"kind": kind, "lower": list(lower or [0.0] * len(upper)), "upper": list(upper)}
+
+
+def soft(d=2, **more):
+    """E = 1, ν = 0.3; plane strain in the plane."""
+    return {"young": 1.0, "poisson": 0.3, **({"plane": "strain"} if d == 2 else {}), **more}
+
+
+def scene(cuts=(), d=2, **changes):
+    """Unit square or cube with cuts, held all around."""
+    content = {
+        "title": "a test",
+        "requirement": "it shall hold",
+        "geometry": box([1.0] * d),
+        "mesh": {"cells": [[4] * d]},
+        "material": soft(d),
+        "supports": [{"where": "boundary", "displacement": [0.0] * d}],
+        "cuts": list(cuts),
+    }
+    return Scene.model_validate(content | changes)
