@@ -216,10 +216,7 @@ def test_a_check_that_holds_for_nobody_is_undecided_and_says_so():
 def test_who_was_not_asked_is_undecided_and_judge_only_narrows():
     records = [solve(0, 1.0, solver=s) for s in ("mine", "xfem", "reference")]
     (found,) = verdicts({**BOUND, "solver": "yours"}, records)
-    assert (found.verdict, found.reason) == (
-        UNDECIDED,
-        "the run was not asked for solver 'yours'",
-    )
+    assert (found.verdict, found.reason) == (UNDECIDED, "the run was not asked for solver 'yours'")
     assert "conforming" in verdicts(AT_MOST_TWICE, records)[0].reason
     assert list(by_solver(verdicts(BOUND, records, judge_only=["mine"]))) == ["mine"]
     (found,) = verdicts({**BOUND, "solver": "xfem"}, records, judge_only=["mine"])

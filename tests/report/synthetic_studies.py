@@ -35,14 +35,11 @@ STUDIES = {
         "metric": "energy_norm",
         "front": [["mine", 0]],
         "running": {"xfem": [[0.5, 0.4, 0.6], None], "mine": [[0.25, 0.2, 0.3]] * 2},
-        "steps": [
-            {"step": 1, "error": 0.125, "times": {"xfem": [0.5, 0.4, 0.6]}},
-            {"step": 2, "error": 0.25, "times": {}},
-        ],
+        "steps": [{"step": 1, "error": 0.125, "times": {"xfem": [0.5, 0.4, 0.6]}},
+                  {"step": 2, "error": 0.25, "times": {}}],
         "points": [POINT | {"solver": "xfem"}, POINT | {"solver": "mine", "error": 0.0625}],
-        "left_out": [
-            {"case": "c", "solver": "mine", "level": 2, "status": "timeout", "reason": HOSTILE}
-        ],
+        "left_out": [{"case": "c", "solver": "mine", "level": 2, "status": "timeout",
+                      "reason": HOSTILE}],
     },
     "budget": {
         "level": 1,
@@ -51,54 +48,24 @@ STUDIES = {
         "chain": ["one", "two"],
         "notes": [HOSTILE],
         "missing": [{"source": "s", "reason": "r", "where": "w"}],
-        "budgets": [
-            {
-                "metric": "displacement_l2",
-                "parts": [{"source": "mesh", "value": -0.0203, "uncertainty": 0.001}],
-                "total": {"source": "total", "value": 0.0, "uncertainty": 0.0, "round_off": True},
-            }
-        ],
+        "budgets": [{
+            "metric": "displacement_l2",
+            "parts": [{"source": "mesh", "value": -0.0203, "uncertainty": 0.001}],
+            "total": {"source": "total", "value": 0.0, "uncertainty": 0.0, "round_off": True},
+        }],
         "candidates": [
-            {
-                "kinematics": "linear",
-                "choices": "",
-                "level": 0,
-                "reason": "it ran away",
-                "high": None,
-            },
-            {
-                "kinematics": "finite",
-                "choices": "",
-                "level": 0,
-                "reason": "",
-                "size": 0.1,
-                "unknowns": 10,
-                "error": 0.0204,
-                "low": 0.02,
-                "high": 0.021,
-                "seconds": 0.5,
-                "fastest": 0.4,
-                "slowest": 0.6,
-            },
+            {"kinematics": "linear", "choices": "", "level": 0, "reason": "it ran away",
+             "high": None},
+            {"kinematics": "finite", "choices": "", "level": 0, "reason": "", "size": 0.1,
+             "unknowns": 10, "error": 0.0204, "low": 0.02, "high": 0.021, "seconds": 0.5,
+             "fastest": 0.4, "slowest": 0.6},
         ],
     },
-    "calibration": {
-        "trials": [
-            {
-                "family": "airy",
-                "scene": 0,
-                "degree": 1,
-                "level": 2,
-                "quantity": "jump_l2",
-                "stated": 2e-3,
-                "true": 1e-3,
-                "ratio": 2.0,
-                "covered": True,
-                "left_out": "",
-            }
-        ]
-    },
-}
+    "calibration": {"trials": [
+        {"family": "airy", "scene": 0, "degree": 1, "level": 2, "quantity": "jump_l2",
+         "stated": 2e-3, "true": 1e-3, "ratio": 2.0, "covered": True, "left_out": ""},
+    ]},
+}  # fmt: skip
 
 
 def make_studies(folder: Path) -> Path:

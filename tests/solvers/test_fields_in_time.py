@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import scenes
 
 from reference.exact import exact_solution
-from verify.scene import Scene
 from verify.solvers import find_solver
 
 SOLVERS = ("xfem", "conforming", "virtual_node")
@@ -16,14 +16,13 @@ SPEED = "-0.02*cos(2*(x - {t}))"
 def _solved(content, solver, level=0, **parameters):
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
-    return find_solver(solver).solve(Scene.model_validate(content), level, 0, **parameters)
+    return find_solver(solver).solve(scenes.scene(**content), level, 0, **parameters)
 
 
 def _wave(**changes):
     content = {
-        "title": "a wave",
-        "requirement": "none",
-        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 0.5]},
+        "geometry": scenes.box([1, 0.5]),
+        "supports": [],
         "mesh": {"cells": [[6, 3], [12, 6]]},
         "material": {"young": 2.5, "poisson": 0.25, "plane": "strain", "density": 3.0},
         "analysis": {"kind": "dynamic", "duration": 1.0, "time_step": 0.02, "outputs": 3},
@@ -81,9 +80,7 @@ def test_a_body_force_in_time_moves_a_free_body_by_its_second_integral(solver, c
 def _strip(cuts, **changes):
     """Part of the strip of `blade_strip`, turned by 25°, λ = μ = ρ = 1."""
     content = {
-        "title": "a strip",
-        "requirement": "none",
-        "geometry": {"kind": "box", "lower": [-0.5, -0.4, 0.0], "upper": [0.5, 0.4, 0.1]},
+        "geometry": scenes.box([0.5, 0.4, 0.1], [-0.5, -0.4, 0.0]),
         "mesh": {"cells": [[8, 6, 1], [16, 12, 1]]},
         "material": {"young": 2.5, "poisson": 0.25, "density": 1.0},
         "supports": [
@@ -106,7 +103,7 @@ def _strip(cuts, **changes):
 
 def _strip_error(found, scene):
     exact = exact_solution("blade_strip", scene["exact"]["parameters"],
-                           Scene.model_validate(scene).material)  # fmt: skip
+                           scenes.scene(**scene).material)  # fmt: skip
     middles = found.points[found.cells[:, :4]].mean(axis=1)
     worst = 0.0
     for time, u in zip(found.times, found.displacement, strict=True):
