@@ -7,8 +7,8 @@ import scenes
 from reference.exact import exact_solution
 from verify.assess.motion_account import motion_account
 from verify.assess.released import advance, released_metrics
-from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Hooke, law_of
+from verify.compare.strain_energy import difference_energy, short_wave_energy
 from verify.errors import InputError
 from verify.solution import Solution
 from verify.solvers import find_solver

@@ -13,8 +13,7 @@ from verify.assess.energy_account import ACCOUNT, account_metrics
 from verify.assess.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.assess.intervals import error_interval
 from verify.assess.motion_account import motion_account
-from verify.assess.motion_history import motion_history
-from verify.assess.part_account import part_metrics, part_records
+from verify.assess.part_account import motion_history, part_metrics, part_records
 from verify.assess.quantities import Measured, unit_of
 from verify.assess.rates import observed_rate
 from verify.assess.reference import (

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from verify.assess.motion_account import NO_VELOCITIES, MotionAccount, uniform_force
 from verify.compare.kinetic import Kinetic
+from verify.compare.ledger import total_energy
 from verify.compare.separated import boundary_nodes
 from verify.result import Metric, PartRecord
 from verify.scene import BodyForce, Gravity, Scene, Traction
@@ -97,3 +98,23 @@ def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
     for where in acting:
         held[boundary] |= lie_on_part(scene, where, solution.points[boundary], size)
     return held
+
+
+def motion_history(account: MotionAccount) -> dict[str, list[float]]:
+    """Return what moves, by name, with ``time`` (s).
+
+    Energies keep the names of their ledger (J, in 2D per metre); ``total`` is the sum that
+    physics keeps constant. ``linear_momentum_x`` … (N s) and ``angular_momentum_z`` (in space
+    also x, y; N m s, about the origin) are integrated from the velocities, if there are any.
+    Empty for a single output time.
+    """
+    if len(account.times) < 2:
+        return {}
+    rows = {"time": account.times, **account.ledger}
+    total = total_energy(account.ledger)
+    if total is not None:
+        rows["total"] = total
+    found = {name: [float(value) for value in row] for name, row in rows.items()}
+    if account.whole is not None:
+        found |= momentum_components(account.whole.linear, account.whole.angular)
+    return found

@@ -12,11 +12,11 @@ import numpy as np
 
 from verify.assess.motion_account import MotionAccount
 from verify.compare.body import body_of
-from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Law
 from verify.compare.integration import cut_rules
 from verify.compare.kinetic import density_of
 from verify.compare.motion import field_at
+from verify.compare.strain_energy import difference_energy, short_wave_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric
 from verify.scene import Scene, ToolPathCut

@@ -1,4 +1,4 @@
-"""Quadrature along the cuts, graded to their ends; each point has two sides."""
+"""Quadrature along cuts in the plane and on membranes, graded to their ends, with two sides."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_cuts import SurfaceLines, nearest_on_lines
 from verify.compare.slabs import graded_breaks
 
 Array = NDArray[np.float64]
@@ -15,6 +17,8 @@ Array = NDArray[np.float64]
 # Distance of `near` from the cut over the body's size. The direction to it is good to
 # round-off over this, 1e-10: enough to tell the two sides of a sliver of 1e-9.
 AWAY = 1e-6
+_ORDER = 3  # Gauss points per cell
+_DEPTH = 1e-4  # size of the cells at ends, relative to the spacing
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class CutRule:
         return type(self)(*(getattr(self, f.name)[order] for f in fields(self)))
 
 
-def cut_rule(body: Body, spacing: float, order: int = 3, depth: float = 1e-4) -> CutRule:
+def cut_rule(body: Body, spacing: float) -> CutRule:
     """Quadrature along all cuts of a body, inside it.
 
     Parameters
@@ -65,26 +69,19 @@ def cut_rule(body: Body, spacing: float, order: int = 3, depth: float = 1e-4) ->
     body : Body
     spacing : float
         Largest distance that one Gauss rule covers, m.
-    order : int
-        Gauss points per cell.
-    depth : float
-        Size of the cells at the ends of a cut, relative to `spacing`.
     """
     found = []
     for part in body.parts:
         ends = np.array([part.start, part.end])
         at_end = _is_special(part.piece.point(ends), body)
-        t, weights, away = along_cut(
-            ends, part.piece.length, at_end, body.size, spacing, order, depth
-        )
+        t, weights, away = along_cut(ends, part.piece.length, at_end, body.size, spacing)
         normals = _left_of(part.piece.tangent(t))
         found.append(CutRule.beside(part.piece.point(t), weights, normals, away))
     return CutRule.joined(found, 2)
 
 
 def along_cut(
-    ends: Array, length: float, special: NDArray[np.bool_], size: float,
-    spacing: float, order: int, depth: float,
+    ends: Array, length: float, special: NDArray[np.bool_], size: float, spacing: float,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Points of a quadrature along a piece of a cut, graded to those ends that are special.
 
@@ -97,7 +94,7 @@ def along_cut(
     special : (2,) bool array
     size : float
         Of the body, m.
-    spacing, order, depth
+    spacing : float
         See `cut_rule`.
 
     Returns
@@ -105,13 +102,13 @@ def along_cut(
     parameters, weights, away : (n,) arrays
         The last is how far from the cut a point beside it shall be, m.
     """
-    x, w = np.polynomial.legendre.leggauss(order)
+    x, w = np.polynomial.legendre.leggauss(_ORDER)
     stops = ends * length
-    breaks = graded_breaks(stops, stops[special], spacing, depth * spacing) / length
+    breaks = graded_breaks(stops, stops[special], spacing, _DEPTH * spacing) / length
     step = np.diff(breaks)
     t = (breaks[:-1, None] + step[:, None] * 0.5 * (x + 1)).ravel()
     weights = (step[:, None] * length * 0.5 * w).ravel()
-    return t, weights, np.repeat(np.maximum(1e-3 * step * length, AWAY * size), order)
+    return t, weights, np.repeat(np.maximum(1e-3 * step * length, AWAY * size), _ORDER)
 
 
 def place_on_cut(body: Body, cut: str, fraction: float) -> CutRule:
@@ -135,3 +132,41 @@ def _is_special(points: Array, body: Body) -> NDArray[np.bool_]:
         return np.zeros(len(points), dtype=bool)
     away = np.linalg.norm(points[:, None] - body.singular[None], axis=2).min(axis=1)
     return away <= 1e-12 * body.size
+
+
+_WHOLE = np.array([0.0, 1.0])
+
+
+def membrane_cut_rule(body: MembraneBody, spacing: float) -> CutRule:
+    """Quadrature along all cuts of a membrane; as `cut_rule`.
+
+    Parameters
+    ----------
+    body : MembraneBody
+    spacing : float
+        Largest distance that one Gauss rule covers, m.
+    """
+    found = []
+    for lines in body.lines.values():
+        at_tip = body.tip_distance(lines.ends.reshape(-1, 3)).reshape(-1, 2) <= 1e-9 * body.size
+        for k, (ends, length) in enumerate(zip(lines.ends, lines.lengths, strict=True)):
+            t, weights, away = along_cut(_WHOLE, length, at_tip[k], body.size, spacing)
+            points = ends[0] + t[:, None] * (ends[1] - ends[0])
+            found.append(_beside(lines, np.full(len(t), k), points, weights, away[:, None]))
+    return CutRule.joined(found, 3)
+
+
+def nearest_on_membrane_cut(body: MembraneBody, cut: str, point: Array) -> CutRule:
+    """Take the point of a cut that is nearest to `point` (3,), as a rule of weight 1."""
+    lines = body.lines[cut]
+    foot, which = nearest_on_lines(point[None], lines.ends)
+    return _beside(lines, which, foot, np.ones(1), AWAY * body.size)
+
+
+def _beside(
+    lines: SurfaceLines, which: NDArray[np.int64], points: Array, weights: Array,
+    away: Array | float,
+) -> CutRule:  # fmt: skip
+    """Rule on the lines `which` (n,): beside an edge of a fold the two sides are not opposite."""
+    positive, negative = (points + away * ways[which] for ways in (lines.positive, lines.negative))
+    return CutRule(points, weights, lines.normals[which], positive, negative)

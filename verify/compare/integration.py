@@ -11,10 +11,9 @@ from math import factorial
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import body_rule
-from verify.compare.cut_line import CutRule, cut_rule
+from verify.compare.cut_line import CutRule, cut_rule, membrane_cut_rule
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_cut_rule import membrane_cut_rule
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.surface_rule import surface_rule
 

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.cut_line import CutRule, place_on_cut
+from verify.compare.cut_line import CutRule, nearest_on_membrane_cut, place_on_cut
 from verify.compare.error_norm import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_cut_rule import nearest_on_membrane_cut
 from verify.compare.surface_rule import nearest_on_cut
 
 

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import morton_order
 from verify.compare.cut_line import AWAY, CutRule
 from verify.compare.patches import Patch
-from verify.compare.simplex_rule import points_in
 from verify.compare.solid import SolidBody
-from verify.compare.splitting import divide, measures, split_at_level
+from verify.compare.splitting import divide, measures, points_in, split_at_level
 
 Array = NDArray[np.float64]
 
 # Where the border of the body is not straight in a patch's parameters, cells on it are halved
 # down to this share of the spacing, and their points outside left out.
 _BORDER = 1 / 16
+_ORDER = 2  # of the rule in each triangle, see `simplex_rule`
 
 
-def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float = 1 / 16) -> CutRule:
+def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutRule:
     """Quadrature on all cuts of a body in space, inside it.
 
     Parameters
@@ -27,8 +27,6 @@ def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float =
     body : SolidBody
     spacing : float
         Size of the cells, m.
-    order : int
-        Of the rule in each triangle, see `simplex_rule`.
     depth : float
         Size of the cells at fronts, relative to the spacing.
 
@@ -40,7 +38,7 @@ def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float =
     found = []
     for patch in body.patches:
         cells, sizes = _cells(patch, body, spacing, depth)
-        uv, weights = points_in(cells, order)
+        uv, weights = points_in(cells, _ORDER)
         away = np.repeat(np.maximum(1e-3 * sizes, AWAY * body.size), len(uv) // max(len(cells), 1))
         points = patch.point(uv)
         kept = body.inside(points)

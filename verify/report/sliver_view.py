@@ -133,7 +133,7 @@ def _map(title: str, found: Sequence[tuple[Mapping[str, Any], Cell]]) -> Table:
     return plain_table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, "map", named=True)
 
 
-def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing]:
+def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing | None]:
     names = dict.fromkeys(m["quantity"] for m in measured)
     shown = [n for n in names if is_error(n) or n.startswith(("relative", "deviation"))]
     panels = []
@@ -147,7 +147,7 @@ def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawi
         title = error_title(quantity) if is_error(quantity) else quantity
         title += ", s" if quantity == _STEP else ""
         panels.append(loglog(title, "ε, in elements", series, palette))
-    return [panel for panel in panels if panel is not None]
+    return panels
 
 
 def _law_text(law: Mapping[str, Any]) -> str:

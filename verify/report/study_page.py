@@ -8,7 +8,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import read_json
 from verify.printable import shown
-from verify.report.blocks import Cell, Drawing, Table, plain_table
+from verify.report.blocks import Drawing
 from verify.report.figures.profiles import profile_panel
 from verify.report.figures.studies import Bar, Series, bars, loglog, scatter
 from verify.report.figures.style import Palette
@@ -21,7 +21,6 @@ from verify.whole_files import write_whole
 
 _STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
 _SCHEMA = 1
-_FOLDED = 30  # findings beyond which those that came out as expected fold
 
 
 def studies_in(directory: Path) -> list[str]:
@@ -52,7 +51,6 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         "kind": kind,
         "record": record,
         "counts": Counter(finding["verdict"] or "SHOWN" for finding in record["findings"]),
-        "findings": _findings(record),
         "origin": origin_facts(record),
         **study_view(kind, record),
     }
@@ -68,29 +66,6 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
     return page
 
 
-def _findings(record: Mapping[str, Any]) -> list[tuple[Table, bool]]:
-    """Return the findings as a table; where they are many, those that did not fail fold."""
-    every = record["findings"]
-    groups: dict[str, list[Any]] = {"Findings": every}
-    if len(every) > _FOLDED:
-        groups = {"Failed or undecided": [], "Passed": [], "Without a limit": []}
-        for finding in every:
-            verdict = finding["verdict"]
-            place = {"PASS": "Passed", None: "Without a limit"}.get(verdict, "Failed or undecided")
-            groups[place].append(finding)
-    head = ["about", "finding", "limit or known result", "verdict"]
-    tables = []
-    for title, group in groups.items():
-        rows = [
-            [f["topic"], f["sentence"], f["expected"],
-             Cell(verdict=f["verdict"]) if f["verdict"] else "shown"]
-            for f in group
-        ]  # fmt: skip
-        folds = title in ("Passed", "Without a limit")
-        tables.append((plain_table(title, head, rows, "verdicts"), folds))
-    return [(table, folds) for table, folds in tables if table.rows]
-
-
 _NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 
 
@@ -98,47 +73,19 @@ def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the template of a study shows beside its record."""
     views: dict[str, Callable[[], dict[str, Any]]] = {
         "slivers": lambda: {"families": sliver_families(record)},
-        "energy": lambda: {"tables": _energy_tables(record["measurements"])},
+        "energy": lambda: {},
         "cost": lambda: {"running": _running(record), "precision": _precision(record)},
         "budget": lambda: {"bars": [_bars(budget) for budget in record["budgets"]]},
         "calibration": lambda: {"scatters": _scatters(record["trials"])},
         "thesis": lambda: _thesis(record),
-        "iterations": lambda: _iterations(record),
+        "iterations": lambda: {"panels": _iterations(record["settings"])},
     }
     return views[kind]()
 
 
-def _energy_tables(measurements: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return a table per family: solvers and sizes against the relative quantities."""
-    tables = []
-    for family in dict.fromkeys(m["family"] for m in measurements):
-        own = listed(measurements, family=family)
-        names = list(dict.fromkeys(m["quantity"] for m in own if m["unit"] == "" and m["value"]))
-        found = {(m["solver"], m["size"], m["quantity"]): m["value"] for m in own}
-        rows = [
-            [solver_title(solver), "–" if size is None else f"{size:g}",
-             *(number(found.get((solver, size, name)), 3) for name in names)]
-            for solver, size in dict.fromkeys((m["solver"], m["size"]) for m in own)
-        ]  # fmt: skip
-        head = ["solver", "ε", *map(metric_title, names)]
-        tables.append(plain_table(family, head, rows, named=True))
-    return tables
-
-
-def _iterations(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row per setting, and both errors over the time."""
-    settings, palette, panels = record["settings"], Palette(), []
-    names = list(dict.fromkeys(name for one in settings for name in one["quantities"]))
-    rows = [
-        ["–" if one["time_step"] is None else f"{one['time_step']:.4g}",
-         "solved" if one["iterations"] is None else str(one["iterations"]),
-         *(number(one[key], 3) for key in ("iteration_error", "whole_error", "energy_drift")),
-         *(number(one["quantities"].get(name), 5) for name in names),
-         number(one["seconds"], 3), one["reason"]]
-        for one in settings
-    ]  # fmt: skip
-    head = ["time step, s", "iterations", "error of the iterations", "error of the whole"]
-    head += [metric_title("energy_drift"), *map(metric_title, names), "seconds", "why not"]
+def _iterations(settings: Sequence[Mapping[str, Any]]) -> list[Drawing | None]:
+    """Return both errors over the time."""
+    palette, panels = Palette(), []
     for key, title in (
         ("iteration_error", "error of the iterations"),
         ("whole_error", "error of the whole"),
@@ -149,8 +96,7 @@ def _iterations(record: Mapping[str, Any]) -> dict[str, Any]:
             places = [(one["seconds"], one[key]) for one in own if one["seconds"] and one[key]]
             series.append(Series(f"{substeps} per step", places))
         panels.append(loglog(title, "seconds", series, palette))
-    tables = [plain_table(f"{record['solver']} on {record['case']}", head, rows, named=True)]
-    return {"tables": tables, "panels": [panel for panel in panels if panel is not None]}
+    return panels
 
 
 def _running(record: Mapping[str, Any]) -> list[Drawing]:
@@ -162,7 +108,7 @@ def _running(record: Mapping[str, Any]) -> list[Drawing]:
     return [profile_panel("time so far, s", steps, curves, Palette(), x_title="step of the cut")]
 
 
-def _precision(record: Mapping[str, Any]) -> list[Drawing]:
+def _precision(record: Mapping[str, Any]) -> list[Drawing | None]:
     """Return the error over time and over unknowns; what no other solve beats is ringed."""
     points = [p for p in record["points"] if p["error"] > 0 and p["seconds"] > 0]
     front = {(solver, level) for solver, level in record["front"]}
@@ -175,7 +121,7 @@ def _precision(record: Mapping[str, Any]) -> list[Drawing]:
             ringed = [(p[key], p["error"]) for p in own if (name, p["level"]) in front and p[key]]
             series.append(Series(solver_title(name), places, ringed=ringed))
         panels.append(loglog(metric_title(record["metric"]), x_title, series, palette))
-    return [panel for panel in panels if panel is not None]
+    return panels
 
 
 def _bars(budget: Mapping[str, Any]) -> Drawing:
@@ -258,7 +204,7 @@ def _thesis(record: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing]:
+def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing | None]:
     palette, panels = Palette(), []
     for dimension in dict.fromkeys(row["dimension"] for row in slivers):
         own = listed(slivers, dimension=dimension)
@@ -270,4 +216,4 @@ def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing]:
         ]
         title = f"critical step over uncut, {dimension}D"
         panels.append(loglog(title, "distance of cut and nodes, element sizes", series, palette))
-    return [panel for panel in panels if panel is not None]
+    return panels
