@@ -15,7 +15,7 @@ from verify.compare.error_norm import (
 )
 from verify.compare.integration import integrate_norm, rules
 from verify.compare.opening import opening
-from verify.compare.splitting import points_in
+from verify.compare.simplex_rule import points_in
 
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])
 SHIFT = np.array([0.01, 0.02, -0.03])

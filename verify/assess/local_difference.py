@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from verify.assess.quantities import Measured
 from verify.compare.opening import cut_place
-from verify.compare.splitting import points_in
+from verify.compare.simplex_rule import points_in
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
 
 Array = NDArray[np.float64]

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import morton_order
 from verify.compare.patches import Patch
 from verify.compare.simplex_body import SimplexBody
+from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import ROUND_OFF, Rule
-from verify.compare.splitting import bisect, heights, points_in, split_at_level
+from verify.compare.splitting import bisect, heights, split_at_level
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.simplex_rule import simplex_rule
 from verify.compare.simplices import simplices
-from verify.compare.splitting import simplex_rule
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution

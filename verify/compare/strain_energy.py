@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field, SolutionField
+from verify.compare.simplex_rule import simplex_rule
 from verify.compare.simplices import in_frames, triangle_frames
 from verify.compare.slabs import Rule
-from verify.compare.splitting import simplex_rule
 from verify.errors import InputError
 from verify.solution import Solution
 

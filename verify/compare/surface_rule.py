@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import morton_order
 from verify.compare.cut_line import AWAY, CutRule
 from verify.compare.patches import Patch
+from verify.compare.simplex_rule import points_in
 from verify.compare.solid import SolidBody
-from verify.compare.splitting import divide, measures, points_in, split_at_level
+from verify.compare.splitting import divide, measures, split_at_level
 
 Array = NDArray[np.float64]
 
