@@ -55,8 +55,6 @@ class GeneralisedAlpha(NewtonIntegrator):
         self,
         body: DynamicBody,
         step_size: float,
-        tolerance: float = 1e-10,
-        iterations: int = 80,
         solver: LinearSolver | None = None,
         spectral_radius: float = 0.8,
     ) -> None:
@@ -68,7 +66,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         self.gamma = 0.5 - self.alpha_m + self.alpha_f
         self.rate, self.share = self.gamma / self.beta, 1.0 - self.alpha_f
         self.weight = (1.0 - self.alpha_m) / self.beta
-        super().__init__(body, step_size, tolerance, iterations, solver)
+        super().__init__(body, step_size, solver)
         self._mass = FreeMass(body)
         self.acceleration = np.zeros(body.shape)
         self._end: _End | None = None

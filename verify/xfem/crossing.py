@@ -93,12 +93,8 @@ def crossed_through(
     zero, piece, size, pieces = crossing
     if tip == "nearest":
         return _mostly_crossed(cut, positions, crossing), np.zeros(pieces, dtype=bool)
-    mark = np.zeros(len(positions), dtype=bool)
-    mark[zero] = True
-    wanted = np.flatnonzero(mark)
-    place = np.cumsum(mark) - 1
+    wanted, at = np.unique(zero, return_inverse=True)
     level, depth = level_and_depth(cut, positions[wanted])
-    at = place[zero]
     margin = 1.0 if tip == "through" else -1.0
     inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
     if reached is not None:

@@ -185,7 +185,11 @@ class EnergyMomentum(NewtonIntegrator):
     from half of that at the end by the square of the turn in a step. Corrections take the latter,
     which is found in a tenth of the time, as long as each takes half of the residual off.
 
-    Parameters are those of `NewtonIntegrator`; with a `solver` all corrections take the former.
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In seconds.
 
     Attributes
     ----------
@@ -195,28 +199,19 @@ class EnergyMomentum(NewtonIntegrator):
 
     rate = 2.0
     share = 0.5
+    tolerance = 1e-12
 
-    def __init__(
-        self,
-        body: DynamicBody,
-        step_size: float,
-        tolerance: float = 1e-12,
-        iterations: int = 80,
-        solver: LinearSolver | None = None,
-    ) -> None:
+    def __init__(self, body: DynamicBody, step_size: float) -> None:
         if not body.force.has_stress:
             raise XfemError("springs have no stress field; expected an integrator that needs none")
-        super().__init__(body, step_size, tolerance, iterations, solver)
+        super().__init__(body, step_size)
         self._first = body.force.rotations.copy()
         self._evaluations = 0
-        self._asks_for_all = solver is not None and body.force.is_corotational
         self._takes_all = False  # of the derivative of the force
         self.substituted = np.zeros(len(self._first), dtype=bool)
 
     @cached_property
     def _general(self) -> LinearSolver:
-        if self._asks_for_all:
-            return self._solver
         return self.body.force.kernels.general(self.body.pattern, self.body.shape[1])
 
     def _prepare(self) -> None:
@@ -225,7 +220,7 @@ class EnergyMomentum(NewtonIntegrator):
             force.evaluate(self._start.displacement)
             self._first[:] = force.rotations
         self._evaluations = 0
-        self._takes_all = self._asks_for_all
+        self._takes_all = False
 
     def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         body, start = self.body, self._start

@@ -273,9 +273,6 @@ def static_equilibrium(
     prescribed: Callable[[float], Floats] | None = None,
     load: Floats | None = None,
     load_steps: int = 1,
-    tolerance: float = 1e-10,
-    iterations: int = 60,
-    start: Floats | None = None,
 ) -> StaticEquilibrium:
     """Displacement with f_int(u) = load, u given on the fixed components.
 
@@ -300,12 +297,6 @@ def static_equilibrium(
         Dead nodal forces at the end of the path; they grow in proportion to s.
     load_steps : int
         Equal parts of the path at least; a part is halved where it does not lead on.
-    tolerance : float
-        Of the residual, over the largest of load, reactions and internal force.
-    iterations : int
-        Allowed per load step.
-    start : (N, d) float array, optional
-        First guess.
 
     Raises
     ------
@@ -316,21 +307,16 @@ def static_equilibrium(
     SingularStiffnessError
         If something is not held.
     XfemError
-        If a shape is wrong, a number not finite, or tolerance, load steps or iterations are not
-        positive.
+        If a shape is wrong, a number not finite, or the load steps are not positive.
     """
     phantom = force.phantom
     shape = (phantom.node_count, phantom.mesh.space)
     check_fixed(fixed, shape)
     if force.is_membrane and not force.is_corotational:
         raise XfemError("linear kinematics of a membrane at finite rotation; expected corotational")
-    if load_steps < 1 or iterations < 1 or not tolerance > 0.0:
-        raise XfemError(
-            f"{load_steps} load steps, {iterations} iterations, tolerance {tolerance:g}; expected "
-            "at least one, at least one, and more than zero"
-        )
+    if load_steps < 1:
+        raise XfemError(f"{load_steps} load steps; expected at least one")
     full_load = np.zeros(shape) if load is None else finite_array(load, "load", shape)
-    displacement = np.zeros(shape) if start is None else finite_array(start, "start", shape)
 
     def wanted(share: float) -> Floats:
         values = np.zeros(shape) if prescribed is None else prescribed(share)
@@ -338,10 +324,9 @@ def static_equilibrium(
             values = np.where(fixed, values, 0.0)
         return finite_array(values, "prescribed displacement", shape)
 
-    method = Descent if force.is_membrane else Newton
-    newton = method(force, fixed, tolerance, iterations)
+    newton = Descent(force, fixed) if force.is_membrane else Newton(force, fixed)
     path = LoadPath(force, fixed, wanted, full_load, newton)
-    displacement, counts = path.follow(displacement, load_steps)
+    displacement, counts = path.follow(np.zeros(shape), load_steps)
     displacement = path.settle(displacement)
     internal, energy = force.evaluate(displacement)
     reactions = np.where(fixed, internal - full_load, 0.0)

@@ -258,13 +258,10 @@ class FacetCut:
 
     _name: ClassVar[str]
 
-    def _mesh(self) -> tuple[Floats, Ints]:
-        raise NotImplementedError
-
     @cached_property
     def arrays(self) -> FacetArrays:
         """Its facets, as kernels take them."""
-        return facet_arrays(*self._mesh())
+        raise NotImplementedError
 
     def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to the facets, to their tangent plane past the rim."""
@@ -314,10 +311,12 @@ class Polyline(FacetCut):
         object.__setattr__(self, "closed", bool(closed))
         _check_segments(self.vertices, self.closed)
 
-    def _mesh(self) -> tuple[Floats, Ints]:
+    @cached_property
+    def arrays(self) -> FacetArrays:
+        """Its segments, as kernels take them."""
         count = len(self.vertices)
         first = np.arange(count if self.closed else count - 1)
-        return self.vertices, np.stack([first, (first + 1) % count], axis=1)
+        return facet_arrays(self.vertices, np.stack([first, (first + 1) % count], axis=1))
 
 
 def _check_segments(vertices: Floats, closed: bool) -> None:
@@ -400,5 +399,7 @@ class TriangulatedSurface(FacetCut):
         if len(np.unique(edges, axis=0)) < len(edges):
             raise XfemError("the triangles of the surface are not consistently oriented")
 
-    def _mesh(self) -> tuple[Floats, Ints]:
-        return self.points, self.triangles
+    @cached_property
+    def arrays(self) -> FacetArrays:
+        """Its triangles, as kernels take them."""
+        return facet_arrays(self.points, self.triangles)

@@ -36,17 +36,17 @@ class NewtonIntegrator(ABC):
     body : DynamicBody
     step_size : float
         In seconds.
+    solver : LinearSolver, optional
+        For the sparsity of the body; by default the one that its kernels have for steps.
+
+    Attributes
+    ----------
     tolerance : float
         Of the residual force, over the largest of the forces that it balances, each force over the
         mass of its node: what hangs on a sliver is solved for like the rest.
     iterations : int
         Allowed per step; if they do not suffice the step fails rather than go on unsolved. Most
         take 2 to 4; where cells that are inside out stand up, it may be 50.
-    solver : LinearSolver, optional
-        For the sparsity of the body; by default the one that its kernels have for steps.
-
-    Attributes
-    ----------
     solves : int
         Linear solves so far.
     """
@@ -54,23 +54,14 @@ class NewtonIntegrator(ABC):
     rate: float  # γ: 1 for implicit Euler, 2 for schemes centred in the step
     share: float  # derivative of the forces used with respect to those at the end
     weight: float | None = None  # h² times the inertia used, by M u₁; without one γ
+    tolerance = 1e-10
+    iterations = 80
 
     def __init__(
-        self,
-        body: DynamicBody,
-        step_size: float,
-        tolerance: float = 1e-10,
-        iterations: int = 80,
-        solver: LinearSolver | None = None,
+        self, body: DynamicBody, step_size: float, solver: LinearSolver | None = None
     ) -> None:
-        if not tolerance > 0.0 or iterations < 1:
-            raise XfemError(
-                f"tolerance {tolerance:g}, {iterations} iterations; expected more than zero, and "
-                "at least one"
-            )
         self.body = body
         self.step_size = check_step(step_size)
-        self.tolerance, self.iterations = tolerance, iterations
         self.solves = 0
         space = body.shape[1]
         self._blocks = np.zeros((len(body.pattern.columns), space, space))

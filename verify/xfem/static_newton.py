@@ -10,6 +10,8 @@ from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics import StaticSolver, is_large
 
+_TOLERANCE = 1e-10  # of the residual, over the largest of load, reactions and internal force
+_ITERATIONS = 60  # allowed per load step
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
 # of membranes, tensions over μ: at first, below which the consistent tangent is tried, the least
@@ -46,17 +48,10 @@ class Newton:
     ----------
     force : InternalForce
     fixed : (N, d) bool array
-    tolerance : float
-        Of the residual, over the largest of load, reactions and internal force.
-    iterations : int
-        Allowed per load step.
     """
 
-    def __init__(
-        self, force: InternalForce, fixed: Bools, tolerance: float, iterations: int
-    ) -> None:
+    def __init__(self, force: InternalForce, fixed: Bools) -> None:
         self._force, self._fixed = force, fixed
-        self._tolerance, self._iterations = tolerance, iterations
         self._pattern = body_pattern(force.phantom)
         space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
@@ -81,10 +76,10 @@ class Newton:
         place = self.place(displacement + self._spread(start, change), load)
         count = 1
         while not self._is_small(place):
-            if count == self._iterations or not np.isfinite(place.norm):
+            if count == _ITERATIONS or not np.isfinite(place.norm):
                 raise NotInEquilibriumError(
                     f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
-                    f"{count} iterations; expected {self._tolerance:g} of them. "
+                    f"{count} iterations; expected {_TOLERANCE:g} of them. "
                     f"{self._why(place)}"
                 )
             place = self._next(place, load)
@@ -205,7 +200,7 @@ class Newton:
         """Whether a residual is within the tolerance, or what round-off of positions leaves."""
         reach = np.abs(self._force.phantom.node_points + place.displacement).max()
         round_off = _ROUND_OFF * self.largest_stiffness * reach
-        return place.norm <= max(self._tolerance * place.scale, round_off)
+        return place.norm <= max(_TOLERANCE * place.scale, round_off)
 
     def _correct(self, displacement: Floats, residual: Floats, change: Floats | None) -> Floats:
         try:

@@ -120,12 +120,10 @@ class ToolPath:
     def time_at(self, travel: ArrayLike) -> Floats:
         """When the blade first comes that far, in seconds."""
         wanted = np.clip(np.asarray(travel, dtype=float), 0.0, self.length)
-        # 'left': a blade that waits has been there since it arrived
-        end = np.clip(np.searchsorted(self.travel, wanted, side="left"), 1, len(self.times) - 1)
-        start = end - 1
-        step = self.travel[end] - self.travel[start]
-        share = np.where(step > 0.0, (wanted - self.travel[start]) / np.where(step, step, 1.0), 0.0)
-        return self.times[start] + share * (self.times[end] - self.times[start])
+        at = np.searchsorted(self.travel, wanted)
+        # a blade that waits has been there since it arrived
+        between = np.interp(wanted, self.travel, self.times)
+        return np.where(self.travel[at] == wanted, self.times[at], between)
 
     def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
         """Append positions (k, b, s): for a tool that moves as one looks."""
