@@ -10,36 +10,19 @@ one that continues its field over the shortest way. And a small part that reache
 unknowns.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.contacts import face_contacts, renumber
+from verify.xfem.contacts import extension_of, face_contacts, renumber
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
 _ROUND_OFF = 1e-12  # of a barycentric coordinate; of positions, over the size of the cell
 _DIGITS = 9  # to which extrapolations are compared: symmetric meshes have many that are equal
 
 
-@dataclass(frozen=True)
-class Roots:
-    """What became of the small parts.
-
-    Attributes
-    ----------
-    following : (p,) bool array
-        Small parts with a node that follows a root cell.
-    rootless : (p,) bool array
-        Small parts with a node that only small parts use, and that follows none.
-    """
-
-    following: Bools
-    rootless: Bools
-
-
-def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Roots]:
+def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Bools, Bools]:
     """Let nodes that only small parts use follow root cells.
 
     Parameters
@@ -54,7 +37,10 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
     -------
     aggregated : PhantomMesh
         `phantom` itself if no node follows a root.
-    roots : Roots
+    following : (p,) bool array
+        Small parts with a node that follows a root cell.
+    rootless : (p,) bool array
+        Small parts with a node that only small parts use, and that follows none.
     """
     alone = np.ones(phantom.node_count, dtype=bool)
     alone[phantom.cells[~small]] = False
@@ -65,10 +51,10 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
     followed[node] = np.arange(len(node))
     of_corner = followed[phantom.cells]
     has_own = (alone[phantom.cells] & (of_corner < 0)).any(axis=1)
-    roots = Roots(small & (of_corner >= 0).any(axis=1), small & has_own)
+    following, rootless = small & (of_corner >= 0).any(axis=1), small & has_own
     if len(node) == 0:
-        return phantom, roots
-    return _aggregated(phantom, followed, weights, cell), roots
+        return phantom, following, rootless
+    return _aggregated(phantom, followed, weights, cell), following, rootless
 
 
 def _reached(phantom: PhantomMesh, small: Bools) -> tuple[Ints, Ints]:
@@ -140,13 +126,12 @@ def _aggregated(phantom: PhantomMesh, followed: Ints, weights: Floats, root: Int
     """Return the mesh without the unknowns of nodes that follow others."""
     own = followed < 0
     node_parent, node, old_of_new = renumber(phantom, own)
-    kept = np.flatnonzero(own)
     gone = np.flatnonzero(~own)
     at = followed[gone]
-    columns = node[phantom.cells[root[at]]]
-    rows = np.broadcast_to(gone[:, None], columns.shape)
-    entries = np.concatenate([np.ones(len(kept)), weights[at].ravel()])
-    places = np.concatenate([kept, rows.ravel()]), np.concatenate([node[kept], columns.ravel()])
-    extension = csr_array((entries, places), shape=(len(own), len(node_parent)))
-    extension.eliminate_zeros()
-    return phantom.following(Aggregation(phantom, extension, node), old_of_new)
+    extension = extension_of(node, gone, node[phantom.cells[root[at]]], weights[at])
+    return replace(
+        phantom,
+        node_parent=node_parent,
+        node_side=phantom.node_side[old_of_new],
+        aggregation=Aggregation(phantom, extension, node),
+    )

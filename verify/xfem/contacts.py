@@ -102,7 +102,12 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
         node_side=phantom.node_side[old_of_new],
         sub_cells=replace(sub, piece=number[into[sub.piece]]),
     )
-    return treated, _extension(phantom, into, node, len(node_parent)), node
+    row, corner = np.nonzero(node[phantom.cells[gone]] < 0)
+    lost = phantom.cells[gone][row, corner]
+    # an unknown that several absorbed pieces used takes the mean of what they follow
+    share = 1.0 / np.bincount(lost, minlength=len(node))[lost]
+    columns = node[phantom.cells[into[gone]][row, corner]]
+    return treated, extension_of(node, lost, columns[:, None], share), node
 
 
 def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
@@ -124,18 +129,22 @@ def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
     return np.concatenate([np.arange(nodes), parent[~first]]), node, old_of_new
 
 
-def _extension(phantom: PhantomMesh, into: Ints, node: Ints, count: int) -> csr_array:
+def extension_of(node: Ints, rows: Ints, columns: Ints, weights: Floats) -> csr_array:
+    """Old unknowns (N,) from the new ones: those that are kept, and those that follow others.
+
+    Parameters
+    ----------
+    node : (N,) int array
+        New number of each old unknown, −1 if it follows others.
+    rows : (k,) int array
+        Unknowns that follow others.
+    columns, weights : (k, m) array
+        Which new ones, and with what weights; those of weight zero are left out.
+    """
     kept = np.flatnonzero(node >= 0)
-    gone = np.flatnonzero(into != np.arange(len(into)))
-    row, corner = np.nonzero(node[phantom.cells[gone]] < 0)
-    lost = phantom.cells[gone][row, corner]
-    # an unknown that several absorbed pieces used takes the mean of what they follow
-    share = 1.0 / np.bincount(lost, minlength=len(node))[lost]
-    columns = node[phantom.cells[into[gone]][row, corner]]
-    return csr_array(
-        (
-            np.concatenate([np.ones(len(kept)), share]),
-            (np.concatenate([kept, lost]), np.concatenate([node[kept], columns])),
-        ),
-        shape=(len(node), count),
-    )
+    entries = np.concatenate([np.ones(len(kept)), weights.ravel()])
+    of = np.concatenate([kept, np.repeat(rows, columns.shape[1])])
+    places = of, np.concatenate([node[kept], columns.ravel()])
+    extension = csr_array((entries, places), shape=(len(node), int(node.max()) + 1))
+    extension.eliminate_zeros()
+    return extension

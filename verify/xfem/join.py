@@ -74,8 +74,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     piece, cut = np.nonzero(partition.label)
     dividing[piece_cell[piece], cut] = True
     face, side = _regions(nodes, dividing[here] | dividing[there], partition.points)
-    pieces = _Pieces(piece_cell, label, len(patch))
-    first, second = (pieces.fitting(cells[face], side) for cells in (here, there))
+    first, second = (_fitting(piece_cell, label, cells[face], side) for cells in (here, there))
     touch = alive[first] & alive[second]
     first, second, face = first[touch], second[touch], face[touch]
     local = on_face[opposite[face]]
@@ -125,25 +124,17 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
     return face[area], side[area]
 
 
-class _Pieces:
-    """Pieces by their cells."""
-
-    def __init__(self, piece_cell: Ints, label: Sides, cells: int) -> None:
-        self.order, self.label = np.argsort(piece_cell, kind="stable"), label
-        self.count = np.bincount(piece_cell, minlength=cells)
-        self.start = np.cumsum(self.count) - self.count
-
-    def fitting(self, cells: Ints, side: Sides) -> Ints:
-        """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
-        count = self.count[cells]
-        of = np.repeat(np.arange(len(cells)), count)
-        within = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
-        piece = self.order[self.start[cells[of]] + within]
-        label = self.label[piece]
-        fits = ((label == 0) | (label == side[of])).all(axis=1)
-        if not np.array_equal(of[fits], np.arange(len(cells))):
-            raise RuntimeError("the pieces of a cell do not partition the plane of a face")
-        return piece[fits]
+def _fitting(piece_cell: Ints, label: Sides, cells: Ints, side: Sides) -> Ints:
+    """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
+    order = np.argsort(piece_cell, kind="stable")
+    first, end = np.searchsorted(piece_cell[order], [cells, cells + 1])
+    count = end - first
+    of = np.repeat(np.arange(len(cells)), count)
+    piece = order[np.arange(len(of)) + np.repeat(end - np.cumsum(count), count)]
+    fits = ((label[piece] == 0) | (label[piece] == side[of])).all(axis=1)
+    if not np.array_equal(of[fits], np.arange(len(cells))):
+        raise RuntimeError("the pieces of a cell do not partition the plane of a face")
+    return piece[fits]
 
 
 def number_nodes(

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from verify.xfem.arrays import Bools, Floats, Ints, finite_array
@@ -213,13 +213,8 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     corners = phantom.cells.shape[1]
     share = phantom.volumes * cell_densities(phantom.mesh, density)[phantom.parent] / corners
     weights = np.bincount(phantom.cells.ravel(), np.repeat(share, corners))
-    root = _diagonal_matrix(1.0 / np.sqrt(weights))
-    return Mass(matrix=_diagonal_matrix(weights), root=root, weights=weights)
-
-
-def _diagonal_matrix(values: Floats) -> csr_array:
-    rows = np.arange(len(values) + 1)
-    return csr_array((values, rows[:-1], rows), shape=(len(values), len(values)))
+    matrix, root = (csr_array(diags_array(x)) for x in (weights, 1.0 / np.sqrt(weights)))
+    return Mass(matrix, root, weights)
 
 
 def second_moments(phantom: PhantomMesh) -> Floats:

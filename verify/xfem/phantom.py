@@ -6,17 +6,16 @@ Heaviside enrichment (2.48), in side-wise unknowns. After that nothing downstrea
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
-from verify.xfem.clip import Partition
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.join import PatchNodes, join_parts, node_sides, number_nodes, piece_sides
+from verify.xfem.join import join_parts, node_sides, number_nodes, piece_sides
 from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.pieces import split_cells
 from verify.xfem.zero_points import ZeroPoints
@@ -146,15 +145,6 @@ class PhantomMesh:
         corner = np.empty(self.node_count, dtype=np.int64)
         corner[self.corner_node[own]] = own
         return corner
-
-    def following(self, aggregation: "Aggregation", old_of_new: Ints) -> "PhantomMesh":
-        """Leave the dof nodes `old_of_new` (N,) alone, which the other corners follow."""
-        return replace(
-            self,
-            node_parent=self.node_parent[old_of_new],
-            node_side=self.node_side[old_of_new],
-            aggregation=aggregation,
-        )
 
     def extend(self, values: Floats) -> Floats:
         """Corner values (N_corners, d) of nodal values (N, d)."""
@@ -304,25 +294,14 @@ def cut_mesh(
     solid = fraction > 0.0
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
-    return _phantom_mesh(mesh, partition, joined, solid, fraction, node_parent, numbering)
 
-
-def _phantom_mesh(
-    mesh: SimplexMesh,
-    partition: Partition,
-    joined: PatchNodes,
-    solid: Bools,
-    fraction: Floats,
-    node_parent: Ints,
-    numbering: Ints,
-) -> PhantomMesh:
+    # the pieces of the patch, and the cells around it
     pieces, cuts = partition.label.shape
     untouched = np.ones(len(mesh.cells), dtype=bool)
     untouched[joined.cells] = False
     rest = np.flatnonzero(untouched)
-    patch_cells = numbering[joined.group]
     parent = np.concatenate([joined.cells[joined.piece_cell], rest])
-    cells = np.concatenate([patch_cells, mesh.cells[rest]])
+    cells = np.concatenate([numbering[joined.group], mesh.cells[rest]])
     label = np.zeros((len(parent), cuts), dtype=np.int8)
     label[:pieces] = partition.label
     share = np.ones(len(parent))

@@ -130,8 +130,7 @@ def treat_slivers(
         dropped = small & ~_bridges(phantom, small)
         treated, extension, node = absorb(phantom, _siblings(phantom, dropped))
     elif policy == "merge" and small.any():
-        treated, roots = aggregate(phantom, small, kept_nodes)
-        following, rootless = roots.following, roots.rootless
+        treated, following, rootless = aggregate(phantom, small, kept_nodes)
         if treated.aggregation is not None:
             extension, node = treated.aggregation.extension, treated.aggregation.node
     changed = dropped | following

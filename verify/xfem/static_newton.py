@@ -161,14 +161,17 @@ class Newton:
 
     def _spread(self, start: Place, change: Floats) -> Floats:
         """Spread the prescribed change with the stiffness before it."""
-        return self._correct(start.displacement, start.residual, change)
+        try:
+            return self._solve(start, change, 1.0)
+        except SingularStiffnessError:
+            return self._solve(start, change, 0.0)
 
     def _next(self, place: Place, load: Floats) -> Place:
         """Place with a smaller residual; if that is not a correction away, one further down."""
         leap = place
         for rotational in _SHARES:
             try:
-                correction = self._solve(place.displacement, place.residual, None, rotational)
+                correction = self._solve(place, None, rotational)
             except SingularStiffnessError:
                 if rotational == 0.0:
                     raise
@@ -202,24 +205,13 @@ class Newton:
         round_off = _ROUND_OFF * self.largest_stiffness * reach
         return place.norm <= max(_TOLERANCE * place.scale, round_off)
 
-    def _correct(self, displacement: Floats, residual: Floats, change: Floats | None) -> Floats:
-        try:
-            return self._solve(displacement, residual, change, 1.0)
-        except SingularStiffnessError:
-            return self._solve(displacement, residual, change, 0.0)
-
     def _solve(
-        self,
-        displacement: Floats,
-        residual: Floats,
-        change: Floats | None,
-        rotational: float,
-        least: float = 0.0,
+        self, place: Place, change: Floats | None, rotational: float, least: float = 0.0
     ) -> Floats:
         """Solve for a change of the fixed components, or for the residual; see `_assemble`."""
         pattern, blocks = self._pattern, self._blocks
-        self._assemble(displacement, rotational, least)
-        load = residual.copy()
+        self._assemble(place.displacement, rotational, least)
+        load = place.residual.copy()
         if change is not None:
             load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
             load[self._fixed] = 0.0
@@ -263,11 +255,11 @@ class Descent(Newton):
     def _spread(self, start: Place, change: Floats) -> Floats:
         """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
         self._least = _TAUT
-        return self._solve(start.displacement, start.residual, change, 0.0, least=self._least)
+        return self._solve(start, change, 0.0, self._least)
 
     def _next(self, place: Place, load: Floats) -> Place:
         """Place further down; the same one with more tension if no way leads there."""
-        correction = self._downhill(place.displacement, place.residual, self._least)
+        correction = self._downhill(place)
         share = self._share_downhill(place, correction, load)
         if share == 0.0:
             self._least = max(self._least, _SLACK) / _FALL
@@ -275,14 +267,14 @@ class Descent(Newton):
         self._least *= _FALL if share == 1.0 else 1.0
         return self.place(place.displacement + share * correction, load)
 
-    def _downhill(self, displacement: Floats, residual: Floats, least: float) -> Floats:
+    def _downhill(self, place: Place) -> Floats:
         """Correction along which the energy falls."""
-        if least < _SLACK:
+        if self._least < _SLACK:
             try:
-                return self._solve(displacement, residual, None, 1.0)
+                return self._solve(place, None, 1.0)
             except SingularStiffnessError:
                 pass
-        return self._solve(displacement, residual, None, 0.0, least=max(least, _LEAST))
+        return self._solve(place, None, 0.0, max(self._least, _LEAST))
 
 
 def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float) -> Ints:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Floats, Ints, check_choice
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
@@ -42,20 +42,16 @@ def rectangle_mesh(
     c, d = nodes[1:, 1:], nodes[:-1, 1:]
     right = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2)
     left = np.stack([np.stack([a, b, d], -1), np.stack([b, c, d], -1)], 2)
-    if diagonal == "right":
-        return SimplexMesh(points, right.reshape(-1, 3))
-    if diagonal == "left":
-        return SimplexMesh(points, left.reshape(-1, 3))
-    if diagonal == "alternating":
+    check_choice(diagonal, Diagonal, "diagonal")
+    if diagonal != "crossed":
         odd = (np.indices(a.shape).sum(axis=0) % 2 == 1)[:, :, None, None]
-        return SimplexMesh(points, np.where(odd, left, right).reshape(-1, 3))
-    if diagonal == "crossed":
-        centre = len(points) + np.arange(a.size).reshape(a.shape)
-        centres = points[np.stack([a, b, c, d], -1)].mean(axis=2).reshape(-1, 2)
-        sides = [(a, b), (b, c), (c, d), (d, a)]
-        fans = np.stack([np.stack([p, q, centre], -1) for p, q in sides], 2)
-        return SimplexMesh(np.concatenate([points, centres]), fans.reshape(-1, 3))
-    raise XfemError(f"diagonal '{diagonal}'; expected right, left, alternating or crossed")
+        turned = {"right": False, "left": True, "alternating": odd}[diagonal]
+        return SimplexMesh(points, np.where(turned, left, right).reshape(-1, 3))
+    centre = len(points) + np.arange(a.size).reshape(a.shape)
+    centres = points[np.stack([a, b, c, d], -1)].mean(axis=2).reshape(-1, 2)
+    sides = [(a, b), (b, c), (c, d), (d, a)]
+    fans = np.stack([np.stack([p, q, centre], -1) for p, q in sides], 2)
+    return SimplexMesh(np.concatenate([points, centres]), fans.reshape(-1, 3))
 
 
 def box_mesh(
