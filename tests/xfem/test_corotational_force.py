@@ -5,6 +5,7 @@ import pytest
 from cut_bodies import SOFT, cut_body, cut_cube, cut_membrane, cut_square, material, rotation
 
 from verify.accelerated import FAST
+from verify.accelerated.one_pass import rotation_matrices
 from verify.xfem import static_newton, statics
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
@@ -16,7 +17,6 @@ from verify.xfem.phantom import cut_mesh
 from verify.xfem.polar import (
     largest_eigenvector,
     nearest_rotations,
-    rotation_matrices,
     rotations_in_space,
 )
 from verify.xfem.structured_meshes import rectangle_mesh

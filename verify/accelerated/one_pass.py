@@ -29,7 +29,7 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
 from verify.xfem.element import deform as deform_cells
 from verify.xfem.energy_momentum import StepEnds, averaged_stress
-from verify.xfem.polar import rotation_matrices
+from verify.xfem.polar import rotation_matrix
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
@@ -165,6 +165,13 @@ class OnePassTetrahedra:
         found = np.empty((len(self._cells), 3, 3))
         rotation_matrices(_by_cell(self._quaternions)[: len(found)], found)
         rotations[self._cells] = found
+
+
+@njit(cache=True)
+def rotation_matrices(quaternions, R):
+    """Write the matrices R (p, 3, 3) of unit quaternions (p, 4)."""
+    for p in range(len(R)):
+        rotation_matrix(quaternions[p], R[p])
 
 
 @njit(cache=True)

@@ -48,6 +48,8 @@ class SpringForce(InternalForce):
         If the material does not fit the mesh, the mesh is a membrane, or an option is unknown.
     """
 
+    has_stress = False
+
     def __init__(
         self,
         phantom: PhantomMesh,
@@ -67,11 +69,6 @@ class SpringForce(InternalForce):
         length = np.linalg.norm(self._rest, axis=2, keepdims=True)
         self._directions = self._rest / length
         self._excess = np.zeros(self.springs.shape)
-
-    @property
-    def has_stress(self) -> bool:
-        """Springs have none."""
-        return False
 
     @property
     def has_one_pass(self) -> bool:

@@ -31,17 +31,16 @@ def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
     own, other, sign = _pairs(phantom)
     nodes, count = len(phantom.mesh.points), len(own)
     extra = nodes + np.arange(count)
-    plain = np.ones(nodes)
     everywhere = np.arange(nodes)
     if basis == "shifted":
         # p_own = u_j; the other side differs by a, counted from below to above
         rows = np.concatenate([everywhere, other, other])
         columns = np.concatenate([everywhere, own, extra])
-        values = np.concatenate([plain, np.ones(count), -sign])
+        values = np.concatenate([np.ones(nodes + count), -sign])
     else:
         rows = np.concatenate([everywhere, own, other, other])
         columns = np.concatenate([everywhere, extra, own, extra])
-        values = np.concatenate([plain, sign, np.ones(count), -sign])
+        values = np.concatenate([np.ones(nodes), sign, np.ones(count), -sign])
     return csr_array((values, (rows, columns)), shape=(phantom.node_count, nodes + count))
 
 

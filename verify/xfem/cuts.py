@@ -22,8 +22,9 @@ from numpy.typing import ArrayLike
 
 from verify.xfem.arrays import Floats, finite_array
 from verify.xfem.errors import XfemError
-from verify.xfem.faceted_cuts import Polyline, TriangulatedSurface
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.faceted_cuts import Polyline as Polyline
+from verify.xfem.faceted_cuts import TriangulatedSurface as TriangulatedSurface
+from verify.xfem.tool_path import ToolPath as ToolPath
 
 
 class Cut(Protocol):
@@ -169,14 +170,3 @@ def _tangents(normal: Floats) -> tuple[Floats, Floats]:
     first = np.cross(normal, helper)
     first /= np.linalg.norm(first)
     return first, np.cross(normal, first)
-
-
-__all__ = [
-    "Cut",
-    "ImplicitCut",
-    "Plane",
-    "PolygonPatch",
-    "Polyline",
-    "ToolPath",
-    "TriangulatedSurface",
-]

@@ -31,15 +31,14 @@ from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.polar import adjugate, nearest_rotations
+from verify.xfem.polar import SPINS, adjugate, nearest_rotations
 
 _REGULAR = 1e-6  # smallest pivot of A over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
 _SINGULAR = 1e-18  # determinant over the cube of the trace: a rotation without a derivative
 # ∂(t R)/∂F in the plane: t R = [[a, −b], [b, a]], a = F₀₀ + F₁₁, b = F₁₀ − F₀₁
-_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 _IN_PLANE = np.einsum("kn,lm->knlm", np.eye(2), np.eye(2))
-_IN_PLANE += np.einsum("kn,lm->knlm", _QUARTER, _QUARTER)
+_IN_PLANE += np.einsum("akn,alm->knlm", SPINS[2], SPINS[2])
 
 
 class StepEnds(NamedTuple):

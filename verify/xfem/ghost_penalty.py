@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from verify.xfem.arrays import Floats, Ints
-from verify.xfem.block_pattern import BlockPattern, body_pattern, pattern_places
+from verify.xfem.block_pattern import BlockPattern, pattern_places
 from verify.xfem.contacts import face_contacts
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
@@ -101,10 +101,6 @@ class GhostPenalty:
         """(N, N) the penalty's stiffness, the same for every component, in N/m."""
         weights = self.factor * self.modulus * self.weights
         return csr_array(self.jumps.T @ (self.jumps * weights[:, None]))
-
-    def pattern(self) -> BlockPattern:
-        """Sparsity of stiffness and penalty; its first cells are those of the body."""
-        return body_pattern(self.phantom, self.couplings)
 
     def add_stiffness(self, pattern: BlockPattern, blocks: Floats, scale: float = 1.0) -> None:
         """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.

@@ -64,6 +64,8 @@ class InternalForce:
         another body. By every method: if an array has another shape or type than the body's.
     """
 
+    has_stress = True  # that can be averaged over a step
+
     def __init__(
         self,
         phantom: PhantomMesh,
@@ -104,11 +106,6 @@ class InternalForce:
     def is_membrane(self) -> bool:
         """Whether the body is of triangles in space."""
         return self.elements.is_membrane
-
-    @property
-    def has_stress(self) -> bool:
-        """Whether the force is that of a stress, which can be averaged over a step."""
-        return True
 
     @property
     def has_one_pass(self) -> bool:

@@ -54,9 +54,8 @@ class Mass:
     @cached_property
     def entries(self) -> tuple[Ints, Ints, Floats]:
         """(rows, columns, values) of the non-zeros."""
-        starts, columns = self.matrix.indptr, self.matrix.indices
-        rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        return rows, columns.astype(np.int64), self.matrix.data
+        entries = self.matrix.tocoo()
+        return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
     def apply(self, vectors: Floats) -> Floats:
         """M times (N, d) vectors."""

@@ -296,13 +296,13 @@ def cut_mesh(
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
     # the pieces of the patch, and the cells around it
-    pieces, cuts = partition.label.shape
+    pieces = len(partition.label)
     untouched = np.ones(len(mesh.cells), dtype=bool)
     untouched[joined.cells] = False
     rest = np.flatnonzero(untouched)
     parent = np.concatenate([joined.cells[joined.piece_cell], rest])
     cells = np.concatenate([numbering[joined.group], mesh.cells[rest]])
-    label = np.zeros((len(parent), cuts), dtype=np.int8)
+    label = np.zeros((len(parent), len(cuts)), dtype=np.int8)
     label[:pieces] = partition.label
     share = np.ones(len(parent))
     share[:pieces] = fraction

@@ -57,18 +57,11 @@ def rotations_in_space(F, quaternions, R):
         q = quaternions[p]
         if not _newton(F[p], q, R[p]):
             largest_eigenvector(F[p], q)
-        _rotation_matrix(q, R[p])
+        rotation_matrix(q, R[p])
 
 
 @njit(cache=True)
-def rotation_matrices(quaternions, R):
-    """Write the matrices R (p, 3, 3) of unit quaternions (p, 4)."""
-    for p in range(len(R)):
-        _rotation_matrix(quaternions[p], R[p])
-
-
-@njit(cache=True)
-def _rotation_matrix(q, R):
+def rotation_matrix(q, R):
     """Write the matrix of the unit quaternion (w, x, y, z) to R (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
@@ -86,7 +79,7 @@ def _newton(F, q, R):
             square += F[k, l] ** 2
     least = _PIVOT * np.sqrt(square)
     for _ in range(_NEWTON_STEPS):
-        _rotation_matrix(q, R)
+        rotation_matrix(q, R)
         for k in range(3):
             for l in range(3):
                 S[k, l] = R[0, k] * F[0, l] + R[1, k] * F[1, l] + R[2, k] * F[2, l]

@@ -6,6 +6,7 @@ the linear response to the whole of it would stretch the body by its arm times t
 """
 
 from collections.abc import Callable, Iterator
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -138,8 +139,7 @@ def part_of_rotation(turn: Floats, share: float) -> Floats:
 
 def _edges_within(cells: Ints, chosen: Bools) -> Ints:
     """Edges (e, 2) of cells both ends of which are chosen."""
-    corners = cells.shape[1]
-    pairs = [(i, j) for i in range(corners) for j in range(i + 1, corners)]
-    edges = np.concatenate([cells[:, pair] for pair in pairs])
+    pairs = list(combinations(range(cells.shape[1]), 2))
+    edges = cells[:, pairs].reshape(-1, 2)
     edges = edges[chosen[edges].all(axis=1)]
     return np.unique(np.sort(edges, axis=1), axis=0)

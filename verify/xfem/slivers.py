@@ -197,15 +197,9 @@ def _siblings(phantom: PhantomMesh, small: Bools) -> Ints:
     last = np.diff(pairs[0][order], append=-1) != 0
     into[pairs[0][order[last]]] = pairs[1][order[last]]
     into[small] = into[phantom.part[small]]
-    return _followed_to_the_end(into)
-
-
-def _followed_to_the_end(into: Ints) -> Ints:
-    while True:
-        further = into[into]
-        if np.array_equal(further, into):
-            return into
+    while not np.array_equal(further := into[into], into):
         into = further
+    return into
 
 
 @dataclass(frozen=True)

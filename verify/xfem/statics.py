@@ -101,7 +101,7 @@ def solve_static(
     check_choice(solver, Method, "solver")
     stiffness = InternalForce(phantom, material, "linear", kernels, ghost)
     clock = [perf_counter()]
-    pattern = ghost.pattern() if ghost else body_pattern(phantom)
+    pattern = body_pattern(phantom, ghost.couplings if ghost else None)
     iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(phantom))
     limit = _MOST if solver == "auto" else 5 * _MOST
     inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, limit if iterates else 0)
