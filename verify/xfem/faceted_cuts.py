@@ -25,19 +25,13 @@ _FLAT = 1e-12  # area over squared edge below which a triangle has none
 
 
 @njit(cache=True)
-def squared_distance(a, b):
-    """Return |a − b|²."""
-    total = 0.0
-    for i in range(len(a)):
-        total += (a[i] - b[i]) ** 2
-    return total
-
-
-@njit(cache=True)
 def nearest_on_facet(x, corners, weights):
-    """Write the weights (k,) of the point of a facet that is nearest to x."""
+    """Write the weights (k,) of the point of a facet (or, k = 1, of a point) nearest to x."""
     for k in range(len(weights)):
         weights[k] = 0.0
+    if corners.shape[0] == 1:
+        weights[0] = 1.0
+        return
     if corners.shape[0] == 2:
         p, q = 0.0, 0.0
         for i in range(len(x)):
@@ -94,12 +88,25 @@ def nearest_on_facet(x, corners, weights):
 
 
 @njit(cache=True)
-def foot_on_facet(corners, weights, foot):
-    """Write the point of a facet with these weights."""
-    for i in range(len(foot)):
-        foot[i] = 0.0
-        for k in range(corners.shape[0]):
-            foot[i] += weights[k] * corners[k, i]
+def _nearest(points, facets):
+    """Nearest of the facets (f, k, s) to points (n, s), weights (n, k), squared distances (n,)."""
+    count, size, space = facets.shape
+    facet, square = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+    found, weights = np.zeros((len(points), size)), np.empty(size)
+    for n in range(len(points)):
+        for f in range(count):
+            nearest_on_facet(points[n], facets[f], weights)
+            distance = 0.0
+            for i in range(space):
+                foot = 0.0
+                for k in range(size):
+                    foot += weights[k] * facets[f, k, i]
+                distance += (points[n, i] - foot) ** 2
+            if distance < square[n]:
+                facet[n], square[n] = f, distance
+                for k in range(size):
+                    found[n, k] = weights[k]
+    return facet, found, square
 
 
 class FacetArrays(NamedTuple):
@@ -178,79 +185,29 @@ def _corner_angles(corners: Floats) -> Floats:
     return angles
 
 
-@njit(cache=True)
-def probe(x, facets, room):
-    """Give (level set, distance past the rim or 0, travel of the nearest point) at x (s,).
-
-    `room` (4, 3) is written: a walk asks this thousands of times and allocates nothing.
-    """
-    count, size, space = facets.corners.shape
-    weights, best_weights = room[0, :size], room[1, :size]
-    foot, best_foot = room[2, :space], room[3, :space]
-    best, nearest = np.inf, 0
-    for t in range(count):
-        nearest_on_facet(x, facets.corners[t], weights)
-        foot_on_facet(facets.corners[t], weights, foot)
-        distance = squared_distance(x, foot)
-        if distance < best:
-            best, nearest = distance, t
-            for k in range(size):
-                best_weights[k] = weights[k]
-            for i in range(space):
-                best_foot[i] = foot[i]
-    zeros, last, only, travel = 0, 0, 0, 0.0
-    for k in range(size):
-        if best_weights[k] == 0.0:
-            zeros, last = zeros + 1, k
-        else:
-            only = k
-        travel += best_weights[k] * facets.travel[nearest, k]
-    normal, rim = facets.normals[nearest], False
-    if zeros == size - 1:
-        normal, rim = facets.vertex_normals[nearest, only], facets.vertex_rim[nearest, only]
-    elif zeros == 1:
-        rim = facets.edge_rim[nearest, last]
-        if not rim:
-            normal = facets.edge_normals[nearest, last]
-    along = 0.0
-    for i in range(space):
-        along += (x[i] - best_foot[i]) * normal[i]
-    if zeros == 0:
-        return along, 0.0, travel
-    if rim:
-        beyond = 0.0
-        for i in range(space):
-            beyond += (x[i] - best_foot[i] - along * normal[i]) ** 2
-        return along, np.sqrt(beyond), travel
-    return (np.sqrt(best) if along >= 0.0 else -np.sqrt(best)), 0.0, travel
-
-
-@njit(cache=True)
-def _probe_points(points, facets):
+def _probe_points(points: Floats, facets: FacetArrays) -> Floats:
     """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
-    found = np.empty((len(points), 3))
-    space = points.shape[1]
-    size = facets.rim.shape[1]
-    weights, corner, room = np.empty(size), np.empty(space), np.empty((4, 3))
-    for n in range(len(points)):
-        x = points[n]
-        level, beyond, travel = probe(x, facets, room)
-        if beyond > 0.0:
-            depth = -beyond
-        else:
-            gap = np.inf
-            for r in range(len(facets.rim)):
-                if size == 1:
-                    for i in range(space):
-                        corner[i] = facets.rim[r, 0, i]
-                else:
-                    nearest_on_facet(x, facets.rim[r], weights)
-                    foot_on_facet(facets.rim[r], weights, corner)
-                gap = min(gap, squared_distance(x, corner))
-            # measured along the facets: without the part across it
-            depth = np.sqrt(max(gap - level * level, 0.0))
-        found[n, 0], found[n, 1], found[n, 2] = level, depth, travel
-    return found
+    facet, weights, square = _nearest(points, facets.corners)
+    zeros = (weights == 0.0).sum(axis=1)
+    corner, opposite = weights.argmax(axis=1), weights.argmin(axis=1)
+    normal, rim = facets.normals[facet], np.zeros(len(points), dtype=bool)
+    edge = zeros == 1
+    rim[edge] = facets.edge_rim[facet[edge], opposite[edge]]
+    edge &= ~rim
+    normal[edge] = facets.edge_normals[facet[edge], opposite[edge]]
+    vertex = zeros == weights.shape[1] - 1
+    rim[vertex] = facets.vertex_rim[facet[vertex], corner[vertex]]
+    normal[vertex] = facets.vertex_normals[facet[vertex], corner[vertex]]
+    off = points - np.einsum("nk,nki->ni", weights, facets.corners[facet])
+    along = np.einsum("ni,ni->n", off, normal)
+    beyond = np.where(rim, np.linalg.norm(off - along[:, None] * normal, axis=1), 0.0)
+    distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)
+    level = np.where(rim | (zeros == 0), along, distance)
+    gap = _nearest(points, facets.rim)[2]
+    # measured along the facets: without the part across it
+    depth = np.where(beyond > 0.0, -beyond, np.sqrt(np.maximum(gap - level**2, 0.0)))
+    travel = np.einsum("nk,nk->n", weights, facets.travel[facet])
+    return np.stack([level, depth, travel], axis=1)
 
 
 class FacetCut:
