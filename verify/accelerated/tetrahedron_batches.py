@@ -31,6 +31,7 @@ CORNERS = 101  # displacement and what is moved, of four corners
 FIRST = 125  # quaternion at the start of a step
 ENTRIES = 129
 
+_FUSED = {"contract"}  # multiply and add in one, rounded once
 _NEWTON_STEPS = 12
 _PIVOT = 1e-4  # of the norm of F: a Hessian nearer to singular goes to the eigenvector
 _SMALL_ANGLE = 1e-16  # square of the last rotation: Newton squares it once more, to round-off
@@ -38,10 +39,9 @@ _SINGULAR = 1e-8  # of the trace of the stretch: a rotation without a derivative
 _REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 
 
-@njit(cache=True, inline="always")
-def _matrix(v, entry, l):
+@njit(cache=True, fastmath=_FUSED)
+def _matrix(v, at):
     """Nine numbers of a cell, by rows."""
-    at = entry * BATCH + l
     return (
         v[at], v[at + BATCH], v[at + 2 * BATCH],
         v[at + 3 * BATCH], v[at + 4 * BATCH], v[at + 5 * BATCH],
@@ -49,10 +49,9 @@ def _matrix(v, entry, l):
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
-def _rotation(v, entry, l):
+@njit(cache=True, fastmath=_FUSED)
+def _rotation(v, at):
     """Matrix of a quaternion of a cell, by rows."""
-    at = entry * BATCH + l
     w, x, y, z = v[at], v[at + BATCH], v[at + 2 * BATCH], v[at + 3 * BATCH]
     return (
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
@@ -61,7 +60,7 @@ def _rotation(v, entry, l):
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, fastmath=_FUSED)
 def _times(M, x, y, z):
     return (
         M[0] * x + M[1] * y + M[2] * z,
@@ -70,10 +69,10 @@ def _times(M, x, y, z):
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, fastmath=_FUSED)
 def _turned_gradients(v, R, l):
     """g_0, g_1, g_2, g_3."""
-    b = _matrix(v, GRADIENTS, l)
+    b = _matrix(v, GRADIENTS * BATCH + l)
     g1, g2, g3 = (
         _times(R, b[0], b[1], b[2]),
         _times(R, b[3], b[4], b[5]),
@@ -82,16 +81,14 @@ def _turned_gradients(v, R, l):
     return (-g1[0] - g2[0] - g3[0], -g1[1] - g2[1] - g3[1], -g1[2] - g2[2] - g3[2]), g1, g2, g3
 
 
-@njit(cache=True, inline="always")
-def _write(v, entry, l, x):
-    at = entry * BATCH + l
+@njit(cache=True, fastmath=_FUSED)
+def _write(v, at, x):
     v[at], v[at + BATCH], v[at + 2 * BATCH] = x[0], x[1], x[2]
 
 
-@njit(cache=True, inline="always")
-def _gradient_row(v, l, component, into, b):
+@njit(cache=True, fastmath=_FUSED)
+def _gradient_row(v, at, into, b):
     """Write one row of a gradient, from a component at the corners."""
-    at = (CORNERS + component) * BATCH + l
     first = v[at]
     p, q, r = v[at + 6 * BATCH] - first, v[at + 12 * BATCH] - first, v[at + 18 * BATCH] - first
     row = (
@@ -99,20 +96,20 @@ def _gradient_row(v, l, component, into, b):
         b[1] * p + b[4] * q + b[7] * r,
         b[2] * p + b[5] * q + b[8] * r,
     )
-    _write(v, into, l, row)
+    _write(v, into, row)
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, fastmath=_FUSED)
 def deform(v):
     """Write both deformation gradients."""
     for l in range(BATCH):
-        b = _matrix(v, GRADIENTS, l)
-        _gradient_row(v, l, 0, 0, b)
-        _gradient_row(v, l, 1, 3, b)
-        _gradient_row(v, l, 2, 6, b)
-        _gradient_row(v, l, 3, _MOVED, b)
-        _gradient_row(v, l, 4, _MOVED + 3, b)
-        _gradient_row(v, l, 5, _MOVED + 6, b)
+        b = _matrix(v, GRADIENTS * BATCH + l)
+        _gradient_row(v, CORNERS * BATCH + l, l, b)
+        _gradient_row(v, (CORNERS + 1) * BATCH + l, 3 * BATCH + l, b)
+        _gradient_row(v, (CORNERS + 2) * BATCH + l, 6 * BATCH + l, b)
+        _gradient_row(v, (CORNERS + 3) * BATCH + l, _MOVED * BATCH + l, b)
+        _gradient_row(v, (CORNERS + 4) * BATCH + l, (_MOVED + 3) * BATCH + l, b)
+        _gradient_row(v, (CORNERS + 5) * BATCH + l, (_MOVED + 6) * BATCH + l, b)
         for k in (0, 4, 8):
             v[k * BATCH + l] += 1.0
             v[(_MOVED + k) * BATCH + l] += 1.0
@@ -150,12 +147,12 @@ def _rotate_one(v, l):
         v[(QUATERNION + k) * BATCH + l] = q[k]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath=_FUSED)
 def _newton_step(v):
     """One step of all cells without a branch; the square of the rotation, or infinity, is left."""
     for l in range(BATCH):
-        f00, f01, f02, f10, f11, f12, f20, f21, f22 = _matrix(v, 0, l)
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = _rotation(v, QUATERNION, l)
+        f00, f01, f02, f10, f11, f12, f20, f21, f22 = _matrix(v, l)
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = _rotation(v, QUATERNION * BATCH + l)
         at = QUATERNION * BATCH + l
         w, x, y, z = v[at], v[at + BATCH], v[at + 2 * BATCH], v[at + 3 * BATCH]
         least = v[_LEAST * BATCH + l]
@@ -195,10 +192,9 @@ def _newton_step(v):
         v[at + 3 * BATCH] = nz * scale if good else z
 
 
-@njit(cache=True, inline="always")
-def _block(v, pair, l, a, b, wl, wm):
+@njit(cache=True, fastmath=_FUSED)
+def _block(v, at, a, b, wl, wm):
     """Write the block w (λ a bᵀ + μ b aᵀ + μ a·b I) of a pair of corners."""
-    at = (BLOCKS + 9 * pair) * BATCH + l
     dot, both = wm * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]), wl + wm
     v[at] = both * a[0] * b[0] + dot
     v[at + BATCH] = wl * a[0] * b[1] + wm * a[1] * b[0]
@@ -211,11 +207,11 @@ def _block(v, pair, l, a, b, wl, wm):
     v[at + 8 * BATCH] = both * a[2] * b[2] + dot
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, fastmath=_FUSED)
 def resist(v, scale):
     """Write the forces of what is moved, and `scale` times the rotation-fixed tangent."""
     for l in range(BATCH):
-        R, F = _rotation(v, QUATERNION, l), _matrix(v, _MOVED, l)
+        R, F = _rotation(v, QUATERNION * BATCH + l), _matrix(v, _MOVED * BATCH + l)
         wl, wm = v[_MODULI * BATCH + l], v[(_MODULI + 1) * BATCH + l]
         e00 = F[0] * R[0] + F[1] * R[1] + F[2] * R[2] - 1.0
         e11 = F[3] * R[3] + F[4] * R[4] + F[5] * R[5] - 1.0
@@ -236,20 +232,20 @@ def resist(v, scale):
             s02, s12, 2.0 * wm * e22 + pressure,
         )  # fmt: skip
         a, b, c, d = _turned_gradients(v, R, l)
-        _write(v, FORCE, l, _times(stress, a[0], a[1], a[2]))
-        _write(v, FORCE + 3, l, _times(stress, b[0], b[1], b[2]))
-        _write(v, FORCE + 6, l, _times(stress, c[0], c[1], c[2]))
-        _write(v, FORCE + 9, l, _times(stress, d[0], d[1], d[2]))
+        _write(v, FORCE * BATCH + l, _times(stress, a[0], a[1], a[2]))
+        _write(v, (FORCE + 3) * BATCH + l, _times(stress, b[0], b[1], b[2]))
+        _write(v, (FORCE + 6) * BATCH + l, _times(stress, c[0], c[1], c[2]))
+        _write(v, (FORCE + 9) * BATCH + l, _times(stress, d[0], d[1], d[2]))
         wl, wm = scale * wl, scale * wm
-        _block(v, 0, l, a, b, wl, wm)
-        _block(v, 1, l, a, c, wl, wm)
-        _block(v, 2, l, a, d, wl, wm)
-        _block(v, 3, l, b, c, wl, wm)
-        _block(v, 4, l, b, d, wl, wm)
-        _block(v, 5, l, c, d, wl, wm)
+        _block(v, BLOCKS * BATCH + l, a, b, wl, wm)
+        _block(v, (BLOCKS + 9) * BATCH + l, a, c, wl, wm)
+        _block(v, (BLOCKS + 18) * BATCH + l, a, d, wl, wm)
+        _block(v, (BLOCKS + 27) * BATCH + l, b, c, wl, wm)
+        _block(v, (BLOCKS + 36) * BATCH + l, b, d, wl, wm)
+        _block(v, (BLOCKS + 45) * BATCH + l, c, d, wl, wm)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, fastmath=_FUSED)
 def _resisted(H, g):
     """H [g]ₓ, H symmetric: its entries 00, 11, 22, 01, 02, 12."""
     x, y, z = g
@@ -260,11 +256,10 @@ def _resisted(H, g):
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
-def _add_rotational(v, pair, l, g, Y):
+@njit(cache=True, fastmath=_FUSED)
+def _add_rotational(v, at, g, Y):
     """Add [g]ₓᵀ Y to the block of a pair of corners."""
     x, y, z = g
-    at = (BLOCKS + 9 * pair) * BATCH + l
     v[at] += z * Y[3] - y * Y[6]
     v[at + BATCH] += z * Y[4] - y * Y[7]
     v[at + 2 * BATCH] += z * Y[5] - y * Y[8]
@@ -276,11 +271,11 @@ def _add_rotational(v, pair, l, g, Y):
     v[at + 8 * BATCH] += y * Y[2] - x * Y[5]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath=_FUSED)
 def resist_rotation(v, scale):
     """Add `scale` times the rotational part of the tangent; note in `IRREGULAR` who has none."""
     for l in range(BATCH):
-        R, F = _rotation(v, QUATERNION, l), _matrix(v, 0, l)
+        R, F = _rotation(v, QUATERNION * BATCH + l), _matrix(v, l)
         # stretch V = F Rᵀ
         v00 = F[0] * R[0] + F[1] * R[1] + F[2] * R[2]
         v11 = F[3] * R[3] + F[4] * R[4] + F[5] * R[5]
@@ -303,17 +298,17 @@ def resist_rotation(v, scale):
         )  # fmt: skip
         g0, g1, g2, g3 = _turned_gradients(v, R, l)
         Y = _resisted(H, g1)
-        _add_rotational(v, 0, l, g0, Y)
+        _add_rotational(v, BLOCKS * BATCH + l, g0, Y)
         Y = _resisted(H, g2)
-        _add_rotational(v, 1, l, g0, Y)
-        _add_rotational(v, 3, l, g1, Y)
+        _add_rotational(v, (BLOCKS + 9) * BATCH + l, g0, Y)
+        _add_rotational(v, (BLOCKS + 27) * BATCH + l, g1, Y)
         Y = _resisted(H, g3)
-        _add_rotational(v, 2, l, g0, Y)
-        _add_rotational(v, 4, l, g1, Y)
-        _add_rotational(v, 5, l, g2, Y)
+        _add_rotational(v, (BLOCKS + 18) * BATCH + l, g0, Y)
+        _add_rotational(v, (BLOCKS + 36) * BATCH + l, g1, Y)
+        _add_rotational(v, (BLOCKS + 45) * BATCH + l, g2, Y)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, fastmath=_FUSED)
 def _stretch(R, F):
     """Rᵀ F, symmetric: its entries 00, 11, 22, 01, 02, 12."""
     return (
@@ -326,7 +321,7 @@ def _stretch(R, F):
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath=_FUSED)
 def average(v):
     """Overwrite the forces by those of the stress averaged over a step, in its plain form.
 
@@ -334,8 +329,11 @@ def average(v):
     there is no plain form, as `IRREGULAR` says afterwards, the force is zero.
     """
     for l in range(BATCH):
-        F0, F1 = _matrix(v, _MOVED, l), _matrix(v, 0, l)
-        U0, U1 = _stretch(_rotation(v, FIRST, l), F0), _stretch(_rotation(v, QUATERNION, l), F1)
+        F0, F1 = _matrix(v, _MOVED * BATCH + l), _matrix(v, l)
+        U0, U1 = (
+            _stretch(_rotation(v, FIRST * BATCH + l), F0),
+            _stretch(_rotation(v, QUATERNION * BATCH + l), F1),
+        )
         a, b, c = U0[0] + U1[0], U0[1] + U1[1], U0[2] + U1[2]
         d, e, f = U0[3] + U1[3], U0[4] + U1[4], U0[5] + U1[5]
         minor, c00, c01, c02 = a * b - d * d, b * c - f * f, e * f - d * c, d * f - b * e
@@ -356,13 +354,15 @@ def average(v):
         q = _times(M, F0[3] + F1[3], F0[4] + F1[4], F0[5] + F1[5])
         r = _times(M, F0[6] + F1[6], F0[7] + F1[7], F0[8] + F1[8])
         P = (p[0], p[1], p[2], q[0], q[1], q[2], r[0], r[1], r[2])
-        B = _matrix(v, GRADIENTS, l)
+        B = _matrix(v, GRADIENTS * BATCH + l)
         x, y, z = (
             _times(P, B[0], B[1], B[2]),
             _times(P, B[3], B[4], B[5]),
             _times(P, B[6], B[7], B[8]),
         )
-        _write(v, FORCE, l, (-x[0] - y[0] - z[0], -x[1] - y[1] - z[1], -x[2] - y[2] - z[2]))
-        _write(v, FORCE + 3, l, x)
-        _write(v, FORCE + 6, l, y)
-        _write(v, FORCE + 9, l, z)
+        _write(
+            v, FORCE * BATCH + l, (-x[0] - y[0] - z[0], -x[1] - y[1] - z[1], -x[2] - y[2] - z[2])
+        )
+        _write(v, (FORCE + 3) * BATCH + l, x)
+        _write(v, (FORCE + 6) * BATCH + l, y)
+        _write(v, (FORCE + 9) * BATCH + l, z)
