@@ -182,7 +182,7 @@ def _linearise(
 ):  # fmt: skip
     """Write force and tangent of a displacement; return the cells without rotational part."""
     left_out = 0
-    row = begun = np.int64(0)  # constants would have what takes them compiled once more
+    row = begun = 0
     d = np.empty((3, 3))
     force[:] = 0.0
     for batch in range(len(constants)):
@@ -238,7 +238,7 @@ def _linearise(
     return left_out
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _begin(row, last, starts, diagonal, blocks):
     """Empty rows up to the last one from the diagonal on; return the one after it."""
     while row <= last:
@@ -250,7 +250,7 @@ def _begin(row, last, starts, diagonal, blocks):
     return row
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _complete(row, starts, diagonal, mirror, whole, d, blocks):
     """Write the diagonal of a row and, if wanted, what is below it, from what is above it."""
     middle = diagonal[row]
