@@ -329,6 +329,11 @@ class CaseResult:
         return list(dict.fromkeys(v.solver for v in self.verdicts if v.verdict is Verdict.FAIL))
 
 
+def finest_of(solves: Iterable[SolveRecord]) -> dict[str, SolveRecord]:
+    """Return the solve on the finest level by solver."""
+    return {solve.solver: solve for solve in sorted(solves, key=lambda solve: solve.level)}
+
+
 def worst(verdicts: Iterable[Verdict]) -> Verdict:
     """Return the worst of verdicts: FAIL, ERROR, UNDECIDED, PASS; UNDECIDED if there are none.
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from verify.result import Metric, SolveRecord, Status
+from verify.result import Metric, SolveRecord, Status, finest_of
 from verify.scene import Scene
 
 SHARE = 0.1  # of the error that is judged, below which the reference's uncertainty shall be
@@ -37,10 +37,7 @@ def sufficiency(
         [quantity.name for quantity in scene.quantities]
         + [check.metric for check in scene.acceptance]
     )
-    finest: dict[str, SolveRecord] = {}
-    for solve in sorted(solves, key=lambda solve: solve.level):
-        if solve.solver != reference and solve.status is Status.SOLVED:
-            finest[solve.solver] = solve
+    finest = finest_of(s for s in solves if s.solver != reference and s.status is Status.SOLVED)
     rows = {
         f"{name} of {solve.solver}, level {solve.level}": _row(metric)
         for solve in finest.values()

@@ -8,7 +8,7 @@ from typing import Any
 from verify.assess.intervals import ERROR_METRICS
 from verify.baseline.record import Independent, Own, Quantity, Speed
 from verify.calibration import KERNEL, seconds_of_note
-from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of
 
 # errors below this are round-off; how large round-off is says nothing
 _ROUND_OFF = 1e-10
@@ -25,8 +25,7 @@ class MeasuredSpeed:
 
 def finest(result: CaseResult) -> list[SolveRecord]:
     """Return the finest level of each solver, solved or not."""
-    by_solver = {solve.solver: solve for solve in sorted(result.solves, key=lambda s: s.level)}
-    return list(by_solver.values())
+    return list(finest_of(result.solves).values())
 
 
 def metric_of(result: CaseResult, name: str) -> tuple[Metric | None, str]:

@@ -9,7 +9,7 @@ from verify.report.blocks import Cell, Drawing, Table, plain_table
 from verify.report.figures.profiles import profile_panel
 from verify.report.figures.style import Palette
 from verify.report.notation import error_text, metric_title, number, solver_title
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, SolveRecord, Status, finest_of
 
 BALANCE_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
@@ -46,7 +46,8 @@ class MotionView:
 
 def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
     """Return the panels over time of a case, or None if nothing in it moves."""
-    moving = _finest(result.solves)
+    solved = (s for s in result.solves if s.status is Status.SOLVED and (s.account or s.series))
+    moving = list(finest_of(solved).values())
     if not moving:
         return None
     cuts = _cuts(result.scene)
@@ -61,15 +62,6 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
                            for name, whose in hidden.items() if whose)  # fmt: skip
     return MotionView(panels, shown, unresolved, released_table(moving),
                       _drifts_table(result, moving), moving)  # fmt: skip
-
-
-def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
-    """Return the finest solved level of each solver that has anything over time."""
-    finest: dict[str, SolveRecord] = {}
-    for solve in sorted(solves, key=lambda solve: solve.level):
-        if solve.status is Status.SOLVED and (solve.account or solve.series):
-            finest[solve.solver] = solve
-    return list(finest.values())
 
 
 def _cuts(scene: dict[str, Any]) -> list[float]:

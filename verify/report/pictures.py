@@ -12,7 +12,7 @@ from verify.report.error_maps import add_error_maps
 from verify.report.notation import number_text, solver_title
 from verify.report.picture import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, SolveRecord, Status, finest_of
 from verify.solution import Solution
 
 __all__ = ["CasePictures", "case_pictures"]
@@ -59,10 +59,7 @@ def _named(solve: SolveRecord) -> str:
 
 def _finest_solves(result: CaseResult) -> list[SolveRecord]:
     """Return the finest stored solve of each solver: reference, those that fail, the others."""
-    finest: dict[str, SolveRecord] = {}
-    for solve in sorted(result.solves, key=lambda solve: solve.level):
-        if solve.status is Status.SOLVED and solve.solution:
-            finest[solve.solver] = solve
+    finest = finest_of(s for s in result.solves if s.status is Status.SOLVED and s.solution)
     if REFERENCE in finest and "conforming" not in result.failing:
         finest.pop("conforming", None)
     order = {REFERENCE: 0, "conforming": 2, "xfem": 3}

@@ -27,24 +27,33 @@ def plane_scene(
     at : float
         Where the opening is asked for, as a fraction of the cut's length.
     """
-    place = {"kind": "displacement", "point": random_point(random, geometry, cut)}
+    place = random_point(random, geometry, cut)
+    opening = {"kind": "opening", "name": "opening", "at": at}
+    poisson = float(random.uniform(0.0, 0.45))
+    material = {"poisson": poisson, "plane": str(random.choice(["strain", "stress"]))}
+    return scene_of(geometry, [8, 8], exact, cut, material, opening, place)
+
+
+def scene_of(
+    geometry: Content, cells: list[int], exact: tuple[str, Content], cut: Content,
+    material: Content, opening: Content, place: list[float],
+) -> Content:  # fmt: skip
+    """Return the content of a scene that asks for an opening and the displacement of a place."""
     return {
         "title": exact[0],
         "requirement": "The stated uncertainty of the reference shall cover its true error.",
         "geometry": geometry,
-        "mesh": {"cells": [[8, 8]]},
-        "material": {
-            "young": 1.0,
-            "poisson": float(random.uniform(0.0, 0.45)),
-            "plane": str(random.choice(["strain", "stress"])),
-        },
+        "mesh": {"cells": [cells]},
+        "material": {"young": 1.0, **material},
         "supports": [{"where": "boundary", "displacement": "exact"}],
         "cuts": [cut],
         "quantities": [
             {"kind": "strain_energy"},
-            {"kind": "opening", "name": "opening", "at": at},
-            {**place, "name": "u_x", "component": "x"},
-            {**place, "name": "u_y", "component": "y"},
+            opening,
+            *(
+                {"kind": "displacement", "point": place, "name": f"u_{axis}", "component": axis}
+                for axis in ("x", "xyz"[len(place) - 1])
+            ),
         ],
         "exact": {"solution": exact[0], "parameters": exact[1]},
     }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verify.study.calibration.plane_scenes import Content, Random
+from verify.study.calibration.plane_scenes import Content, Random, scene_of
 
 
 def solid_smooth(random: Random) -> Content:
@@ -52,20 +52,7 @@ def ball_and_shell(random: Random) -> Content:
 def _scene(
     random: Random, exact: tuple[str, Content], cut: Content, at: np.ndarray, opened: np.ndarray
 ) -> Content:
-    place = {"kind": "displacement", "point": at.tolist()}
-    return {
-        "title": exact[0],
-        "requirement": "The stated uncertainty of the reference shall cover its true error.",
-        "geometry": {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3},
-        "mesh": {"cells": [[3, 3, 3]]},
-        "material": {"young": 1.0, "poisson": float(random.uniform(0.0, 0.45))},
-        "supports": [{"where": "boundary", "displacement": "exact"}],
-        "cuts": [cut],
-        "quantities": [
-            {"kind": "strain_energy"},
-            {"kind": "opening", "name": "opening", "point": opened.tolist()},
-            {**place, "name": "u_x", "component": "x"},
-            {**place, "name": "u_z", "component": "z"},
-        ],
-        "exact": {"solution": exact[0], "parameters": exact[1]},
-    }
+    cube = {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3}
+    opening = {"kind": "opening", "name": "opening", "point": opened.tolist()}
+    material = {"poisson": float(random.uniform(0.0, 0.45))}
+    return scene_of(cube, [3, 3, 3], exact, cut, material, opening, at.tolist())

@@ -43,19 +43,15 @@ def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) 
     comparisons = []
     for metric in metrics:
         for view, item_of in ((EQUAL_SIZE, item_at_equal_size), (FINEST, _on_finest)):
-            items, left_out = [], []
-            for result in results:
-                for name in _names(result, metric, solvers):
-                    item = item_of(result, name, solvers)
-                    if isinstance(item, LeftOut):
-                        left_out.append(item)
-                    else:
-                        items.append(item)
-            found = compared_by_mean(metric, view, solvers, items, left_out)
-            if found is not None:
+            items = [
+                item_of(result, name, solvers)
+                for result in results
+                for name in _names(result, metric, solvers)
+            ]
+            if (found := compared_by_mean(metric, view, solvers, items)) is not None:
                 comparisons.append(found)
         # of the view above that came last: on the finest level
-        exact = [item for item in items if len(item.found) > 1 and is_exact(item)]
+        exact = [i for i in items if isinstance(i, Item) and len(i.found) > 1 and is_exact(i)]
         if (found := compared_by_worst(metric, EXACT, solvers, exact)) is not None:
             comparisons.append(found)
     return comparisons

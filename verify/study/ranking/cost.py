@@ -21,16 +21,12 @@ def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> l
     """
     comparisons, uncertain = [], bool(why_times_are_no_sample(results, solvers))
     for metric in _METRICS:
-        items, left_out = [], []
-        for result in results:
-            if not any(s.metric(metric) for s in result.solves if s.solver in solvers):
-                continue
-            item = cost_item(result, metric, solvers)
-            if isinstance(item, LeftOut):
-                left_out.append(item)
-            else:
-                items.append(item)
-        found = compared_by_mean(metric, "time at equal error", solvers, items, left_out)
+        items = [
+            cost_item(result, metric, solvers)
+            for result in results
+            if any(s.metric(metric) for s in result.solves if s.solver in solvers)
+        ]
+        found = compared_by_mean(metric, "time at equal error", solvers, items)
         if found is not None and uncertain:
             found = replace(found, standings=_tied(found.standings))
         if found is not None:

@@ -37,8 +37,7 @@ def compared_by_mean(
     metric: str,
     view: str,
     solvers: Sequence[str],
-    items: Sequence[Item],
-    before: Sequence[LeftOut] = (),
+    items: Sequence[Item | LeftOut],
 ) -> Comparison | None:
     """Join items by the geometric mean of ratios to the least number of each.
 
@@ -48,10 +47,11 @@ def compared_by_mean(
     item whose least number is round-off has no ratios and is left out, with the numbers
     (`compared_by_worst` is for those). So is one in which the reference cannot tell somebody's
     error from none: a single lower bound of zero would make that of the mean zero, and all ranks
-    ties. What was left out `before` is listed with it.
+    ties. What was left out before is listed with it.
     """
-    counted, left_out = [], list(before)
-    for item in items:
+    counted: list[Item] = []
+    left_out = [item for item in items if isinstance(item, LeftOut)]
+    for item in [item for item in items if isinstance(item, Item)]:
         left_out += [LeftOut(item.case, solver, why) for solver, why in item.missing.items()]
         if len(item.found) < 2:
             alone = f"{', '.join(item.found)} alone" if item.found else "no solver"
@@ -111,23 +111,10 @@ def _standings(
         found, count, where = joined.get(solver, (None, 0, ""))
         rank = ranks.get(solver)
         tied = rank is not None and list(ranks.values()).count(rank) > 1
-        standings.append(
-            Standing(
-                solver,
-                rank,
-                tied,
-                value=found.value if found else None,
-                low=found.low if found else None,
-                high=found.high if found else None,
-                count=count,
-                where=where,
-            )
-        )
+        value, low, high = (found.value, found.low, found.high) if found else (None,) * 3
+        standings.append(Standing(solver, rank, tied, value, low, high, count, where))
     last = math.inf
-    return sorted(
-        standings,
-        key=lambda s: (s.rank or last, last if s.value is None else s.value),
-    )
+    return sorted(standings, key=lambda s: (s.rank or last, last if s.value is None else s.value))
 
 
 def _mean(ratios: Sequence[Interval]) -> Interval:
@@ -136,11 +123,7 @@ def _mean(ratios: Sequence[Interval]) -> Interval:
             return 0.0
         return math.exp(sum(map(math.log, numbers)) / len(numbers))
 
-    return Interval(
-        mean([r.value for r in ratios]),
-        mean([r.low for r in ratios]),
-        mean([r.high for r in ratios]),
-    )
+    return Interval(*(mean([getattr(r, end) for r in ratios]) for end in ("value", "low", "high")))
 
 
 def _above_round_off(found: Interval) -> Interval:
