@@ -21,8 +21,7 @@ from scipy.spatial import cKDTree
 from verify.errors import InputError
 from verify.simulator.surfaces import Picture
 from verify.whole_files import whole_file, write_whole
-
-_Floats = NDArray[np.float64]
+from verify.xfem.arrays import Floats
 
 _SKIN, _FLESH, _FAT, _STEEL = "#e8b79b", "#a8322a", "#e8bf62", "#8b98a5"
 _BED = 1.0  # of the width that is seen, along the line of sight: behind every fold of a skin
@@ -40,8 +39,8 @@ class Frame:
 
     time: float
     picture: Picture
-    blades: Sequence[tuple[_Floats, _Floats]] = ()
-    hooks: Sequence[tuple[_Floats, _Floats]] = ()
+    blades: Sequence[tuple[Floats, Floats]] = ()
+    hooks: Sequence[tuple[Floats, Floats]] = ()
 
 
 @dataclass(frozen=True)
@@ -69,9 +68,9 @@ class View:
         Pixels.
     """
 
-    centre: _Floats
-    towards: _Floats
-    up: _Floats
+    centre: Floats
+    towards: Floats
+    up: Floats
     width: float
     size: tuple[int, int] = (640, 640)
     underlay: Underlay | None = None

@@ -3,18 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from verify.accelerated import FAST
 from verify.simulator.grips import Grips
 from verify.simulator.stage import Stage
+from verify.xfem.arrays import Bools, Floats
 from verify.xfem.body import DynamicBody
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,8 +35,8 @@ class BodyParts:
         cls,
         stage: Stage,
         phantom: PhantomMesh,
-        start: dict[int, _Floats],
-        facets: Sequence[NDArray[np.bool_]],
+        start: dict[int, Floats],
+        facets: Sequence[Bools],
     ) -> "BodyParts":
         """Make the parts of a cut body.
 
@@ -57,7 +53,7 @@ class BodyParts:
         grips = Grips(phantom, stage.holds, stage.hooks, mass.weights, start, facets)
         return cls(stage, InternalForce(phantom, stage.material, kernels=FAST), mass, grips)
 
-    def body(self, load: Callable[[float], _Floats]) -> DynamicBody:
+    def body(self, load: Callable[[float], Floats]) -> DynamicBody:
         """Make the body and its sparsity; `load` gives nodal forces (N, s) at a time, N."""
         return DynamicBody(
             self.force,

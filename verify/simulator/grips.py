@@ -3,18 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.stage import Hold, Hook
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import MovingSupports
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
-
-def gripped(phantom: PhantomMesh, hook: Hook) -> _Ints:
+def gripped(phantom: PhantomMesh, hook: Hook) -> Ints:
     """Dof nodes that a hook grips: those on its side within its radius, at least the nearest.
 
     The unknowns at nodes across the cut are among them: they carry the material up to the cut.
@@ -26,9 +23,7 @@ def gripped(phantom: PhantomMesh, hook: Hook) -> _Ints:
     return on_side[away <= max(hook.radius, float(away.min()))]
 
 
-def held_unknowns(
-    phantom: PhantomMesh, nodes: NDArray[np.bool_], on_held: NDArray[np.bool_] | None = None
-) -> NDArray[np.bool_]:
+def held_unknowns(phantom: PhantomMesh, nodes: Bools, on_held: Bools | None = None) -> Bools:
     """Dof nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
 
     The unknown of the material at a node is held. Another one there, of material beyond a cut, is
@@ -47,7 +42,7 @@ def held_unknowns(
     return held
 
 
-def held_facets(mesh: SimplexMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def held_facets(mesh: SimplexMesh, nodes: Bools) -> Bools:
     """(m, d + 1) whether the facet opposite to a corner is on the boundary, its nodes all held."""
     cell, local = mesh.boundary_facets.T
     facet = nodes[mesh.cells[cell]]
@@ -78,9 +73,9 @@ class Grips:
         phantom: PhantomMesh,
         holds: Sequence[Hold],
         hooks: Sequence[Hook],
-        weights: _Floats,
-        start: dict[int, _Floats],
-        facets: Sequence[NDArray[np.bool_]] | None = None,
+        weights: Floats,
+        start: dict[int, Floats],
+        facets: Sequence[Bools] | None = None,
     ) -> None:
         shape = (phantom.node_count, phantom.mesh.space)
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
@@ -88,8 +83,8 @@ class Grips:
             at = held_unknowns(phantom, hold.nodes, None if facets is None else facets[k])
             for axis, value in zip(hold.components, hold.values, strict=True):
                 self._fixed[at, axis], self._values[at, axis] = True, value
-        self._moved: list[tuple[Hook, _Ints, _Floats]] = []
-        self._pulled: list[tuple[Hook, _Ints, _Floats]] = []
+        self._moved: list[tuple[Hook, Ints, Floats]] = []
+        self._pulled: list[tuple[Hook, Ints, Floats]] = []
         for number, begun in start.items():
             hook, nodes = hooks[number], gripped(phantom, hooks[number])
             if len(nodes) == 0:
@@ -106,14 +101,14 @@ class Grips:
         """Holds, and hooks that move."""
         return MovingSupports(self._fixed, self._at)
 
-    def force(self, time: float) -> _Floats:
+    def force(self, time: float) -> Floats:
         """Nodal forces (N, s) of the hooks that pull, N."""
         force = np.zeros(self._values.shape)
         for hook, nodes, full in self._pulled:
             force[nodes] += hook.share(time) * full
         return force
 
-    def _at(self, time: float) -> tuple[_Floats, _Floats]:
+    def _at(self, time: float) -> tuple[Floats, Floats]:
         displacement, velocity = self._values.copy(), np.zeros(self._values.shape)
         for hook, nodes, begun in self._moved:
             displacement[nodes] = begun + hook.share(time) * hook.vector

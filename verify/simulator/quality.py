@@ -6,14 +6,11 @@ Measured from outside, between steps: no part of what a step costs.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.session import Session
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _ASTRAY = 2.0  # times the largest stretch in the body: no facet of the material can be that long
 
@@ -76,8 +73,8 @@ def quality_of(session: Session) -> Quality:
 
 
 def deformation_gradients(
-    mesh: SimplexMesh, parent: _Ints, nodes: _Ints, displacement: _Floats
-) -> _Floats:
+    mesh: SimplexMesh, parent: Ints, nodes: Ints, displacement: Floats
+) -> Floats:
     """(p, s, s) deformation gradient of each piece; of a membrane that within its plane."""
     corners = mesh.points[mesh.cells[parent]] + displacement[nodes]
     return np.einsum("pki,pkj->pij", corners, mesh.gradients[parent])
@@ -91,7 +88,7 @@ def _enclosed(surface: MovingSurface) -> float:
     return float(np.linalg.det(corners).sum()) / 6.0
 
 
-def _loose_edges(facets: _Ints) -> int:
+def _loose_edges(facets: Ints) -> int:
     size = int(facets.max(initial=-1)) + 1
     if facets.shape[1] == 2:
         return int((np.bincount(facets[:, 0], minlength=size)
@@ -104,7 +101,7 @@ def _loose_edges(facets: _Ints) -> int:
 
 
 def _bad_facets(
-    surface: MovingSurface, displacement: _Floats, gradients: _Floats, stretch: float
+    surface: MovingSurface, displacement: Floats, gradients: Floats, stretch: float
 ) -> tuple[int, int]:
     """Facets that face the wrong way, and facets that are stretched beyond the material."""
     used = surface.used
@@ -120,5 +117,5 @@ def _bad_facets(
     return int(wrong.sum()), int((long > _ASTRAY * stretch * short).any(axis=1).sum())
 
 
-def _area_vectors(corners: _Floats) -> _Floats:
+def _area_vectors(corners: Floats) -> Floats:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

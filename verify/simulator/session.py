@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
 from verify.simulator.body_parts import BodyParts
@@ -15,13 +14,12 @@ from verify.simulator.grips import Grips, gripped, held_facets
 from verify.simulator.stage import Stage
 from verify.simulator.step_record import PHASES, StepRecord
 from verify.simulator.surfaces import Picture, Surfaces
+from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
-
-_Floats = NDArray[np.float64]
 
 
 class Session:
@@ -66,8 +64,8 @@ class Session:
         self.surfaces = Surfaces(stage, self.cutter)
         self.collider = SurfaceCollider(self.surfaces.touchable)
         self.records: list[StepRecord] = []
-        self._start: dict[int, _Floats] = {}
-        self._tool_load: _Floats | None = None
+        self._start: dict[int, Floats] = {}
+        self._tool_load: Floats | None = None
         self._crossed = 0
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
@@ -124,7 +122,7 @@ class Session:
         return record
 
     @property
-    def displacement(self) -> _Floats:
+    def displacement(self) -> Floats:
         """(N, s) displacement of all unknowns of the cut body, m."""
         return self.state.displacement
 
@@ -132,12 +130,12 @@ class Session:
         """Draw the body as it is now."""
         return self.surfaces.picture(self.phantom, self.displacement)
 
-    def blades(self) -> list[tuple[_Floats, _Floats]]:
+    def blades(self) -> list[tuple[Floats, Floats]]:
         """Tip and other end of each blade under way, m."""
         now = self.state.time
         return [_blade_at(path, now) for path in self._under_way()]
 
-    def hooks(self) -> list[tuple[_Floats, _Floats]]:
+    def hooks(self) -> list[tuple[Floats, Floats]]:
         """Place at the edge of the cut of each hook that has gripped, m, and its vector."""
         found = []
         for number in self._start:
@@ -197,7 +195,7 @@ class Session:
         self._tool_load, self._solver = None, solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
 
-    def _load(self, time: float) -> _Floats:
+    def _load(self, time: float) -> Floats:
         force = self._grips.force(time)
         return force if self._tool_load is None else force + self._tool_load
 
@@ -235,7 +233,7 @@ class Session:
                 surface.facet_force(int(facet), at, force, load)
         self._tool_load = load
 
-    def _spent_so_far(self) -> _Floats:
+    def _spent_so_far(self) -> Floats:
         account = self._ledger.close()
         work = account.load_work[-1] + account.support_work[-1]
         lost = account.algorithmic[-1] + account.damping[-1]
@@ -271,7 +269,7 @@ class Session:
         self._seconds[phase] += self._clock() - start
 
 
-def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:
+def _blade_at(path: ToolPath, time: float) -> tuple[Floats, Floats]:
     """Tip and other end of a blade at a time."""
     after = min(max(int(np.searchsorted(path.times, time)), 1), len(path.times) - 1)
     begin, end = path.times[after - 1], path.times[after]

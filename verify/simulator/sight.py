@@ -1,14 +1,12 @@
 """First point of a simulated body on a line of sight."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.surfaces import Picture
+from verify.xfem.arrays import Floats
 
-_Floats = NDArray[np.float64]
 
-
-def place_in_sight(picture: Picture, eye: _Floats, towards: _Floats) -> _Floats | None:
+def place_in_sight(picture: Picture, eye: Floats, towards: Floats) -> Floats | None:
     """Find where a line of sight meets the skin first.
 
     Parameters

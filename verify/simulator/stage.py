@@ -3,15 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -26,9 +23,9 @@ class Hold:
         Displacement of each of the components, m.
     """
 
-    nodes: NDArray[np.bool_]
+    nodes: Bools
     components: tuple[int, ...]
-    values: _Floats
+    values: Floats
 
 
 @dataclass(frozen=True)
@@ -52,11 +49,11 @@ class Hook:
         s.
     """
 
-    at: _Floats
+    at: Floats
     radius: float
     stroke: int
     side: int
-    vector: _Floats
+    vector: Floats
     is_force: bool
     begin: float
     duration: float
@@ -66,7 +63,7 @@ class Hook:
         s = min(max((time - self.begin) / self.duration, 0.0), 1.0)
         return s * s * (3.0 - 2.0 * s)
 
-    def at_edge(self, path: ToolPath) -> _Floats:
+    def at_edge(self, path: ToolPath) -> Floats:
         """Place (s,) of the edge of a cut that is nearest to where the hook grips, m."""
         blade = (path.blades[:, -1] - path.blades[:, 0]).mean(axis=0)
         along = blade / (np.linalg.norm(blade) or 1.0)
@@ -113,15 +110,15 @@ class Stage:
     mesh: SimplexMesh
     material: Material
     density: float
-    gravity: _Floats
+    gravity: Floats
     time_step: float
     duration: float
     holds: list[Hold] = field(default_factory=list)
     hooks: list[Hook] = field(default_factory=list)
     strokes: list[ToolPath] = field(default_factory=list)
     damping: RayleighDamping = field(default_factory=RayleighDamping)
-    visual: tuple[_Floats, _Ints] | None = None
-    collision: tuple[_Floats, _Ints] | None = None
+    visual: tuple[Floats, Ints] | None = None
+    collision: tuple[Floats, Ints] | None = None
     tool_radius: float = 0.0
     tool_force: float = 0.0
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Gravity, Scene, Skin, ToolPathCut, is_uniform
@@ -14,14 +13,12 @@ from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.stage import Hold, Hook, Stage
 from verify.solvers.body_of_scene import background_mesh
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 def stage_of(scene: Scene, level: int = 0) -> Stage:
@@ -97,7 +94,7 @@ def _refusal(scene: Scene) -> str | None:
     return None
 
 
-def _mesh(scene: Scene, level: int) -> tuple[SimplexMesh, NDArray[np.bool_] | None]:
+def _mesh(scene: Scene, level: int) -> tuple[SimplexMesh, Bools | None]:
     if isinstance(scene.geometry, Skin):
         skin = skin_mesh(scene.geometry, _folder(scene))
         return SimplexMesh(skin.points, skin.cells), skin.rim
@@ -115,7 +112,7 @@ def _material(scene: Scene, thickness: float) -> Material:
     return isotropic(young, poisson, "plane strain" if scene.dimension == 2 else "solid")
 
 
-def _holds(scene: Scene, mesh: SimplexMesh, rim: NDArray[np.bool_] | None) -> list[Hold]:
+def _holds(scene: Scene, mesh: SimplexMesh, rim: Bools | None) -> list[Hold]:
     facets = mesh.boundary_facets
     on_facet = np.ones((len(facets), mesh.dim + 1), dtype=bool)
     on_facet[np.arange(len(facets)), facets[:, 1]] = False
@@ -155,9 +152,7 @@ def _stroke(cut: ToolPathCut) -> ToolPath:
     return ToolPath.of_tip(np.array(cut.points, dtype=float), cut.moments, depth)
 
 
-def _surface(
-    scene: Scene, mesh: SimplexMesh, triangles: int | None
-) -> tuple[_Floats, _Ints] | None:
+def _surface(scene: Scene, mesh: SimplexMesh, triangles: int | None) -> tuple[Floats, Ints] | None:
     if triangles is None:
         return None
     if isinstance(scene.geometry, Skin):
@@ -165,7 +160,7 @@ def _surface(
     return _fine_boundary(mesh, triangles)
 
 
-def _fine_boundary(mesh: SimplexMesh, triangles: int) -> tuple[_Floats, _Ints]:
+def _fine_boundary(mesh: SimplexMesh, triangles: int) -> tuple[Floats, Ints]:
     """Boundary of a solid, each of its triangles split in four until there are enough."""
     surface = BodySurface(GrowingBody(mesh)).surface
     points, facets = surface.material.rows.copy(), surface.facets.rows.copy()

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from verify.xfem.arrays import Floats
 
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")
@@ -52,7 +51,7 @@ class StepRecord:
     split: int
     newly_split: int
     unknowns: int
-    delay: NDArray[np.float64]
+    delay: Floats
     kinetic: float
     strain: float
     potential: float

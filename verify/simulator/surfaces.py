@@ -4,7 +4,6 @@ Those of a solid can be separate meshes. A plane body and a membrane are their o
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
@@ -12,10 +11,8 @@ from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.stage import Stage
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 class Picture:
@@ -30,9 +27,7 @@ class Picture:
         Whether a triangle lies on a cut.
     """
 
-    def __init__(
-        self, points: _Floats, material: _Floats, triangles: _Ints, inner: NDArray[np.bool_]
-    ) -> None:
+    def __init__(self, points: Floats, material: Floats, triangles: Ints, inner: Bools) -> None:
         beyond = ((0, 0), (0, 3 - points.shape[1]))
         self.points, self.material = np.pad(points, beyond), np.pad(material, beyond)
         self.triangles, self.inner = triangles, inner
@@ -68,7 +63,7 @@ class Surfaces:
         for follower in self._followers:
             follower.update(increment)
 
-    def move(self, displacement: _Floats) -> None:
+    def move(self, displacement: Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""
         self._positions = [follower.surface.positions(displacement) for follower in self._followers]
 
@@ -83,11 +78,11 @@ class Surfaces:
         return (self.collision or self.material).surface
 
     @property
-    def touchable_positions(self) -> _Floats:
+    def touchable_positions(self) -> Floats:
         """(v, s) vertices of that surface after the last `move`, m."""
         return self._positions[-1 if self.collision else 0]
 
-    def picture(self, phantom: PhantomMesh, displacement: _Floats) -> Picture:
+    def picture(self, phantom: PhantomMesh, displacement: Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
         if phantom.mesh.space == 2:
             return _pieces(phantom, displacement)
@@ -106,7 +101,7 @@ class Surfaces:
         return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
 
 
-def _pieces(phantom: PhantomMesh, displacement: _Floats) -> Picture:
+def _pieces(phantom: PhantomMesh, displacement: Floats) -> Picture:
     """Draw a plane body: its whole triangles and the parts of the split ones."""
     piece, at, _ = phantom.solid_simplices
     corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.animation import Frame, beside, meshes_of, view_of
 from verify.simulator.live_scalpel import LiveScalpel
@@ -12,6 +11,7 @@ from verify.simulator.session import Session
 from verify.simulator.sight import place_in_sight
 from verify.simulator.stage import Stage
 from verify.simulator.stroke_file import write_stroke
+from verify.xfem.arrays import Floats
 
 _DEPTH = 0.05  # of the body's size: how far the blade reaches from where it touches
 
@@ -137,7 +137,7 @@ class PlayWindow:
         if place is not None:
             self.scalpel.touch(place, far - near)
 
-    def _seen_at(self, x: int, y: int, depth: float) -> NDArray[np.float64]:
+    def _seen_at(self, x: int, y: int, depth: float) -> Floats:
         """Find the point (3,) of space behind a pixel: 0 is the near end of what is seen."""
         renderer = self.plotter.renderer
         renderer.SetDisplayPoint(x, y, depth)

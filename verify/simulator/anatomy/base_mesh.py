@@ -7,12 +7,9 @@ their own mark joints and other places; the skin is the group ``body``.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.errors import InputError
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints
 
 _DECIMETRE = 0.1
 _NEEDED = {
@@ -37,10 +34,10 @@ class BaseMesh:
         Points of the left eyeball, m.
     """
 
-    points: _Floats
-    triangles: _Ints
-    places: dict[str, _Floats]
-    eye: _Floats
+    points: Floats
+    triangles: Ints
+    places: dict[str, Floats]
+    eye: Floats
 
 
 def parse_base_mesh(text: str) -> BaseMesh:

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -11,9 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from verify.errors import InputError
 from verify.simulator.anatomy.base_mesh import BaseMesh
 from verify.simulator.anatomy.surface_file import border_loops
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 _POINTS = 400  # on a border
 _SMOOTH = 6.0  # standard deviation along a border, in points of it
@@ -24,9 +21,9 @@ _SLOPE = {"face": 0.2, "hand": 0.35}  # least cosine to the plane's normal
 class Crop(NamedTuple):
     """Borders (k, 2) and seen points (n, 3) of a patch, m."""
 
-    outline: _Floats
-    holes: list[_Floats]
-    samples: _Floats
+    outline: Floats
+    holes: list[Floats]
+    samples: Floats
 
 
 def crop_face(mesh: BaseMesh) -> Crop:
@@ -84,19 +81,17 @@ def crop_hand(mesh: BaseMesh) -> Crop:
     return Crop(outline, [], samples)
 
 
-def _middles(points: _Floats, triangles: _Ints) -> _Floats:
+def _middles(points: Floats, triangles: Ints) -> Floats:
     return points[triangles].mean(axis=1)
 
 
-def _normals(points: _Floats, triangles: _Ints) -> _Floats:
+def _normals(points: Floats, triangles: Ints) -> Floats:
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
 
 
-def _patch(
-    points: _Floats, triangles: _Ints, wanted: NDArray[np.bool_], seed: _Floats, slope: float
-) -> _Ints:
+def _patch(points: Floats, triangles: Ints, wanted: Bools, seed: Floats, slope: float) -> Ints:
     """Find the connected triangles that face upwards, around the highest one over the seed."""
     wanted = wanted & (_normals(points, triangles)[:, 2] > slope)
     chosen = triangles[wanted]
@@ -110,7 +105,7 @@ def _patch(
     return chosen[label == label[start]]
 
 
-def _edge_links(triangles: _Ints) -> coo_array:
+def _edge_links(triangles: Ints) -> coo_array:
     """Which triangles share an edge."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
@@ -120,13 +115,13 @@ def _edge_links(triangles: _Ints) -> coo_array:
     return coo_array((np.ones(len(first)), (first, second)), shape=(len(triangles),) * 2)
 
 
-def _longest(points: _Floats, triangles: _Ints) -> _Ints:
+def _longest(points: Floats, triangles: Ints) -> Ints:
     loops = border_loops(triangles)
     lengths = [np.linalg.norm(np.diff(points[loop, :2], axis=0), axis=1).sum() for loop in loops]
     return loops[int(np.argmax(lengths))]
 
 
-def _smooth(ring: _Floats) -> _Floats:
+def _smooth(ring: Floats) -> Floats:
     """Resample a border evenly and smooth it: triangles of the base mesh make it ragged."""
     closed = np.concatenate([ring, ring[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
@@ -135,20 +130,20 @@ def _smooth(ring: _Floats) -> _Floats:
     return gaussian_filter1d(even, _SMOOTH, axis=0, mode="wrap")
 
 
-def _eye_opening(eye: _Floats, side: float) -> _Floats:
+def _eye_opening(eye: Floats, side: float) -> Floats:
     low, high = eye[:, :2].min(axis=0), eye[:, :2].max(axis=0)
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     # lids cover the upper and the lower third of the ball
     return _lens(centre * [side, 1.0], 1.0 * half[0], 0.36 * half[1])
 
 
-def _lens(centre: _Floats, half_length: float, half_height: float) -> _Floats:
+def _lens(centre: Floats, half_length: float, half_height: float) -> Floats:
     turn = np.linspace(0.0, 2.0 * np.pi, _POINTS // 4, endpoint=False)
     rise = np.sin(turn) * np.abs(np.sin(turn)) ** 0.5
     return centre + np.column_stack([half_length * np.cos(turn), half_height * rise])
 
 
-def _seen(points: _Floats, body: _Ints, patch: _Ints) -> _Floats:
+def _seen(points: Floats, body: Ints, patch: Ints) -> Floats:
     """Points of the patch that no other layer of skin covers."""
     own = points[np.unique(patch)]
     low, high = own.min(axis=0), own.max(axis=0)
@@ -162,7 +157,7 @@ def _seen(points: _Floats, body: _Ints, patch: _Ints) -> _Floats:
     return own[~covered]
 
 
-def _is_under(points: _Floats, triangle: _Floats) -> NDArray[np.bool_]:
+def _is_under(points: Floats, triangle: Floats) -> Bools:
     a, b, c = triangle[:, :2]
     whole = _cross(b - a, c - a)
     if whole == 0.0:
@@ -172,10 +167,10 @@ def _is_under(points: _Floats, triangle: _Floats) -> NDArray[np.bool_]:
     third = 1.0 - first - second
     height = first * triangle[0, 2] + second * triangle[1, 2] + third * triangle[2, 2]
     over = (first >= 0.0) & (second >= 0.0) & (third >= 0.0)
-    under: NDArray[np.bool_] = over & (height > points[:, 2] + _HIDDEN)
+    under: Bools = over & (height > points[:, 2] + _HIDDEN)
     return under
 
 
-def _cross(a: _Floats, b: _Floats) -> _Floats:
-    result: _Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+def _cross(a: Floats, b: Floats) -> Floats:
+    result: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return result

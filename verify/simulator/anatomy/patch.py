@@ -4,12 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.anatomy.plane_mesh import mesh_of_about
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -26,11 +23,11 @@ class Patch:
         Borders of openings, m.
     """
 
-    outline: _Floats
-    height: Callable[[_Floats], _Floats]
-    holes: list[_Floats] = field(default_factory=list)
+    outline: Floats
+    height: Callable[[Floats], Floats]
+    holes: list[Floats] = field(default_factory=list)
 
-    def triangulate(self, triangles: int) -> tuple[_Floats, _Ints, int]:
+    def triangulate(self, triangles: int) -> tuple[Floats, Ints, int]:
         """Mesh the patch with about so many triangles.
 
         Returns

@@ -5,13 +5,10 @@ and are moved to the mean of their neighbours, Delaunay's triangles being made a
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from verify.errors import InputError
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 _SWEEPS = 12  # of smoothing; angles change by less than a degree after that
 _CLEARANCE = 0.62  # of an element size, between the border and the first inner points
@@ -19,7 +16,7 @@ _ATTEMPTS, _FINER = 12, 0.97
 _FLAT = 0.05  # least shape of a triangle, 1 is equilateral
 
 
-def plane_mesh(outline: _Floats, holes: list[_Floats], size: float) -> tuple[_Floats, _Ints, int]:
+def plane_mesh(outline: Floats, holes: list[Floats], size: float) -> tuple[Floats, Ints, int]:
     """Triangulate a domain.
 
     Parameters
@@ -56,9 +53,7 @@ def plane_mesh(outline: _Floats, holes: list[_Floats], size: float) -> tuple[_Fl
     return points, triangles, len(rings[0])
 
 
-def mesh_of_about(
-    outline: _Floats, holes: list[_Floats], triangles: int
-) -> tuple[_Floats, _Ints, int]:
+def mesh_of_about(outline: Floats, holes: list[Floats], triangles: int) -> tuple[Floats, Ints, int]:
     """Triangulate a domain with about so many triangles; returns what `plane_mesh` does."""
     area = _area(outline) - sum(_area(hole) for hole in holes)
     size = float(np.sqrt(area / triangles * 4.0 / np.sqrt(3.0)))
@@ -72,8 +67,8 @@ def mesh_of_about(
 
 
 def _next_finer(
-    outline: _Floats, holes: list[_Floats], size: float
-) -> tuple[tuple[_Floats, _Ints, int], float]:
+    outline: Floats, holes: list[Floats], size: float
+) -> tuple[tuple[Floats, Ints, int], float]:
     """Mesh with the first size that does, from the one asked for downwards, and that size.
 
     Where points happen to lie badly beside a narrow bend, a size a little smaller is right.
@@ -87,7 +82,7 @@ def _next_finer(
     raise AssertionError
 
 
-def inside(points: _Floats, rings: list[_Floats]) -> NDArray[np.bool_]:
+def inside(points: Floats, rings: list[Floats]) -> Bools:
     """Whether points (n, 2) lie within the first ring and in none of the others."""
     odd = np.zeros(len(points), dtype=bool)
     for ring in rings:
@@ -100,7 +95,7 @@ def inside(points: _Floats, rings: list[_Floats]) -> NDArray[np.bool_]:
     return odd
 
 
-def _resampled(ring: _Floats, size: float) -> _Floats:
+def _resampled(ring: Floats, size: float) -> Floats:
     closed = np.concatenate([ring, ring[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     # a hole keeps a shape however coarse the mesh
@@ -109,7 +104,7 @@ def _resampled(ring: _Floats, size: float) -> _Floats:
     return np.column_stack([np.interp(places, along, closed[:, axis]) for axis in range(2)])
 
 
-def _lattice(rings: list[_Floats], border: _Floats, size: float) -> _Floats:
+def _lattice(rings: list[Floats], border: Floats, size: float) -> Floats:
     low, high = rings[0].min(axis=0), rings[0].max(axis=0)
     rise = 0.5 * np.sqrt(3.0) * size
     rows = int(np.ceil((high[1] - low[1]) / rise)) + 1
@@ -121,7 +116,7 @@ def _lattice(rings: list[_Floats], border: _Floats, size: float) -> _Floats:
     return points[far & inside(points, rings)]
 
 
-def _triangles(points: _Floats, rings: list[_Floats]) -> _Ints:
+def _triangles(points: Floats, rings: list[Floats]) -> Ints:
     cells = Delaunay(points).simplices.astype(np.int64)
     corners = points[cells]
     kept = inside(corners.mean(axis=1), rings)
@@ -135,7 +130,7 @@ def _triangles(points: _Floats, rings: list[_Floats]) -> _Ints:
     return cells
 
 
-def _means(points: _Floats, triangles: _Ints) -> _Floats:
+def _means(points: Floats, triangles: Ints) -> Floats:
     start, end = triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()
     total = np.zeros_like(points)
     np.add.at(total, start, points[end])
@@ -144,7 +139,7 @@ def _means(points: _Floats, triangles: _Ints) -> _Floats:
     return np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], points)
 
 
-def _check(points: _Floats, triangles: _Ints, rings: list[_Floats], size: float) -> None:
+def _check(points: Floats, triangles: Ints, rings: list[Floats], size: float) -> None:
     """Every point is used, and the border of the triangles is that of the domain."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     single, uses = np.unique(edges, axis=0, return_counts=True)
@@ -159,6 +154,6 @@ def _check(points: _Floats, triangles: _Ints, rings: list[_Floats], size: float)
         raise InputError(f"an element size of {size:.3g} m is too coarse for the outline")
 
 
-def _area(ring: _Floats) -> float:
+def _area(ring: Floats) -> float:
     x, y = ring.T
     return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

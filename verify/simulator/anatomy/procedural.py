@@ -7,12 +7,10 @@ coordinates in millimetres inside this file, metres outside.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from verify.simulator.anatomy.patch import Patch
-
-_Floats = NDArray[np.float64]
+from verify.xfem.arrays import Floats
 
 _MM = 1e-3
 _POINTS = 400  # on a border, far more than any mesh resolves
@@ -62,11 +60,11 @@ def procedural_hand() -> Patch:
     return Patch(outline * _MM, _in_metres(_hand_height))
 
 
-def _in_metres(height: Callable[[_Floats, _Floats], _Floats]) -> Callable[[_Floats], _Floats]:
+def _in_metres(height: Callable[[Floats, Floats], Floats]) -> Callable[[Floats], Floats]:
     return lambda points: height(points[:, 0] / _MM, points[:, 1] / _MM) * _MM
 
 
-def _egg() -> _Floats:
+def _egg() -> Floats:
     turn = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)
     y = -5.0 + 102.0 * np.sin(turn)
     # narrower at the chin than at the forehead
@@ -74,18 +72,18 @@ def _egg() -> _Floats:
     return np.column_stack([x, y])
 
 
-def _almond(x: float, y: float, half_length: float, half_height: float) -> _Floats:
+def _almond(x: float, y: float, half_length: float, half_height: float) -> Floats:
     turn = np.linspace(0.0, 2.0 * np.pi, _POINTS // 4, endpoint=False)
     lens = np.sin(turn) * np.abs(np.sin(turn)) ** 0.5
     return np.column_stack([x + half_length * np.cos(turn), y + half_height * lens])
 
 
-def _bump(x: _Floats, y: _Floats, bump: tuple[float, ...], side: float = 1.0) -> _Floats:
+def _bump(x: Floats, y: Floats, bump: tuple[float, ...], side: float = 1.0) -> Floats:
     height, x0, y0, wx, wy = bump
     return height * np.exp(-(((x - side * x0) / wx) ** 2) - ((y - y0) / wy) ** 2)
 
 
-def _face_height(x: _Floats, y: _Floats) -> _Floats:
+def _face_height(x: Floats, y: Floats) -> Floats:
     base = 55.0 * (1.0 - (np.abs(x) / 92.0) ** 2.4) - 18.0 * (np.abs(y + 5.0) / 102.0) ** 2.5
     for bump in _FACE_MIRRORED:
         base = base + _bump(x, y, bump, 1.0) + _bump(x, y, bump, -1.0)
@@ -94,7 +92,7 @@ def _face_height(x: _Floats, y: _Floats) -> _Floats:
     return base + _nose(x, y)
 
 
-def _nose(x: _Floats, y: _Floats) -> _Floats:
+def _nose(x: Floats, y: Floats) -> Floats:
     """Ridge that rises from the root to the tip and falls off to the lip within a few mm."""
     root, tip, foot = 32.0, -9.0, -21.0
     rise = np.clip((root - y) / (root - tip), 0.0, 1.0) ** 1.3
@@ -104,7 +102,7 @@ def _nose(x: _Floats, y: _Floats) -> _Floats:
     return 21.0 * along * np.exp(-((x / width) ** 2))
 
 
-def _hand_height(x: _Floats, y: _Floats) -> _Floats:
+def _hand_height(x: Floats, y: Floats) -> Floats:
     arch = 16.0 * (1.0 - (np.abs(x) / 62.0) ** 2.2) - 4.0 * ((y - 5.0) / 60.0) ** 2
     for x0, y0 in _KNUCKLES:
         arch = arch + _bump(x, y, (5.0, x0, y0, 8.5, 10.0))

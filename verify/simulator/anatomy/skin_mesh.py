@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.scene import Skin
 from verify.simulator.anatomy.patch import Patch
@@ -12,17 +11,15 @@ from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
 from verify.simulator.anatomy.store import stored_patch
 from verify.simulator.anatomy.surface_file import outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 
 class SkinMesh(NamedTuple):
     """Points (n, 3) in m, triangles or tetrahedra, and which points are on the outer border."""
 
-    points: _Floats
-    cells: _Ints
-    rim: NDArray[np.bool_]
+    points: Floats
+    cells: Ints
+    rim: Bools
 
 
 def patch_of(skin: Skin) -> Patch:
@@ -62,7 +59,7 @@ def skin_mesh(skin: Skin, folder: Path) -> SkinMesh:
     return SkinMesh(solid, tetrahedra, np.tile(rim, skin.layers + 1))
 
 
-def skin_surface(skin: Skin, folder: Path, triangles: int) -> tuple[_Floats, _Ints]:
+def skin_surface(skin: Skin, folder: Path, triangles: int) -> tuple[Floats, Ints]:
     """Close the surface of a skin with a thickness, made of about so many triangles.
 
     That of a file is at least as fine as the file.
@@ -74,7 +71,7 @@ def skin_surface(skin: Skin, folder: Path, triangles: int) -> tuple[_Floats, _In
     return closed_shell(points, cells, skin.thickness)
 
 
-def _surface(skin: Skin, folder: Path, count: float) -> tuple[_Floats, _Ints, NDArray[np.bool_]]:
+def _surface(skin: Skin, folder: Path, count: float) -> tuple[Floats, Ints, Bools]:
     if skin.file is not None:
         points, triangles = read_surface(folder / skin.file)
         return points, triangles, outer_border(points, triangles)
@@ -82,7 +79,7 @@ def _surface(skin: Skin, folder: Path, count: float) -> tuple[_Floats, _Ints, ND
     return points, triangles, np.arange(len(points)) < rim
 
 
-def quartered(points: _Floats, triangles: _Ints) -> tuple[_Floats, _Ints]:
+def quartered(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """Split each triangle in four at the middles of its edges."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     single, place = np.unique(edges, axis=0, return_inverse=True)

@@ -6,14 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from verify.errors import InputError
 from verify.simulator.anatomy.patch import Patch
 from verify.whole_files import write_whole
-
-_Floats = NDArray[np.float64]
+from verify.xfem.arrays import Floats
 
 
 def store_folder() -> Path:
@@ -29,7 +27,7 @@ def patch_file(shape: str, folder: Path | None = None) -> Path:
     return (folder or store_folder()) / f"{shape}.npz"
 
 
-def write_patch(path: Path, outline: _Floats, holes: list[_Floats], samples: _Floats) -> None:
+def write_patch(path: Path, outline: Floats, holes: list[Floats], samples: Floats) -> None:
     """Write a patch: borders (k, 2) and samples (n, 3) of its surface, m; in one step."""
     arrays = {"outline": outline, "samples": samples}
     arrays |= {f"hole{k}": hole for k, hole in enumerate(holes)}
@@ -63,11 +61,11 @@ def stored_patch(shape: str, folder: Path | None = None) -> Patch:
     return Patch(outline, _height(samples), holes)
 
 
-def _height(samples: _Floats) -> Callable[[_Floats], _Floats]:
+def _height(samples: Floats) -> Callable[[Floats], Floats]:
     inner = LinearNDInterpolator(samples[:, :2], samples[:, 2])
     beyond = NearestNDInterpolator(samples[:, :2], samples[:, 2])
 
-    def height(points: _Floats) -> _Floats:
+    def height(points: Floats) -> Floats:
         values = inner(points)
         outside = np.isnan(values)
         values[outside] = beyond(points[outside])

@@ -3,18 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.read_mesh import read_with_meshio
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 _SAME = 1e-9  # of the extent: STL repeats every point for each of its triangles
 
 
-def read_surface(path: Path) -> tuple[_Floats, _Ints]:
+def read_surface(path: Path) -> tuple[Floats, Ints]:
     """Read a surface: points (n, 3) in m and triangles (m, 3), points in one place made one.
 
     Raises
@@ -35,7 +32,7 @@ def read_surface(path: Path) -> tuple[_Floats, _Ints]:
     return points, triangles
 
 
-def border_loops(triangles: _Ints) -> list[_Ints]:
+def border_loops(triangles: Ints) -> list[Ints]:
     """Points along each border of a surface, in the direction of its triangles."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     inner = {(int(b), int(a)) for a, b in edges}
@@ -49,7 +46,7 @@ def border_loops(triangles: _Ints) -> list[_Ints]:
     return loops
 
 
-def outer_border(points: _Floats, triangles: _Ints) -> NDArray[np.bool_]:
+def outer_border(points: Floats, triangles: Ints) -> Bools:
     """Mark the points (n,) of the longest border; none of a closed surface."""
     rim = np.zeros(len(points), dtype=bool)
     loops = border_loops(triangles)
@@ -61,7 +58,7 @@ def outer_border(points: _Floats, triangles: _Ints) -> NDArray[np.bool_]:
     return rim
 
 
-def _welded(points: _Floats, triangles: _Ints) -> tuple[_Floats, _Ints]:
+def _welded(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     extent = float(np.ptp(points, axis=0).max(initial=0.0))
     key = np.round(points / (_SAME * extent)) if extent > 0.0 else points
     _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
@@ -70,7 +67,7 @@ def _welded(points: _Floats, triangles: _Ints) -> tuple[_Floats, _Ints]:
     return points[first[used]], compact.reshape(cells.shape).astype(np.int64)
 
 
-def _check(points: _Floats, triangles: _Ints, where: str) -> None:
+def _check(points: Floats, triangles: Ints, where: str) -> None:
     corners = points[triangles]
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1

@@ -5,17 +5,14 @@ neighbours agree on the diagonal of the face between them (Dompierre et al. 1999
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.errors import InputError
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints
 
 _SIGNS = (-1.0, 1.0, -1.0)  # orientation of the three tetrahedra of a prism that lies below
 
 
-def vertex_normals(points: _Floats, triangles: _Ints) -> _Floats:
+def vertex_normals(points: Floats, triangles: Ints) -> Floats:
     """(n, 3) unit normals at the points, weighted by the area of the triangles around."""
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -26,8 +23,8 @@ def vertex_normals(points: _Floats, triangles: _Ints) -> _Floats:
 
 
 def thicken(
-    points: _Floats, triangles: _Ints, thickness: float, layers: int = 1
-) -> tuple[_Floats, _Ints]:
+    points: Floats, triangles: Ints, thickness: float, layers: int = 1
+) -> tuple[Floats, Ints]:
     """Tetrahedra between a surface and its copy at a distance below it.
 
     Parameters
@@ -79,7 +76,7 @@ def thicken(
     return solid, tetrahedra
 
 
-def closed_shell(points: _Floats, triangles: _Ints, thickness: float) -> tuple[_Floats, _Ints]:
+def closed_shell(points: Floats, triangles: Ints, thickness: float) -> tuple[Floats, Ints]:
     """Close the surface (p, 3), (f, 3) of the solid that `thicken` makes, facing outwards."""
     count = len(points)
     shell = np.concatenate([points, points - thickness * vertex_normals(points, triangles)])

@@ -1,12 +1,11 @@
 """Distinct integers, ascending, and integers of lists that lie one after the other."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Ints
 
 
-def distinct(values: _Ints) -> _Ints:
+def distinct(values: Ints) -> Ints:
     """Distinct values (q,), ascending: for a few thousand a sort beats numpy's hashing."""
     ordered = np.sort(values, axis=None)
     first = np.ones(len(ordered), dtype=bool)
@@ -14,7 +13,7 @@ def distinct(values: _Ints) -> _Ints:
     return ordered[first]
 
 
-def ranges(bounds: _Ints) -> _Ints:
+def ranges(bounds: Ints) -> Ints:
     """Integers from the first up to the second bound of each row (k, 2), row after row."""
     counts = bounds[:, 1] - bounds[:, 0]
     ends = np.cumsum(counts)
@@ -22,6 +21,6 @@ def ranges(bounds: _Ints) -> _Ints:
     return np.arange(len(shift)) + shift
 
 
-def of_lists(starts: _Ints, items: _Ints, rows: _Ints) -> _Ints:
+def of_lists(starts: Ints, items: Ints, rows: Ints) -> Ints:
     """Integers of some lists, of which each begins where the one before ends."""
     return items[ranges(np.stack([starts[rows], starts[rows + 1]], axis=1))]

@@ -4,9 +4,8 @@ from collections import defaultdict
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Ints
 
 
 class RowNumbers:
@@ -15,7 +14,7 @@ class RowNumbers:
     def __init__(self) -> None:
         self._number: defaultdict[bytes, int] = defaultdict(count().__next__)
 
-    def number(self, rows: _Ints) -> tuple[_Ints, _Ints]:
+    def number(self, rows: Ints) -> tuple[Ints, Ints]:
         """Numbers (k,) of rows (k, width), and where each new one comes first.
 
         New rows get the next numbers, in their order.

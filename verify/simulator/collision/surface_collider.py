@@ -6,14 +6,12 @@ A tool is asked against all boxes at once; only facets whose boxes it comes near
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import nearest_on_facet
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _ROUND_OFF = 16.0 * np.finfo(float).eps  # of positions: what touches exactly is touched
 
@@ -36,11 +34,11 @@ class Contacts:
         Place on the tool, from its start (0) to its end (1).
     """
 
-    facet: _Ints
-    piece: _Ints
-    distance: _Floats
-    at: _Floats
-    share: _Floats
+    facet: Ints
+    piece: Ints
+    distance: Floats
+    at: Floats
+    share: Floats
 
 
 class SurfaceCollider:
@@ -60,11 +58,11 @@ class SurfaceCollider:
         self.surface = surface
         self.follow(surface.material.rows.copy())
 
-    def refit(self, displacement: _Floats) -> None:
+    def refit(self, displacement: Floats) -> None:
         """Move with the body, by the displacement (N, s) of the dof nodes, in metres."""
         self.follow(self.surface.positions(displacement))
 
-    def follow(self, positions: _Floats) -> None:
+    def follow(self, positions: Floats) -> None:
         """Move to positions (v, s) of all vertices that are known already, kept by reference, m.
 
         Raises
@@ -79,7 +77,7 @@ class SurfaceCollider:
         if not np.isfinite(positions).all():
             raise XfemError("positions of a surface that are not finite")
         self.positions = positions
-        self._boxes: tuple[_Ints, _Floats, _Floats, _Floats] | None = None
+        self._boxes: tuple[Ints, Floats, Floats, Floats] | None = None
 
     def nearest(self, points: ArrayLike, limit: float = np.inf) -> Contacts:
         """Nearest point of the surface to each point (q, s), if nearer than the limit.
@@ -136,7 +134,7 @@ class SurfaceCollider:
             facet[found], np.minimum(distance[found], radius), at[found], share[found]
         )
 
-    def _facets(self) -> tuple[_Ints, _Floats, _Floats, _Floats]:
+    def _facets(self) -> tuple[Ints, Floats, Floats, Floats]:
         """Numbers of the facets in use, their corners, and the corners of their boxes."""
         if self._boxes is None:
             used = self.surface.used
@@ -144,19 +142,19 @@ class SurfaceCollider:
             self._boxes = used, corners, corners.min(axis=1), corners.max(axis=1)
         return self._boxes
 
-    def _near(self, start: _Floats, end: _Floats, reach: float) -> tuple[_Ints, _Floats]:
+    def _near(self, start: Floats, end: Floats, reach: float) -> tuple[Ints, Floats]:
         """Facets whose box meets that of a segment, widened by a reach, and their corners."""
         numbers, corners, low, high = self._facets()
         beyond = (low > np.maximum(start, end) + reach) | (high < np.minimum(start, end) - reach)
         near = np.flatnonzero(~beyond.any(axis=1))
         return numbers[near], corners[near]
 
-    def _contacts(self, facet: _Ints, distance: _Floats, at: _Floats, share: _Floats) -> Contacts:
+    def _contacts(self, facet: Ints, distance: Floats, at: Floats, share: Floats) -> Contacts:
         piece = np.full(len(facet), -1)
         piece[facet >= 0] = self.surface.facet_piece.rows[facet[facet >= 0]]
         return Contacts(facet, piece, distance, at, share)
 
-    def _check(self, points: ArrayLike) -> _Floats:
+    def _check(self, points: ArrayLike) -> Floats:
         queries = np.ascontiguousarray(points, dtype=float)
         space = self.positions.shape[1]
         if queries.ndim != 2 or queries.shape[1] != space or not np.isfinite(queries).all():
@@ -164,14 +162,14 @@ class SurfaceCollider:
         return queries
 
 
-def _volumes(edges: _Floats) -> _Floats:
+def _volumes(edges: Floats) -> Floats:
     """Find the determinants (q,) of rows (q, s, s)."""
     if edges.shape[2] == 2:
         return edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     return np.einsum("qi,qi->q", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))
 
 
-def _pierced(start: _Floats, end: _Floats, corners: _Floats) -> tuple[_Floats, _Floats]:
+def _pierced(start: Floats, end: Floats, corners: Floats) -> tuple[Floats, Floats]:
     """Share (q,) of a segment at which it pierces each facet, -1 if it does not, and weights."""
     before, behind = _volumes(corners - start), _volumes(corners - end)
     apart = ((before > 0.0) == (behind > 0.0)) & (before != 0.0) & (behind != 0.0)
@@ -189,13 +187,13 @@ def _pierced(start: _Floats, end: _Floats, corners: _Floats) -> tuple[_Floats, _
 
 
 def _segment_to_facets(
-    start: _Floats, end: _Floats, corners: _Floats
-) -> tuple[_Floats, _Floats, _Floats]:
+    start: Floats, end: Floats, corners: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Distance (q,) of a segment from each facet, share of the segment, weights on the facet."""
     count, size, _ = corners.shape
     best, share, weights = np.full(count, np.inf), np.zeros(count), np.empty((count, size))
 
-    def take(distance: _Floats, at: _Floats | float, on_facet: _Floats) -> None:
+    def take(distance: Floats, at: Floats | float, on_facet: Floats) -> None:
         nearer = distance < best
         best[nearer], weights[nearer] = distance[nearer], on_facet[nearer]
         share[nearer] = np.broadcast_to(at, count)[nearer]
@@ -219,7 +217,7 @@ def _segment_to_facets(
     return best, share, weights
 
 
-def _nearest_of_segments(p: _Floats, q: _Floats, a: _Floats, b: _Floats) -> tuple[_Floats, _Floats]:
+def _nearest_of_segments(p: Floats, q: Floats, a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Shares (s on pq, t on each ab) of the nearest points of a segment and some others.
 
     Ericson, Real-Time Collision Detection, section 5.1.9.
@@ -228,7 +226,7 @@ def _nearest_of_segments(p: _Floats, q: _Floats, a: _Floats, b: _Floats) -> tupl
     uu, vv, uv = float(u @ u), (v * v).sum(axis=1), v @ u
     uw, vw = w @ u, (v * w).sum(axis=1)
 
-    def share(top: _Floats, bottom: _Floats | float) -> _Floats:
+    def share(top: Floats, bottom: Floats | float) -> Floats:
         bottom = np.broadcast_to(bottom, top.shape)
         return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0.0)
 

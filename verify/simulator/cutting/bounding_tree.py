@@ -6,10 +6,8 @@ nodes n to 2n − 1, in the order of a curve that fills space.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints
 
 _BITS = 10  # of each coordinate on the curve
 _DEEP = 128  # deeper than any heap: twice its height is what a depth-first stack needs
@@ -30,7 +28,7 @@ class BoundingTree:
         Corners of the box of each simplex.
     """
 
-    def __init__(self, points: _Floats, simplices: _Ints) -> None:
+    def __init__(self, points: Floats, simplices: Ints) -> None:
         corners, count = points[simplices], len(simplices)
         self.floor, self.ceiling = corners.min(axis=1), corners.max(axis=1)
         self._order = np.argsort(_places_on_curve(self.floor + self.ceiling), kind="stable")
@@ -45,7 +43,7 @@ class BoundingTree:
             self._high[level] = np.maximum(self._high[2 * level], self._high[2 * level + 1])
             end = int(level[0])
 
-    def meeting(self, floor: _Floats, ceiling: _Floats) -> tuple[_Ints, _Ints]:
+    def meeting(self, floor: Floats, ceiling: Floats) -> tuple[Ints, Ints]:
         """Simplices whose boxes meet those from `floor` (q, s) to `ceiling`.
 
         Returns the first of each box (q + 1,), and all of them one after the other.
@@ -53,7 +51,7 @@ class BoundingTree:
         return _meeting(self._low, self._high, self._order, floor, ceiling)
 
 
-def _places_on_curve(centres: _Floats) -> _Ints:
+def _places_on_curve(centres: Floats) -> Ints:
     """Places (n,) on the Z-order curve of the box around all centres (n, s)."""
     low, widest = centres.min(axis=0), float(np.ptp(centres, axis=0).max())
     places = ((centres - low) * ((2**_BITS - 1) / widest if widest > 0.0 else 0.0)).astype(int)

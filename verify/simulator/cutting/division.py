@@ -3,15 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.patch import MeshPatch
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -35,15 +30,15 @@ class Division:
 
     patch: MeshPatch
     partition: Partition
-    numbers: _Ints
-    cell: _Ints
-    label: NDArray[np.int8]
-    fraction: _Floats
-    solid: NDArray[np.bool_]
-    old: _Ints
-    changed: NDArray[np.bool_]
+    numbers: Ints
+    cell: Ints
+    label: Sides
+    fraction: Floats
+    solid: Bools
+    old: Ints
+    changed: Bools
 
     @cached_property
-    def changed_cells(self) -> _Ints:
+    def changed_cells(self) -> Ints:
         """Cells of the pieces whose labels are new, ascending."""
         return distinct(self.cell[self.changed & self.solid])

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import distinct, ranges
 from verify.simulator.arrays.growing_array import GrowingArray
@@ -19,6 +18,7 @@ from verify.simulator.cutting.point_numbers import PointNumbers
 from verify.simulator.cutting.renumbering import Slots, number_groups, slots_before
 from verify.simulator.cutting.stored_pieces import StoredPieces
 from verify.simulator.cutting.tied_parts import TiedParts
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
@@ -26,13 +26,10 @@ from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import ROUND_OFF, Held, split_cells
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-
 _NOTHING = ROUND_OFF**2  # share of a cell that a piece without volume may have when divided further
 
 # the cuts near a patch: the number of each, and the cut as that patch sees it
-CutsNear = Callable[[MeshPatch], tuple[_Ints, Sequence[Cut]]]
+CutsNear = Callable[[MeshPatch], tuple[Ints, Sequence[Cut]]]
 
 
 @dataclass(frozen=True)
@@ -53,13 +50,13 @@ class Increment:
         Dof node from which each new one inherits displacement and velocity.
     """
 
-    cells: _Ints
-    touched: _Ints
-    moved: _Ints
+    cells: Ints
+    touched: Ints
+    moved: Ints
     nodes_before: int
-    source: _Ints
+    source: Ints
 
-    def inherit(self, values: _Floats) -> _Floats:
+    def inherit(self, values: Floats) -> Floats:
         """Nodal values (N_before, ...) after the cut: new nodes move as their source does.
 
         The displacement field does not change, and the lumped masses of the parts of a piece sum
@@ -151,7 +148,7 @@ class GrowingBody:
         """Stored pieces as they are now."""
         return StoredPieces(self.piece_label.rows, self.first_piece, self.next_piece.rows)
 
-    def split_by(self, cells: _Ints, cut: int) -> NDArray[np.bool_]:
+    def split_by(self, cells: Ints, cut: int) -> Bools:
         """Whether a cut has split cells, or pieces of them."""
         return self.pieces.labelled(cells, cut)
 
@@ -163,12 +160,12 @@ class GrowingBody:
         self.cut_count += 1
         return self.cut_count - 1
 
-    def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
+    def split(self, candidates: Ints, cuts_near: CutsNear) -> Increment | None:
         """Bring some cells up to date with the cuts; None if nothing changes."""
         division = self.division(candidates, cuts_near)
         return None if division is None else self.divide(division)
 
-    def division(self, candidates: _Ints, cuts_near: CutsNear) -> Division | None:
+    def division(self, candidates: Ints, cuts_near: CutsNear) -> Division | None:
         """Find how some cells are to be divided, None if they are not; the body stays as it is.
 
         Parameters
@@ -220,10 +217,10 @@ class GrowingBody:
         moved = distinct(np.concatenate([cells, self._moved]))
         return Increment(cells, touched, moved, before, self._source)
 
-    def _held_in(self, patch: MeshPatch, numbers: _Ints) -> Held:
+    def _held_in(self, patch: MeshPatch, numbers: Ints) -> Held:
         """Make the rule that what a cut has separated it separates, whatever came later."""
 
-        def held(parent: _Ints, label: NDArray[np.int8], index: int) -> NDArray[np.bool_]:
+        def held(parent: Ints, label: Sides, index: int) -> Bools:
             cells = patch.whole_cells[parent]
             before = self.pieces.separated(cells, label, numbers, int(numbers[index]))
             self.held += int(before.sum())
@@ -231,7 +228,7 @@ class GrowingBody:
 
         return held
 
-    def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> Division:
+    def _compare(self, patch: MeshPatch, partition: Partition, numbers: Ints) -> Division:
         """Match the pieces of a patch with the stored ones."""
         fraction = partition.fraction
         solid = fraction > 0.0
@@ -257,7 +254,7 @@ class GrowingBody:
             changed |= self._tied.parted(partition.tied, of)
         return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
-    def _renumber(self, division: Division) -> _Ints:
+    def _renumber(self, division: Division) -> Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
         joined = join_parts(division.patch, division.partition, division.solid)
         local, group = joined.cells[joined.piece_cell], joined.group
@@ -278,7 +275,7 @@ class GrowingBody:
         self._moved = slots.cell[there[(before != after).any(axis=1)]]
         return place
 
-    def _store_pieces(self, division: Division, slots: Slots) -> _Ints:
+    def _store_pieces(self, division: Division, slots: Slots) -> Ints:
         """Store pieces: the first part of a stored one takes its place, others are appended.
 
         Returns the place (p,) of each, -1 for those without volume.
@@ -303,7 +300,7 @@ class GrowingBody:
         self.piece_label.rows[place[changed]] = division.label[changed]
         return place
 
-    def _store_simplices(self, division: Division, cells: _Ints, place: _Ints) -> None:
+    def _store_simplices(self, division: Division, cells: Ints, place: Ints) -> None:
         """Replace the sub-simplices of the changed cells."""
         patch, partition = division.patch, division.partition
         ids = self.points.number(partition.points, patch.whole_nodes, division.numbers)
@@ -325,7 +322,7 @@ class GrowingBody:
         self.sub_range[cells] = begin + np.stack([np.concatenate([[0], ends[:-1]]), ends], axis=1)
 
 
-def _sides(partition: Partition) -> NDArray[np.int8]:
+def _sides(partition: Partition) -> Sides:
     """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
     side, piece = partition.label.copy(), partition.simplices.piece
     plus = partition.points.values[partition.simplices.points] >= 0.0
@@ -337,7 +334,7 @@ def _sides(partition: Partition) -> NDArray[np.int8]:
     return side
 
 
-def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:
+def _among(values: Ints, ascending: Ints) -> Bools:
     """Whether each value is one of some ascending ones, of which there is at least one."""
     place = np.searchsorted(ascending, values)
     return ascending[np.minimum(place, len(ascending) - 1)] == values

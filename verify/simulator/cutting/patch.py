@@ -1,13 +1,10 @@
 """A few cells of a mesh as a mesh of its own, so that work on them costs what they are."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import distinct, of_lists
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 class MeshPatch(SimplexMesh):
@@ -19,17 +16,17 @@ class MeshPatch(SimplexMesh):
         Their numbers in the whole mesh, ascending.
     """
 
-    whole_cells: _Ints
-    whole_nodes: _Ints
+    whole_cells: Ints
+    whole_nodes: Ints
 
     def __init__(
         self,
-        points: _Floats,
+        points: Floats,
         extent: float,
-        cells: _Ints,
-        nodes: _Ints,
-        local: _Ints,
-        across: _Ints,
+        cells: Ints,
+        nodes: Ints,
+        local: Ints,
+        across: Ints,
     ) -> None:
         # the whole mesh has been checked; its scale of round-off holds here too
         for name, value in (
@@ -50,15 +47,15 @@ class PatchCutter:
         self.mesh = mesh
         self._starts, self._around = mesh.node_cells
 
-    def nodes_of(self, cells: _Ints) -> _Ints:
+    def nodes_of(self, cells: Ints) -> Ints:
         """Nodes of some cells, ascending."""
         return distinct(self.mesh.cells[cells])
 
-    def cells_around(self, nodes: _Ints) -> _Ints:
+    def cells_around(self, nodes: Ints) -> Ints:
         """Cells that have one of the nodes, ascending."""
         return distinct(of_lists(self._starts, self._around, nodes))
 
-    def patch(self, cells: _Ints) -> MeshPatch:
+    def patch(self, cells: Ints) -> MeshPatch:
         """Make the patch of these cells, given ascending."""
         mesh, nodes = self.mesh, self.nodes_of(cells)
         local, others = np.searchsorted(nodes, mesh.cells[cells]), mesh.neighbours[cells]

@@ -8,13 +8,11 @@ is; otherwise the edge on which it was found does.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.zero_points import ZeroPoints
-
-_Ints = NDArray[np.int64]
 
 NODES, CUTS = 4, 3  # a point of a tetrahedron has at most that many
 NONE = np.iinfo(np.int64).max  # no further node or cut
@@ -24,10 +22,10 @@ _WIDTH = NODES + CUTS
 class FoundPoints(NamedTuple):
     """What is asked of the points of a patch, as in `ZeroPoints`."""
 
-    positions: NDArray[np.float64]
-    values: NDArray[np.float64]
-    ends: _Ints
-    cut: _Ints
+    positions: Floats
+    values: Floats
+    ends: Ints
+    cut: Ints
 
 
 class PointNumbers:
@@ -57,11 +55,11 @@ class PointNumbers:
         self._supports = GrowingArray(np.empty((0, _WIDTH), dtype=np.int64))
 
     @property
-    def supports(self) -> _Ints:
+    def supports(self) -> Ints:
         """(k, 7) mesh nodes (4) and cuts (3) of each zero point, ascending, padded at the end."""
         return self._supports.rows
 
-    def number(self, points: ZeroPoints | FoundPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
+    def number(self, points: ZeroPoints | FoundPoints, whole_nodes: Ints, cuts: Ints) -> Ints:
         """Numbers of all points of a patch: its nodes, then its zero points.
 
         Parameters
@@ -90,7 +88,7 @@ class PointNumbers:
             self.cut.append(cuts[points.cut[ready[new]]])
         return numbers
 
-    def _number(self, ends: _Ints, cut: _Ints) -> tuple[_Ints, _Ints]:
+    def _number(self, ends: Ints, cut: Ints) -> tuple[Ints, Ints]:
         """Numbers (k,) of the zero points of cuts (k,) on edges (k, 2), and the first new ones."""
         known = self.supports_of(ends)
         span = distinct_in_rows(known[:, :, :NODES].reshape(-1, 2 * NODES), NODES)
@@ -116,7 +114,7 @@ class PointNumbers:
         self._supports.append(np.hstack([span[new], on]))
         return self.nodes + number, new
 
-    def supports_of(self, points: _Ints) -> _Ints:
+    def supports_of(self, points: Ints) -> Ints:
         """(..., 7) mesh nodes and cuts of points (...), ascending, padded at the end."""
         found = np.full((*points.shape, _WIDTH), NONE)
         zero = points >= self.nodes
@@ -124,17 +122,17 @@ class PointNumbers:
         found[zero] = self.supports[points[zero] - self.nodes]
         return found
 
-    def spans(self, nodes: _Ints, points: _Ints) -> NDArray[np.bool_]:
+    def spans(self, nodes: Ints, points: Ints) -> Bools:
         """Whether each of some mesh nodes (q, c) spans the simplex of a point (q,).
 
         The weights of the others at the point are zero; its own may round to zero.
         """
         spanned = self.supports_of(points)[:, None, :NODES]
-        found: NDArray[np.bool_] = (spanned == nodes[:, :, None]).any(axis=2)
+        found: Bools = (spanned == nodes[:, :, None]).any(axis=2)
         return found
 
 
-def distinct_in_rows(rows: _Ints, most: int) -> _Ints:
+def distinct_in_rows(rows: Ints, most: int) -> Ints:
     """Distinct integers of each row, ascending, at most so many, padded with `NONE`."""
     found = np.sort(rows, axis=1)
     again = found[:, 1:] == found[:, :-1]

@@ -6,12 +6,9 @@ A slot is a corner of a piece; slots that move together are a group (`verify.xfe
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.cutting.division import Division
-
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
+from verify.xfem.arrays import Bools, Ints
 
 
 class Slots(NamedTuple):
@@ -27,11 +24,11 @@ class Slots(NamedTuple):
         Whether a slot is at a node of changed cells, and whether the node lies in the piece.
     """
 
-    cell: _Ints
-    old: _Ints
-    solid: _Bools
-    touched: _Bools
-    home: _Bools
+    cell: Ints
+    old: Ints
+    solid: Bools
+    touched: Bools
+    home: Bools
 
 
 class Renumbered(NamedTuple):
@@ -40,12 +37,12 @@ class Renumbered(NamedTuple):
     The conflict is a piece whose slot descends from another dof node than its group, or -1.
     """
 
-    number: _Ints
-    source: _Ints
+    number: Ints
+    source: Ints
     conflict: int
 
 
-def slots_before(division: Division, local: _Ints, first_piece: _Ints) -> Slots:
+def slots_before(division: Division, local: Ints, first_piece: Ints) -> Slots:
     """Find what the slots of a patch are before its dof nodes are numbered anew.
 
     Parameters
@@ -71,7 +68,7 @@ def slots_before(division: Division, local: _Ints, first_piece: _Ints) -> Slots:
 
 
 def number_groups(
-    slots: Slots, group: _Ints, piece_cells: _Ints, mesh_nodes: int, count: int
+    slots: Slots, group: Ints, piece_cells: Ints, mesh_nodes: int, count: int
 ) -> Renumbered:
     """Give every group (p, d + 1) of slots its dof node, new ones from `count` on.
 

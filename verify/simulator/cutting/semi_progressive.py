@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.division import Division
@@ -18,14 +18,12 @@ from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.stroke import Stroke
 from verify.simulator.cutting.whole_mesh import whole_mesh
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.tool_path import ToolPath
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _NONE = np.empty(0, dtype=np.int64)
 
@@ -46,14 +44,14 @@ class Crossings:
         Time of the `advance` that split the element: `leave`, rounded up to a frame.
     """
 
-    cell: _Ints
-    stroke: _Ints
-    entry: _Floats
-    leave: _Floats
-    seen: _Floats
+    cell: Ints
+    stroke: Ints
+    entry: Floats
+    leave: Floats
+    seen: Floats
 
     @property
-    def delay(self) -> _Floats:
+    def delay(self) -> Floats:
         """Time (k,) from the first to the last edge: element size over tool speed, in seconds."""
         return self.leave - self.entry
 
@@ -149,7 +147,7 @@ class SemiProgressiveCutter:
         return [stroke.cut for stroke in self.strokes]
 
     @property
-    def level_sets(self) -> _Floats:
+    def level_sets(self) -> Floats:
         """(n, cuts) nodal level sets in metres, NaN where no cut has come near."""
         columns = [stroke.values for stroke in self.strokes]
         return np.stack(columns, axis=1) if columns else np.zeros((len(self.mesh.points), 0))
@@ -177,7 +175,7 @@ class SemiProgressiveCutter:
             self._records = []
         return self._crossings
 
-    def _cuts_near(self, patch: MeshPatch) -> tuple[_Ints, list[Cut]]:
+    def _cuts_near(self, patch: MeshPatch) -> tuple[Ints, list[Cut]]:
         near = [stroke for stroke in self.strokes if stroke.near[patch.whole_cells].any()]
         numbers = np.array([stroke.number for stroke in near], dtype=np.int64)
         return numbers, [stroke.seen_by(patch) for stroke in near]
@@ -206,9 +204,9 @@ class SemiProgressiveCutter:
 class _Record(NamedTuple):
     """Elements split by a stroke, with travels of the blade that are times only if asked for."""
 
-    cell: _Ints
+    cell: Ints
     stroke: int
-    entry: _Floats
-    leave: _Floats
+    entry: Floats
+    leave: Floats
     seen: float
     path: ToolPath

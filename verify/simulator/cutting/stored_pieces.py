@@ -4,11 +4,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
-_Labels = NDArray[np.int8]
+from verify.xfem.arrays import Bools, Ints, Sides
 
 
 class StoredPieces(NamedTuple):
@@ -24,11 +21,11 @@ class StoredPieces(NamedTuple):
         After each piece the next of its cell, or -1.
     """
 
-    label: _Labels
-    first: _Ints
-    following: _Ints
+    label: Sides
+    first: Ints
+    following: Ints
 
-    def in_turn(self, cells: _Ints) -> Iterator[tuple[_Ints, _Ints]]:
+    def in_turn(self, cells: Ints) -> Iterator[tuple[Ints, Ints]]:
         """Go through the pieces of cells (q,): places in that list, and a piece of each."""
         rows, pieces = np.arange(len(cells)), self.first[cells]
         while len(rows):
@@ -37,14 +34,14 @@ class StoredPieces(NamedTuple):
             more = pieces >= 0
             rows, pieces = rows[more], pieces[more]
 
-    def labelled(self, cells: _Ints, cut: int) -> _Bools:
+    def labelled(self, cells: Ints, cut: int) -> Bools:
         """Whether any piece of each cell has a side of the cut."""
         found = np.zeros(len(cells), dtype=bool)
         for rows, pieces in self.in_turn(cells):
             found[rows] |= self.label[pieces, cut] != 0
         return found
 
-    def separated(self, cells: _Ints, label: _Labels, numbers: _Ints, cut: int) -> _Bools:
+    def separated(self, cells: Ints, label: Sides, numbers: Ints, cut: int) -> Bools:
         """Whether a cut has split every stored piece of which each given piece may be a part.
 
         `numbers` says which cuts the columns of `label` (p, q) are.
@@ -58,7 +55,7 @@ class StoredPieces(NamedTuple):
             every[rows] &= ~fits | (stored[:, cut] != 0)
         return some & every
 
-    def match(self, cells: _Ints, label: _Labels, side: _Labels) -> tuple[_Ints, _Bools]:
+    def match(self, cells: Ints, label: Sides, side: Sides) -> tuple[Ints, Bools]:
         """Find the stored piece (p,) of which each given one is a part, or -1; if labels differ.
 
         A piece is part of another of the same cell if every cut that made the other has it on the

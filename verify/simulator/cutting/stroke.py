@@ -3,19 +3,17 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.cuts import Cut
 from verify.xfem.faceted_cuts import FacetArrays
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.pieces`
 _NEAR = 1.5  # longest edges: so near to the sweep is every cell that it may part with other cuts
@@ -35,11 +33,11 @@ class SeenCut:
         How far the blade has come, in metres.
     """
 
-    def __init__(self, nodes: _Floats, values: _Floats, sweep: Sweep, front: float) -> None:
+    def __init__(self, nodes: Floats, values: Floats, sweep: Sweep, front: float) -> None:
         self._nodes, self._values = nodes, values
         self._part = sweep.until(front)
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Values taken, at the nodes; the distance to the sweep elsewhere."""
         if points is self._nodes:
             return self._values
@@ -47,7 +45,7 @@ class SeenCut:
             return self._values
         return self._part.level_set(points)
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Distance to the rim or to the blade, negative past it."""
         return self._part.depth(points)
 
@@ -82,7 +80,7 @@ class Stroke:
     """
 
     def __init__(
-        self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints, size: _Floats
+        self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: Ints, size: Floats
     ) -> None:
         self.path, self.number = path, number
         self.front = -1.0
@@ -94,7 +92,7 @@ class Stroke:
         self._snap = _ROUND_OFF * mesh.extent
         self._under_way = np.empty(0, dtype=np.int64)
 
-    def advance(self, time: float, elements: BoundingTree) -> _Ints:
+    def advance(self, time: float, elements: BoundingTree) -> Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
 
         Parameters
@@ -123,7 +121,7 @@ class Stroke:
         self._under_way = cells[~settled]
         return cells[(through & ~recorded) | ~alone]
 
-    def _crossed(self, cells: _Ints) -> tuple[_Ints, NDArray[np.bool_], _Floats]:
+    def _crossed(self, cells: Ints) -> tuple[Ints, Bools, Floats]:
         """Those of some cells (q,) that the blade is near, if crossed through, latest travel.
 
         Writes the travel at which the blade entered each, and crossed it through. The tolerances
@@ -157,11 +155,11 @@ class Stroke:
         self.path = self.path.extended(blades, times)
         self.values[~self._fixed] = np.nan
 
-    def fix(self, nodes: _Ints) -> None:
+    def fix(self, nodes: Ints) -> None:
         """From now on the level sets of these nodes do not change."""
         self._fixed[nodes] = True
 
-    def level_sets(self, nodes: _Ints) -> _Floats:
+    def level_sets(self, nodes: Ints) -> Floats:
         """Level sets of mesh nodes, computed where they have not been, in metres."""
         unknown = nodes[np.isnan(self.values[nodes])]
         if len(unknown):
@@ -183,7 +181,7 @@ class Stroke:
 
 def _cells_hit(
     sweep: FacetArrays, after: float, front: float, margin: float, elements: BoundingTree
-) -> _Ints:
+) -> Ints:
     """Cells near what is swept between two travels; may hold doubles."""
     corners, travel = sweep.corners, sweep.travel
     points, there = [corners], [(travel >= after) & (travel <= front)]

@@ -1,14 +1,11 @@
 """Pieces of a growing body that no cut keeps apart, though planes of cuts divide them."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.simulator.arrays.growing_array import GrowingArray
-
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
+from verify.xfem.arrays import Bools, Ints
 
 
 class TiedParts:
@@ -29,7 +26,7 @@ class TiedParts:
         self.joint = np.zeros(cells, dtype=bool)
         self._part = GrowingArray(np.arange(cells))
 
-    def still(self, tied: _Ints, old: _Ints) -> _Ints:
+    def still(self, tied: Ints, old: Ints) -> Ints:
         """Those of the pairs (t, 2) of new pieces that have not been apart before.
 
         `old` (p,) is the stored piece of each new one, -1 if it has none.
@@ -38,7 +35,7 @@ class TiedParts:
         same = self._part.rows[first] == self._part.rows[second]
         return tied[same & (first >= 0) & (second >= 0)]
 
-    def parted(self, tied: _Ints, old: _Ints) -> _Bools:
+    def parted(self, tied: Ints, old: Ints) -> Bools:
         """Which new pieces (p,) come from a part that is several by now."""
         now = _components(len(old), tied)
         known = np.flatnonzero(old >= 0)
@@ -48,7 +45,7 @@ class TiedParts:
         found[known] = (np.bincount(pairs[0]) > 1)[before]
         return found
 
-    def store(self, tied: _Ints, cell: _Ints, place: _Ints, count: int) -> None:
+    def store(self, tied: Ints, cell: Ints, place: Ints, count: int) -> None:
         """Take over new pieces, stored at `place` (p,), -1 if not at all.
 
         Parameters
@@ -70,6 +67,6 @@ class TiedParts:
         self.joint[cell[tied[:, 0]]] = True
 
 
-def _components(count: int, pairs: _Ints) -> _Ints:
+def _components(count: int, pairs: Ints) -> Ints:
     graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)

@@ -3,18 +3,15 @@
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import GrowingBody
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.join import node_sides, piece_sides
 from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.zero_points import ZeroPoints
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
-
-def whole_mesh(body: GrowingBody, level_sets: _Floats) -> PhantomMesh:
+def whole_mesh(body: GrowingBody, level_sets: Floats) -> PhantomMesh:
     """Copy a growing body into a phantom-node mesh; costs what the whole mesh is.
 
     Dof nodes keep their numbers; pieces are ordered by their cell.
@@ -55,10 +52,10 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> PhantomMesh:
 class _GrownSubCells(SubCells):
     """Sub-simplices of a growing body; what is not asked for at every cut is made when it is."""
 
-    _points: tuple[_Floats, _Ints, _Ints]
-    _nodes: tuple[_Floats, _Floats]
+    _points: tuple[Floats, Ints, Ints]
+    _nodes: tuple[Floats, Floats]
 
-    def __init__(self, body: GrowingBody, number: _Ints, used: _Ints, level_sets: _Floats) -> None:
+    def __init__(self, body: GrowingBody, number: Ints, used: Ints, level_sets: Floats) -> None:
         self.__dict__.update(
             piece=number[body.sub_piece.rows[used]],
             points=body.sub_points.rows[used],
@@ -77,7 +74,7 @@ class _GrownSubCells(SubCells):
 
 
 def _zero_points(
-    nodes: _Floats, level_sets: _Floats, positions: _Floats, ends: _Ints, cut: _Ints
+    nodes: Floats, level_sets: Floats, positions: Floats, ends: Ints, cut: Ints
 ) -> ZeroPoints:
     points = ZeroPoints(nodes, level_sets, 0.0)
     values = np.full((len(nodes) + len(cut), level_sets.shape[1]), np.nan)

@@ -7,7 +7,6 @@ with two new rims along a cut instead of inner facets.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
@@ -16,9 +15,7 @@ from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
 from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.simulator.mapping.moving_surface import MovingSurface
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 
 class BodySurface:
@@ -54,7 +51,7 @@ class BodySurface:
             self._cover(increment.touched, increment.cells)
 
     @property
-    def rims(self) -> _Ints:
+    def rims(self) -> Ints:
         """(k, 2) edges of the surface that cuts have made; of a solid there are none.
 
         They run along the direction of their facets, the material on their left seen from above.
@@ -63,7 +60,7 @@ class BodySurface:
             return np.empty((0, 2), dtype=np.int64)
         return rim_edges(self._body, self.surface)
 
-    def _cover(self, cells: _Ints, split: _Ints) -> None:
+    def _cover(self, cells: Ints, split: Ints) -> None:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
         self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
@@ -80,7 +77,7 @@ class BodySurface:
             inner[source], body.piece_cells.rows, cell, self._facet_range,
         )  # fmt: skip
 
-    def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
+    def _facets_of(self, cells: Ints) -> tuple[Ints, Floats, Ints, Ints, Bools]:
         """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""
         body = self._body
         if self._membrane:

@@ -2,33 +2,28 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from verify.simulator.cutting.growing_body import GrowingBody
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints, Sides
 
 
 class CutElements(NamedTuple):
     """Elements of a mesh and their pieces; see `GrowingBody`."""
 
-    cells: _Ints
-    neighbours: _Ints
-    piece_cells: _Ints
-    first_piece: _Ints
-    next_piece: _Ints
+    cells: Ints
+    neighbours: Ints
+    piece_cells: Ints
+    first_piece: Ints
+    next_piece: Ints
 
 
 class SubSimplices(NamedTuple):
     """Sub-simplices of split elements, those of each by `sub_range` (m, 2); see `GrowingBody`."""
 
-    sub_range: _Ints
-    sub_piece: _Ints
-    sub_points: _Ints
-    sub_barycentric: _Floats
-    sub_sign: NDArray[np.int8]
+    sub_range: Ints
+    sub_piece: Ints
+    sub_points: Ints
+    sub_barycentric: Floats
+    sub_sign: Sides
 
 
 def cut_elements(body: GrowingBody) -> CutElements:

@@ -8,10 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 
 
 class DividedFacets(NamedTuple):
@@ -28,16 +26,16 @@ class DividedFacets(NamedTuple):
         Facet of each part, ascending, and its side of the cut; 0 if the facet is not divided.
     """
 
-    ends: _Ints
-    positions: _Floats
-    ids: _Ints
-    at: _Floats
-    source: _Ints
-    side: NDArray[np.int8]
+    ends: Ints
+    positions: Floats
+    ids: Ints
+    at: Floats
+    source: Ints
+    side: Sides
 
 
 def divide_facets(
-    facets: _Ints, values: _Floats, points: _Floats, is_cut: Callable[[_Floats], NDArray[np.bool_]]
+    facets: Ints, values: Floats, points: Floats, is_cut: Callable[[Floats], Bools]
 ) -> DividedFacets:
     """Divide triangles by a cut where both places in which it crosses their edges are split.
 

@@ -10,15 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import distinct
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.cutting.point_numbers import NODES, NONE, PointNumbers
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _FACE = 3  # corners of a face
 _SHORT = 1e-2  # of an edge: what has given a line its direction was too short to be trusted
@@ -30,7 +27,7 @@ class _Line:
     """Numbers of the zero points on a line, and the direction along which they are ordered."""
 
     points: list[int] = field(default_factory=list)
-    direction: _Floats | None = None
+    direction: Floats | None = None
 
 
 class EdgePoints:
@@ -44,7 +41,7 @@ class EdgePoints:
         Points where cuts meet that mesh.
     """
 
-    def __init__(self, nodes: _Floats, points: PointNumbers) -> None:
+    def __init__(self, nodes: Floats, points: PointNumbers) -> None:
         self._nodes, self._points = nodes, points
         # nodes of edges that have a point, and of faces that have one inside
         self._crossed, self._faced = np.zeros((2, len(nodes)), dtype=bool)
@@ -56,7 +53,7 @@ class EdgePoints:
         self._in_faces: dict[tuple[int, ...], _Line] = {}
         self._turned = False
 
-    def add(self, numbers: _Ints) -> None:
+    def add(self, numbers: Ints) -> None:
         """Record points (by number; mesh nodes are ignored) on the lines on which they lie."""
         nodes, ends = self._points.nodes, self._points.ends.rows
         unheard = np.zeros(len(ends) - len(self._recorded), dtype=bool)
@@ -85,7 +82,7 @@ class EdgePoints:
             for line in lines:
                 self._in_faces.setdefault(line, _Line()).points.append(nodes + int(zero[k]))
 
-    def bisect(self, facets: _Ints, at: _Floats) -> tuple[_Ints, _Floats, _Ints]:
+    def bisect(self, facets: Ints, at: Floats) -> tuple[Ints, Floats, Ints]:
         """Bisect triangles at all recorded points on their edges; segments stay.
 
         Parameters
@@ -127,7 +124,7 @@ class EdgePoints:
             facets[rows], at[rows] = [ids for ids, _ in made], [place for _, place in made]
         return facets, at, source
 
-    def _suspects(self, facets: _Ints) -> _Ints:
+    def _suspects(self, facets: Ints) -> Ints:
         """Facets on the edges of which there may be points, ascending."""
         nodes, other = self._points.nodes, facets[:, [1, 2, 0]]
         low, high = np.minimum(facets, other), np.maximum(facets, other)
@@ -143,10 +140,10 @@ class EdgePoints:
         suspect[at] = [key in self._on_edges for key in (low[at] << 32 | high[at]).tolist()]
         return np.flatnonzero(suspect.any(axis=1))
 
-    def _parts(self, corners: list[int], at: _Floats) -> list[tuple[list[int], _Floats]]:
+    def _parts(self, corners: list[int], at: Floats) -> list[tuple[list[int], Floats]]:
         """Bisect a triangle until no edge has a point inside."""
         rest = [(corners, at)]
-        done: list[tuple[list[int], _Floats]] = []
+        done: list[tuple[list[int], Floats]] = []
         while rest:
             if len(rest) + len(done) > _MOST:
                 raise XfemError(f"points on the edges of facet {corners} are in no order")
@@ -222,7 +219,7 @@ class EdgePoints:
             return bool(self._points.met[number, cut])
         return cut in self._points.supports[number - nodes, NODES:]
 
-    def _directed(self, line: _Line, x: int, y: int) -> _Floats:
+    def _directed(self, line: _Line, x: int, y: int) -> Floats:
         """Direction of a line: it leads from one end of the edge to the farthest point known.
 
         It is replaced once there is a point far beyond: what is 1e-14 long may point anywhere. That
@@ -234,14 +231,14 @@ class EdgePoints:
         far = int(lengths.argmax())
         if known is not None and known @ known >= _SHORT**2 * lengths[far]:
             return known
-        direction: _Floats = steps[far]
+        direction: Floats = steps[far]
         if known is not None:
             self._turned = True
             direction = direction if direction @ known >= 0.0 else -direction
         line.direction = direction
         return direction
 
-    def _place(self, number: int) -> _Floats:
+    def _place(self, number: int) -> Floats:
         nodes = len(self._nodes)
         if number < nodes:
             return np.asarray(self._nodes[number])

@@ -9,7 +9,7 @@ elements that a cut touched are looked at again (thesis 3.2.4, 4.4.2).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from verify.simulator.arrays.distinct import distinct, of_lists, ranges
 from verify.simulator.cutting.growing_body import Increment
@@ -20,13 +20,9 @@ from verify.simulator.mapping.divided_facets import divide_facets
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.material_places import MaterialPlaces
 from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.errors import XfemError
 from verify.xfem.pieces import ROUND_OFF, split_cells
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
-_Labels = NDArray[np.int8]
 
 _INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is looked up
 _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
@@ -35,32 +31,32 @@ _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on t
 class _Fragments(NamedTuple):
     """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts, if whole."""
 
-    ids: _Ints
-    source: _Ints
-    at: _Floats
-    label: _Labels
-    whole: _Bools
+    ids: Ints
+    source: Ints
+    at: Floats
+    label: Sides
+    whole: Bools
 
 
 class _Corners(NamedTuple):
     """Cell (q, k) of each corner of facets, its coordinates, those of a place inside the facet."""
 
-    cell: _Ints
-    weights: _Floats
-    inside: _Floats
+    cell: Ints
+    weights: Floats
+    inside: Floats
 
 
 class _SurfaceCut:
     """A cut as a surface sees it: it is where the body is split."""
 
-    def __init__(self, nodes: _Floats, values: _Floats, cut: int, embedded: "EmbeddedSurface"):
+    def __init__(self, nodes: Floats, values: Floats, cut: int, embedded: "EmbeddedSurface"):
         self._nodes, self._values, self._cut, self._embedded = nodes, values, cut, embedded
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Realised level set at the vertices; zero points are on the cut by construction."""
         return self._values if points is self._nodes else np.zeros(len(points))
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Infinite where the body is split, minus that where it is not."""
         return np.where(self._embedded.is_cut(points, self._cut), np.inf, -np.inf)
 
@@ -129,14 +125,14 @@ class EmbeddedSurface:
         if len(concerned):
             self._replace(concerned, nodes, numbers, values)
 
-    def is_cut(self, places: _Floats, cut: int) -> _Bools:
+    def is_cut(self, places: Floats, cut: int) -> Bools:
         """Whether the element at each material place (q, s) is split by a cut."""
         place, cell = self._places.holding(places)
         found = np.zeros(len(places), dtype=bool)
         found[place[self._cutter.body.split_by(cell, cut)]] = True
         return found
 
-    def _facets_and_cells(self) -> tuple[_Ints, _Ints]:
+    def _facets_and_cells(self) -> tuple[Ints, Ints]:
         """Facet, ascending, and cell of all pairs that are near each other.
 
         They are if their boxes meet, or if a vertex of the facet belongs to the cell. Outside the
@@ -154,7 +150,7 @@ class EmbeddedSurface:
         pairs = distinct(facet * len(self._cutter.mesh.cells) + cells)
         return np.divmod(pairs, len(self._cutter.mesh.cells))
 
-    def _place_corners(self, facets: _Ints, places: _Floats) -> _Corners:
+    def _place_corners(self, facets: Ints, places: Floats) -> _Corners:
         """Find cells for the corners (q, k, s) of parts of facets, a little inside of each part."""
         count, size, space = places.shape
         inside = (1.0 - _INWARDS) * places + _INWARDS * places.mean(axis=1, keepdims=True)
@@ -169,7 +165,7 @@ class EmbeddedSurface:
         shape = (count, size, weights.shape[1])
         return _Corners(cell.reshape(count, size), weights.reshape(shape), at.reshape(shape))
 
-    def _replace(self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats) -> None:
+    def _replace(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> None:
         """Put the parts of some facets in the place of what there is of these.
 
         They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is
@@ -192,7 +188,7 @@ class EmbeddedSurface:
             self._cutter.body.piece_cells.rows, parts.source, self._facet_range,
         )  # fmt: skip
 
-    def _pieces(self, corners: _Corners, label: _Labels) -> _Ints:
+    def _pieces(self, corners: _Corners, label: Sides) -> Ints:
         """Piece (q, k) of each corner of parts of facets, from its cell and the place inside.
 
         `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
@@ -214,9 +210,7 @@ class EmbeddedSurface:
             found[rows[better]], agree[rows[better]] = pieces[better], total[better]
         return found.reshape(corners.cell.shape)
 
-    def _fragments(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> _Fragments:
+    def _fragments(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> _Fragments:
         """Divide facets, bisect them where others are, and say on which sides they lie.
 
         `values` (q, cuts) are the level sets of the cuts with these `numbers` at the `nodes`.
@@ -234,8 +228,8 @@ class EmbeddedSurface:
         return _Fragments(ids, facets[source], at, label, is_whole)
 
     def _divided_by_one(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> tuple[_Ints, _Ints, _Floats, _Labels]:
+        self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats
+    ) -> tuple[Ints, Ints, Floats, Sides]:
         """Divide facets by the only cut there is: points, which facet, corners in it, side."""
         corners, local = self.points[nodes], np.searchsorted(nodes, self.facets[facets])
         parts = divide_facets(
@@ -248,8 +242,8 @@ class EmbeddedSurface:
         return point[parts.ids], parts.source, parts.at, parts.side[:, None]
 
     def _divided_by_several(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> tuple[_Ints, _Ints, _Floats, _Labels]:
+        self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats
+    ) -> tuple[Ints, Ints, Floats, Sides]:
         """Divide facets by any number of cuts, as elements are."""
         local = np.searchsorted(nodes, self.facets[facets])
         across = np.full(local.shape, -1)
@@ -277,7 +271,7 @@ class EmbeddedSurface:
         order = np.argsort(source, kind="stable")
         return ids[order], source[order], at[order], side[order]
 
-    def _values(self, vertices: _Ints) -> tuple[_Ints, _Floats]:
+    def _values(self, vertices: Ints) -> tuple[Ints, Floats]:
         """Cuts between vertices, or through one, and their realised level sets (q, cuts) there."""
         strokes = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
         cells, at = self._cutter.mesh.cells[self._vertex_cell[vertices]], self._vertex_at[vertices]
@@ -295,7 +289,7 @@ class EmbeddedSurface:
         return np.array(numbers, dtype=np.int64), found
 
 
-def _check(points: _Floats, facets: _Ints, space: int) -> None:
+def _check(points: Floats, facets: Ints, space: int) -> None:
     if points.ndim != 2 or points.shape[1] != space or not np.isfinite(points).all():
         raise XfemError(f"surface points of shape {points.shape}; expected finite (v, {space})")
     if facets.ndim != 2 or facets.shape[1] != space or len(facets) == 0:

@@ -9,13 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from verify.simulator.cutting.bounding_tree import BoundingTree
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _REACH = 1e-9  # of the mesh's extent: a place so near to a box is in it
 _TIE = 1e-9  # barycentric coordinates: closer than that to a face is on it
@@ -25,11 +22,11 @@ _WIDER = 8.0  # how much farther is looked for a box where there is none
 class _Elements(NamedTuple):
     """Elements (m, d + 1) of a mesh, gradients of their shape functions, and their boxes (m, s)."""
 
-    cells: _Ints
-    points: _Floats
-    gradients: _Floats
-    floor: _Floats
-    ceiling: _Floats
+    cells: Ints
+    points: Floats
+    gradients: Floats
+    floor: Floats
+    ceiling: Floats
 
 
 class MaterialPlaces:
@@ -49,7 +46,7 @@ class MaterialPlaces:
             mesh.cells, mesh.points, np.ascontiguousarray(mesh.gradients), tree.floor, tree.ceiling
         )
 
-    def barycentric(self, cells: _Ints, places: _Floats) -> _Floats:
+    def barycentric(self, cells: Ints, places: Floats) -> Floats:
         """Barycentric coordinates (q, d + 1) of places (q, s), each in one cell."""
         mesh = self._mesh
         away = places - mesh.points[mesh.cells[cells, 0]]
@@ -57,15 +54,15 @@ class MaterialPlaces:
         at[:, 0] += 1.0
         return at
 
-    def gap(self, cells: _Ints, places: _Floats) -> _Floats:
+    def gap(self, cells: Ints, places: Floats) -> Floats:
         """How far (q,) each place is beyond the box of a cell along some axis, or negative."""
         floor, ceiling = self._tree.floor[cells], self._tree.ceiling[cells]
-        found: _Floats = np.maximum(floor - places, places - ceiling).max(axis=1)
+        found: Floats = np.maximum(floor - places, places - ceiling).max(axis=1)
         return found
 
     def cells_of(
-        self, places: _Floats, near: tuple[_Ints, _Ints] | None = None
-    ) -> tuple[_Ints, _Floats]:
+        self, places: Floats, near: tuple[Ints, Ints] | None = None
+    ) -> tuple[Ints, Floats]:
         """Cell (q,) of each place and the barycentric coordinates (q, d + 1) there.
 
         `near` are the cells to try, if they are known: the first of each place, and all of them.
@@ -74,7 +71,7 @@ class MaterialPlaces:
         found, at, _ = _cells_of(places, starts, cells, self._elements, self.reach)
         return found, at
 
-    def holding(self, places: _Floats) -> tuple[_Ints, _Ints]:
+    def holding(self, places: Floats) -> tuple[Ints, Ints]:
         """Place and cell of all pairs where the cell holds the place; on a face several do."""
         starts, cells = self._near(places)
         _, at, least = _cells_of(places, starts, cells, self._elements, self.reach)
@@ -82,7 +79,7 @@ class MaterialPlaces:
         holds = least >= np.minimum(at.min(axis=1), 0.0)[place] - _TIE
         return place[holds], cells[holds]
 
-    def _near(self, places: _Floats) -> tuple[_Ints, _Ints]:
+    def _near(self, places: Floats) -> tuple[Ints, Ints]:
         """Cells to which each place may belong: the first of each, and all of them."""
         reach = np.full((len(places), 1), self.reach)
         while True:

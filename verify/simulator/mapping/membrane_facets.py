@@ -1,19 +1,14 @@
 """The surface of a membrane: itself. A cut gives it two new rims, and no inner surface."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.moving_surface import MovingSurface
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Bools, Floats, Ints
 
 
-def membrane_facets(
-    body: GrowingBody, cells: _Ints
-) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
+def membrane_facets(body: GrowingBody, cells: Ints) -> tuple[Ints, Floats, Ints, Ints, Bools]:
     """Triangles of these elements: whole, or as the cuts have divided them.
 
     Returns for each, cell by cell: point numbers (q, 3), barycentric corners (q, 3, 3), piece,
@@ -36,7 +31,7 @@ def membrane_facets(
     return ids[order], at[order], piece[order], cell[order], inner
 
 
-def rim_edges(body: GrowingBody, surface: MovingSurface) -> _Ints:
+def rim_edges(body: GrowingBody, surface: MovingSurface) -> Ints:
     """Edges (k, 2) of a membrane's surface that a cut has made, along the facets' direction.
 
     Those are the edges of one facet only that do not lie on the edge of the uncut membrane. Costs
@@ -50,7 +45,7 @@ def rim_edges(body: GrowingBody, surface: MovingSurface) -> _Ints:
     return open_[~_on_outer_edge(body, surface, open_)]
 
 
-def _on_outer_edge(body: GrowingBody, surface: MovingSurface, edges: _Ints) -> NDArray[np.bool_]:
+def _on_outer_edge(body: GrowingBody, surface: MovingSurface, edges: Ints) -> Bools:
     """Whether an edge of the surface lies on an edge of the mesh that has one element only."""
     mesh = body.mesh
     nodes = np.where(
@@ -61,5 +56,5 @@ def _on_outer_edge(body: GrowingBody, surface: MovingSurface, edges: _Ints) -> N
     cell, opposite = mesh.boundary_facets.T
     outer = np.sort(mesh.cells[cell[:, None], (opposite[:, None] + [1, 2]) % 3], axis=1)
     size = len(mesh.points)
-    on_outer: NDArray[np.bool_] = along & np.isin(ends[0] * size + ends[1], outer @ [size, 1])
+    on_outer: Bools = along & np.isin(ends[0] * size + ends[1], outer @ [size, 1])
     return on_outer

@@ -9,16 +9,12 @@ gets is the same.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers
-from verify.xfem.arrays import check_floats
+from verify.xfem.arrays import Bools, Floats, Ints, check_floats
 from verify.xfem.errors import XfemError
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 class MovingSurface:
@@ -59,15 +55,15 @@ class MovingSurface:
 
     def add(
         self,
-        point: _Ints,
-        material: _Floats,
-        weights: _Floats,
-        counts: Callable[[_Ints], NDArray[np.bool_]],
-        piece: _Ints,
-        inner: NDArray[np.bool_],
-        piece_cells: _Ints,
-        owner: _Ints,
-        bounds: _Ints,
+        point: Ints,
+        material: Floats,
+        weights: Floats,
+        counts: Callable[[Ints], Bools],
+        piece: Ints,
+        inner: Bools,
+        piece_cells: Ints,
+        owner: Ints,
+        bounds: Ints,
     ) -> None:
         """Append facets, and a vertex for each point and set of unknowns from which it moves.
 
@@ -112,17 +108,17 @@ class MovingSurface:
         bounds[owner[change], 0] = begin + change
         bounds[owner[change], 1] = begin + np.append(change[1:], len(owner))
 
-    def retire(self, facets: _Ints) -> None:
+    def retire(self, facets: Ints) -> None:
         """Take facets out of use."""
         self.facets.rows[facets, 0] = -1
         self.retired += len(facets)
 
     @property
-    def used(self) -> _Ints:
+    def used(self) -> Ints:
         """Numbers of the facets in use."""
         return np.flatnonzero(self.facets.rows[:, 0] >= 0)
 
-    def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
+    def positions(self, displacement: Floats, out: Floats | None = None) -> Floats:
         """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes.
 
         Parameters
@@ -146,7 +142,7 @@ class MovingSurface:
         out[:] = found
         return out
 
-    def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
+    def nodal_forces(self, forces: Floats, out: Floats) -> Floats:
         """Add forces (v, s) on the vertices to those on the dof nodes, `out` (N, s): Wᵀf.
 
         Raises
@@ -159,7 +155,7 @@ class MovingSurface:
         out[: self._mapping.shape[1]] += self._mapping.T @ forces
         return out
 
-    def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
+    def facet_force(self, facet: int, at: Floats, force: Floats, out: Floats) -> Floats:
         """Add a force at a point of a facet to the forces on the dof nodes.
 
         Parameters
@@ -193,7 +189,7 @@ class MovingSurface:
         np.add.at(out, self.nodes.rows[vertices], shares[:, :, None] * force)
         return out
 
-    def _check(self, nodal: _Floats) -> None:
+    def _check(self, nodal: Floats) -> None:
         kind, space = getattr(nodal, "dtype", type(nodal).__name__), self.material.rows.shape[1]
         if kind != np.float64 or nodal.ndim != 2 or nodal.shape[1] != space:
             raise XfemError(

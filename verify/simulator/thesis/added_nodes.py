@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.methods.catalogue import cut_by
@@ -13,6 +12,7 @@ from verify.scene import load_scene
 from verify.simulator import Stage, stage_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.thesis.published import published_rows
+from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline, ToolPath
@@ -148,7 +148,7 @@ def _growth(stage: Stage, rows: Sequence[int]) -> list[tuple[int, int, float]]:
     return found
 
 
-def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[NDArray[np.float64]]:
+def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[Floats]:
     """Plan (k, 2) of what each tip has come along, of the strokes that have begun."""
     tips = []
     for path in strokes:

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from time import perf_counter, thread_time
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.calibration import kernel_seconds
 from verify.simulator import PHASES, Session, Stage, quality_of
 from verify.simulator.thesis.strokes import hand, stroke_along
+from verify.xfem.arrays import Floats
 
 LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}
 _TETRAHEDRA = 1000
@@ -101,7 +101,7 @@ def real_time() -> RealTime:
     )
 
 
-def _shares(seconds: NDArray[np.float64]) -> dict[str, float]:
+def _shares(seconds: Floats) -> dict[str, float]:
     return {name: float(np.mean(seconds <= limit)) for name, limit in LIMITS.items()}
 
 
