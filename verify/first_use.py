@@ -130,7 +130,6 @@ def _scalpel(mesh: SimplexMesh, kind: State) -> None:
         )
     )  # fmt: skip
     session.run()
-    session.collider.nearest(mesh.points[:1])
 
 
 def _comparison() -> None:

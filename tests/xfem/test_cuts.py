@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
 from surface_measures import sphere
 
 from verify.compare.splitting import measures
@@ -16,7 +17,7 @@ from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
 from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import box_mesh
 
 COORDINATE = st.floats(-3.0, 3.0)
 
@@ -160,68 +161,42 @@ def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
         np.testing.assert_allclose(*(getattr(one, ask)(points) for one in sweeps), atol=4e-16)
 
 
-def _model(dim, seed):
-    """A cut body, its surface displaced at random, and the collider on it."""
-    mesh = box_mesh((4, 4, 4)) if dim == 3 else rectangle_mesh((8, 8))
-    cutter = SemiProgressiveCutter(mesh)
+def test_a_tool_touches_the_facets_within_its_radius_and_no_others() -> None:
+    # a cut body, displaced at random; the distance to a convex facet is convex along the tool
+    cutter = SemiProgressiveCutter(box_mesh((3, 3, 3)))
     body = BodySurface(cutter.body)
-    collider = SurfaceCollider(body.surface)
-    depth = [0.0, 0.1, 1.4] if dim == 3 else None
-    tips = [[-0.1, 0.47, -0.2], [1.1, 0.53, -0.2]]
-    cutter.begin(ToolPath.of_tip([tip[:dim] for tip in tips], [0.0, 1.0], depth))
-    rng = np.random.default_rng(seed)
-    for time in (0.4, 1.0):
+    surface, collider = body.surface, SurfaceCollider(body.surface)
+    cutter.begin(ToolPath.of_tip([[-0.1, 0.47, -0.2], [1.1, 0.53, -0.2]], [0, 1], [0.0, 0.1, 1.4]))
+    rng, weights = np.random.default_rng(1), np.empty(3)
+    for time, count in ((0.4, 5), (1.0, 15)):
         body.update(cutter.advance(time))
-        displacement = 0.05 * rng.normal(size=(cutter.body.node_count, dim))
-        collider.refit(displacement)
-    collider.refit(displacement)  # once without a change of the surface
-    rows = body.surface.used
-    corners = body.surface.positions(displacement)[body.surface.facets.rows[rows]]
-    return cutter, body, collider, rows, corners, rng
+        x = surface.positions(0.05 * rng.normal(size=(cutter.body.node_count, 3)))
+        collider.follow(x)
+        hits = 0
+        for _ in range(count):
+            start, end = rng.uniform(-0.3, 1.3, (2, 3))
+            contacts = collider.touched(start, end, 0.05)
+            found = dict(zip(contacts.facet.tolist(), contacts.distance, strict=True))
+            for row in surface.used:
+                corners = x[surface.facets.rows[row]]
 
+                def away(share, start=start, end=end, corners=corners):
+                    place = start + share * (end - start)
+                    nearest_on_facet(place, corners, weights)
+                    return np.linalg.norm(weights @ corners - place)
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_nearest_facet_is_that_of_all(dim) -> None:
-    _, body, collider, rows, corners, rng = _model(dim, 1)
-    points = rng.uniform(-0.3, 1.3, (60, dim))
-    contacts = collider.nearest(points)
-    weights = np.empty(dim)
-    for q, x in enumerate(points):
-        best = np.inf
-        for facet in corners:
-            nearest_on_facet(x, facet, weights)
-            best = min(best, np.linalg.norm(weights @ facet - x))
-        assert contacts.distance[q] == pytest.approx(best, rel=1e-12)
-        foot = contacts.at[q] @ corners[np.searchsorted(rows, contacts.facet[q])]
-        assert np.linalg.norm(foot - x) == pytest.approx(best, rel=1e-12)
-    np.testing.assert_array_equal(contacts.piece, body.surface.facet_piece.rows[contacts.facet])
-    # a limit hides what is farther, and nothing else
-    limited = collider.nearest(points, limit=0.05)
-    np.testing.assert_array_equal(limited.facet >= 0, contacts.distance < 0.05)
-    assert np.isinf(limited.distance[limited.facet < 0]).all()
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_segment_pierces_what_a_linear_solve_says(dim) -> None:
-    _, _, collider, rows, corners, rng = _model(dim, 3)
-    hits = 0
-    for _ in range(40):
-        start, end = rng.uniform(-0.3, 1.3, (2, dim))
-        contacts = collider.pierced(start, end)
-        expected = {}
-        for facet, corner in zip(rows, corners, strict=True):
-            matrix = np.column_stack([start - end, *(corner[1:] - corner[0])])
-            share, *rest = np.linalg.solve(matrix, start - corner[0])
-            if 0 <= share <= 1 and min([*rest, 1 - sum(rest)]) >= 0:
-                expected[int(facet)] = share
-        assert sorted(contacts.facet.tolist()) == sorted(expected)
-        assert (np.diff(contacts.share) >= 0.0).all()
-        for k, facet in enumerate(contacts.facet):
-            assert contacts.share[k] == pytest.approx(expected[int(facet)], abs=1e-10)
-            foot = contacts.at[k] @ corners[np.searchsorted(rows, facet)]
-            np.testing.assert_allclose(foot, start + contacts.share[k] * (end - start), atol=1e-12)
-        hits += len(expected)
-    assert hits > 40
+                inside = minimize_scalar(away, bounds=(0, 1), options={"xatol": 1e-9}).fun
+                exact = min(inside, away(0.0), away(1.0))
+                assert abs(exact - 0.05) > 1e-6  # nothing undecided
+                assert (row in found) == (exact < 0.05)
+                # the search knows the place up to √ε, and so the distance where it has a kink
+                assert found.get(row, exact) == pytest.approx(exact, abs=1e-7)
+            foot = np.einsum("qk,qki->qi", contacts.at, x[surface.facets.rows[contacts.facet]])
+            share = np.clip((foot - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
+            gap = np.linalg.norm(foot - start - share[:, None] * (end - start), axis=1)
+            np.testing.assert_allclose(gap, contacts.distance, atol=1e-12)
+            hits += len(found)
+        assert hits > 5 * count
 
 
 _EPS = np.finfo(float).eps

@@ -229,8 +229,8 @@ class Session:
             if len(contacts.facet) == 0 or length == 0.0:
                 continue
             force = self.stage.tool_force / (length * len(contacts.facet)) * (here - before)
-            for facet, at in zip(contacts.facet, contacts.at, strict=True):
-                surface.facet_force(int(facet), at, force, load)
+            forces = np.tile(force, (len(contacts.facet), 1))
+            surface.add_forces(contacts.facet, contacts.at, forces, load)
         self._tool_load = load
 
     def _spent_so_far(self) -> Floats:

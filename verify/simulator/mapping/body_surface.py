@@ -13,7 +13,6 @@ from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.mapping.cut_elements import cut_elements, sub_simplices
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
-from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.arrays import Bools, Floats, Ints
 
@@ -50,16 +49,6 @@ class BodySurface:
         if increment is not None:
             self._cover(increment.touched, increment.cells)
 
-    @property
-    def rims(self) -> Ints:
-        """(k, 2) edges of the surface that cuts have made; of a solid there are none.
-
-        They run along the direction of their facets, the material on their left seen from above.
-        """
-        if not self._membrane:
-            return np.empty((0, 2), dtype=np.int64)
-        return rim_edges(self._body, self.surface)
-
     def _cover(self, cells: Ints, split: Ints) -> None:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
@@ -81,7 +70,30 @@ class BodySurface:
         """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""
         body = self._body
         if self._membrane:
-            return membrane_facets(body, cells)
+            return _membrane_facets(body, cells)
         return exposed_facets(
             cells, body.split_cells, cut_elements(body), sub_simplices(body), self._orientation
         )
+
+
+def _membrane_facets(body: GrowingBody, cells: Ints) -> tuple[Ints, Floats, Ints, Ints, Bools]:
+    """Triangles of these elements: whole, or as the cuts have divided them.
+
+    Returns for each, cell by cell: point numbers (q, 3), barycentric corners (q, 3, 3), piece,
+    cell, and that it lies on no cut. They keep the direction of their element.
+    """
+    split = body.split_cells[cells]
+    whole, divided = cells[~split], cells[split]
+    of_cells = body.sub_range[divided]
+    sub = ranges(of_cells)
+    ids = np.concatenate([body.mesh.cells[whole], body.sub_points.rows[sub]])
+    eye = np.broadcast_to(np.eye(3), (len(whole), 3, 3))
+    at = np.concatenate([eye, body.sub_barycentric.rows[sub]])
+    piece = np.concatenate([body.first_piece[whole], body.sub_piece.rows[sub]])
+    cell = np.concatenate([whole, np.repeat(divided, of_cells[:, 1] - of_cells[:, 0])])
+    turned = np.concatenate([np.zeros(len(whole), dtype=bool), body.sub_sign.rows[sub] < 0])
+    ids[turned, :2] = ids[turned, 1::-1]
+    at[turned, :2] = at[turned, 1::-1]
+    order = np.argsort(cell, kind="stable")
+    inner = np.zeros(len(cell), dtype=bool)
+    return ids[order], at[order], piece[order], cell[order], inner

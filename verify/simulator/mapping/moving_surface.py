@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers
-from verify.xfem.arrays import Bools, Floats, Ints, check_floats
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.errors import XfemError
 
 
@@ -118,87 +118,52 @@ class MovingSurface:
         """Numbers of the facets in use."""
         return np.flatnonzero(self.facets.rows[:, 0] >= 0)
 
-    def positions(self, displacement: Floats, out: Floats | None = None) -> Floats:
-        """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes.
-
-        Parameters
-        ----------
-        displacement : (N, s) float array
-            In metres.
-        out : (v, s) float array, optional
-            Written instead of a new array: a step then allocates nothing.
+    def positions(self, displacement: Floats) -> Floats:
+        """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes, in metres.
 
         Raises
         ------
         XfemError
-            If `displacement` has fewer rows than there are dof nodes, or an array another shape
-            or type.
+            If `displacement` has fewer rows than there are dof nodes, or another shape or type.
         """
         self._check(displacement)
-        found = self.material.rows + self._mapping @ displacement[: self._mapping.shape[1]]
-        if out is None:
-            return np.asarray(found)
-        check_floats("positions", out, found.shape)
-        out[:] = found
-        return out
+        moved = self._mapping @ displacement[: self._mapping.shape[1]]
+        return np.asarray(self.material.rows + moved)
 
-    def nodal_forces(self, forces: Floats, out: Floats) -> Floats:
-        """Add forces (v, s) on the vertices to those on the dof nodes, `out` (N, s): Wᵀf.
-
-        Raises
-        ------
-        XfemError
-            If an array has another shape or type.
-        """
-        self._check(out)
-        check_floats("forces", forces, self.material.rows.shape)
-        out[: self._mapping.shape[1]] += self._mapping.T @ forces
-        return out
-
-    def facet_force(self, facet: int, at: Floats, force: Floats, out: Floats) -> Floats:
-        """Add a force at a point of a facet to the forces on the dof nodes.
+    def add_forces(self, facets: Ints, at: Floats, forces: Floats, out: Floats) -> None:
+        """Add forces at points of facets to the forces on the dof nodes: Wᵀf.
 
         Parameters
         ----------
-        facet : int
-        at : (k,) float array
-            Barycentric coordinates of the point in the facet.
-        force : (s,) float array
+        facets : (q,) int array
+        at : (q, k) float array
+            Barycentric coordinates of each point in its facet.
+        forces : (q, s) float array
             In newtons.
         out : (N, s) float array
 
         Raises
         ------
         XfemError
-            If there is no such facet (a contact that is none has the number -1), or a shape is
-            wrong.
+            If a facet is not in use, or a shape is wrong.
         """
         self._check(out)
-        if not 0 <= facet < len(self.facets.rows):
-            raise XfemError(f"facet {facet}; expected one of 0..{len(self.facets.rows) - 1}")
-        vertices = self.facets.rows[facet]
-        if vertices[0] < 0:
-            raise XfemError(f"facet {facet} is no longer in use")
-        if np.shape(at) != vertices.shape or np.shape(force) != out.shape[1:]:
+        if not np.isin(facets, self.used).all():
+            raise XfemError(f"facets {facets}; expected facets of the surface that are in use")
+        vertices = self.facets.rows[facets]
+        if at.shape != vertices.shape or forces.shape != (len(facets), out.shape[1]):
             raise XfemError(
-                f"force of shape {np.shape(force)} at a place of shape {np.shape(at)}; expected "
-                f"{out.shape[1:]} and {vertices.shape}"
+                f"forces of shape {forces.shape} at places of shape {at.shape}; expected "
+                f"{(len(facets), out.shape[1])} and {vertices.shape}"
             )
-        at, force = np.asarray(at, dtype=float), np.asarray(force, dtype=float)
-        shares = at[:, None] * self.weights.rows[vertices]
-        np.add.at(out, self.nodes.rows[vertices], shares[:, :, None] * force)
-        return out
+        shares = at[:, :, None] * self.weights.rows[vertices]
+        np.add.at(out, self.nodes.rows[vertices], shares[..., None] * forces[:, None, None])
 
     def _check(self, nodal: Floats) -> None:
-        kind, space = getattr(nodal, "dtype", type(nodal).__name__), self.material.rows.shape[1]
-        if kind != np.float64 or nodal.ndim != 2 or nodal.shape[1] != space:
-            raise XfemError(
-                f"nodal values of shape {np.shape(nodal)}, {kind}; expected (N, {space}), float64"
-            )
-        if len(nodal) < self._mapping.shape[1]:
-            raise XfemError(
-                f"{len(nodal)} nodal values; expected at least {self._mapping.shape[1]}"
-            )
+        shape = f"(N ≥ {self._mapping.shape[1]}, {self.material.rows.shape[1]})"
+        fits = nodal.ndim == 2 and nodal.shape[1] == self.material.rows.shape[1]
+        if not fits or nodal.dtype != np.float64 or len(nodal) < self._mapping.shape[1]:
+            raise XfemError(f"nodal values {nodal.shape}, {nodal.dtype}; expected {shape}, float64")
 
     @property
     def _mapping(self) -> csr_array:
