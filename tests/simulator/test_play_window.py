@@ -5,7 +5,7 @@ import pytest
 from thesis_stages import CASES
 
 from verify.scene import load_scene
-from verify.simulator.sight import place_in_sight
+from verify.simulator.live_scalpel import place_in_sight
 from verify.simulator.stage_of_scene import stage_of
 from verify.simulator.surfaces import Picture
 from verify.simulator.window import PlayWindow

@@ -23,17 +23,16 @@ def gripped(phantom: PhantomMesh, hook: Hook) -> Ints:
     return on_side[away <= max(hook.radius, float(away.min()))]
 
 
-def held_unknowns(phantom: PhantomMesh, nodes: Bools, on_held: Bools | None = None) -> Bools:
+def held_unknowns(phantom: PhantomMesh, nodes: Bools, facets: Bools) -> Bools:
     """Dof nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
 
     The unknown of the material at a node is held. Another one there, of material beyond a cut, is
     held only if that material reaches a held facet: else a part that is cut free would hang on a
-    node that is no part of it. `on_held` is what `held_facets` gives, if it is known.
+    node that is no part of it. `facets` is what `held_facets` gives.
     """
     held = np.zeros(phantom.node_count, dtype=bool)
     held[: len(nodes)] = nodes
     sub = phantom.sub_cells
-    facets = held_facets(phantom.mesh, nodes) if on_held is None else on_held
     # of sub-simplices on held facets all corners but one lie on these
     away = sub.barycentric != 0.0
     part, facet = np.nonzero((away.sum(axis=1) == 1) & facets[phantom.parent[sub.piece]])
@@ -64,7 +63,7 @@ class Grips:
         Lumped masses: a force is shared in proportion, so that slivers get next to nothing.
     start : dict
         Displacement (N, s) at which each hook (by its number) has gripped.
-    facets : sequence of (m, d + 1) bool arrays, optional
+    facets : sequence of (m, d + 1) bool arrays
         `held_facets` of each hold; they do not change as the body is cut.
     """
 
@@ -75,12 +74,12 @@ class Grips:
         hooks: Sequence[Hook],
         weights: Floats,
         start: dict[int, Floats],
-        facets: Sequence[Bools] | None = None,
+        facets: Sequence[Bools],
     ) -> None:
         shape = (phantom.node_count, phantom.mesh.space)
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
         for k, hold in enumerate(holds):
-            at = held_unknowns(phantom, hold.nodes, None if facets is None else facets[k])
+            at = held_unknowns(phantom, hold.nodes, facets[k])
             for axis, value in zip(hold.components, hold.values, strict=True):
                 self._fixed[at, axis], self._values[at, axis] = True, value
         self._moved: list[tuple[Hook, Ints, Floats]] = []

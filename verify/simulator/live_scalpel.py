@@ -1,8 +1,12 @@
-"""A tool that is led by hand: points where it touches the body become a stroke, cut as it goes."""
+"""A tool led by hand: what it points at, strokes cut as it goes, and these as cuts of a case."""
+
+from pathlib import Path
 
 import numpy as np
 
 from verify.simulator.session import Session
+from verify.simulator.surfaces import Picture
+from verify.whole_files import write_whole
 from verify.xfem.arrays import Floats
 from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
@@ -76,3 +80,67 @@ class LiveScalpel:
             return here[None]
         reach = self.depth * np.asarray(towards, dtype=float) / np.linalg.norm(towards)
         return np.stack([here - reach, here + reach])
+
+
+def place_in_sight(picture: Picture, eye: Floats, towards: Floats) -> Floats | None:
+    """Find where a line of sight meets the skin first.
+
+    Parameters
+    ----------
+    picture : Picture
+    eye : (3,) float array
+        m; what lies behind it is not seen.
+    towards : (3,) float array
+
+    Returns
+    -------
+    (3,) float array or None
+        The place in the uncut body, m; None where only the faces of cuts, or nothing, are met.
+
+    Notes
+    -----
+    Intersection of a line with triangles by Möller and Trumbore, J. Graphics Tools 2 (1997) 21.
+    """
+    a, b, c = (picture.points[picture.triangles[:, k]] for k in range(3))
+    across = np.cross(towards, c - a)
+    volume = np.einsum("ij,ij->i", b - a, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = np.einsum("ij,ij->i", eye - a, across) / volume
+        normal = np.cross(eye - a, b - a)
+        v = normal @ towards / volume
+        distance = np.einsum("ij,ij->i", c - a, normal) / volume
+        met = np.flatnonzero((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance >= 0.0))
+    if len(met) == 0:
+        return None
+    first = met[np.argmin(distance[met])]
+    if picture.inner[first]:
+        return None
+    weights = np.array([1.0 - u[first] - v[first], u[first], v[first]])
+    return np.asarray(weights @ picture.material[picture.triangles[first]])
+
+
+def stroke_text(path: ToolPath, name: str = "stroke") -> str:
+    """Say a path of a straight blade as a ``[[cuts]]`` of kind ``tool_path``, in TOML."""
+    lines = ["[[cuts]]", 'kind = "tool_path"', f'name = "{name}"']
+    tips = path.blades[:, 0]
+    lines.append(f"points = {_table(tips)}")
+    lines.append(f"times = {_row(path.times)}")
+    if path.blades.shape[2] == 3:
+        blades = path.blades[:, -1] - tips
+        lengths = (blades**2).sum(axis=1) ** 0.5
+        lines.append(f"direction = {_table(blades)}")
+        lines.append(f"depth = {lengths.max():.9g}")
+    return "\n".join(lines) + "\n"
+
+
+def write_stroke(path: ToolPath, file: Path, name: str = "stroke") -> None:
+    """Write it into a file, in one step."""
+    write_whole(file, stroke_text(path, name))
+
+
+def _row(values) -> str:  # type: ignore[no-untyped-def]
+    return f"[{', '.join(repr(float(f'{value:.9g}')) for value in values)}]"
+
+
+def _table(rows) -> str:  # type: ignore[no-untyped-def]
+    return "[\n" + "".join(f"    {_row(row)},\n" for row in rows) + "]"

@@ -6,8 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
+from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
-from verify.simulator.body_parts import BodyParts
 from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips, gripped, held_facets
@@ -18,6 +18,8 @@ from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.internal_force import InternalForce
+from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
 
@@ -182,12 +184,15 @@ class Session:
 
     def _assemble(self) -> None:
         """Make the body anew as it is cut now, with what holds it from now on."""
-        phantom = self.cutter.phantom_mesh()
-        parts = BodyParts.of(self.stage, phantom, self._start, self._held)
-        body = parts.body(self._load)
-        body.force.prepare(body.pattern)
+        stage, phantom = self.stage, self.cutter.phantom_mesh()
+        mass = side_wise_mass(phantom, stage.density)
+        grips = Grips(phantom, stage.holds, stage.hooks, mass.weights, self._start, self._held)
+        force = InternalForce(phantom, stage.material, kernels=FAST)
+        weight = mass.weight(stage.gravity)
+        body = DynamicBody(force, mass, weight, self._load, grips.supports, stage.damping)
+        force.prepare(body.pattern)
         held = body.fixed.all(axis=1)  # these need not be solved for
-        self._follow(body, parts.grips, Cholesky(body.pattern, self.stage.mesh.space, held))
+        self._follow(body, grips, Cholesky(body.pattern, stage.mesh.space, held))
 
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
         """Move with another body from now on."""

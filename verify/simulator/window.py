@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 
 from verify.simulator.animation import Frame, beside, meshes_of, view_of
-from verify.simulator.live_scalpel import LiveScalpel
+from verify.simulator.live_scalpel import LiveScalpel, place_in_sight, write_stroke
 from verify.simulator.session import Session
-from verify.simulator.sight import place_in_sight
 from verify.simulator.stage import Stage
-from verify.simulator.stroke_file import write_stroke
 from verify.xfem.arrays import Floats
 
 _DEPTH = 0.05  # of the body's size: how far the blade reaches from where it touches

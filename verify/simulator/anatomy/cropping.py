@@ -4,13 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
 from verify.simulator.anatomy.base_mesh import BaseMesh
 from verify.simulator.anatomy.surface_file import border_loops
 from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.mesh import connected, neighbours_across
 
 _POINTS = 400  # on a border
 _SMOOTH = 6.0  # standard deviation along a border, in points of it
@@ -97,22 +96,14 @@ def _patch(points: Floats, triangles: Ints, wanted: Bools, seed: Floats, slope: 
     chosen = triangles[wanted]
     if len(chosen) == 0:
         raise InputError("nothing of the base mesh lies where the patch should be")
-    label = connected_components(_edge_links(chosen), directed=False)[1]
+    across = neighbours_across(chosen)
+    one, edge = np.nonzero(across >= 0)
+    label = connected(len(chosen), one, across[one, edge])
     middles = _middles(points, chosen)
     near = np.linalg.norm(middles[:, :2] - seed, axis=1)
     close = np.flatnonzero(near <= near.min() + 0.005)
     start = close[np.argmax(middles[close, 2])]
     return chosen[label == label[start]]
-
-
-def _edge_links(triangles: Ints) -> coo_array:
-    """Which triangles share an edge."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(triangles)), 3)
-    order = np.lexsort(edges.T)
-    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
-    first, second = owner[order[:-1][same]], owner[order[1:][same]]
-    return coo_array((np.ones(len(first)), (first, second)), shape=(len(triangles),) * 2)
 
 
 def _longest(points: Floats, triangles: Ints) -> Ints:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from verify.simulator.arrays.distinct import distinct
+from verify.simulator.arrays import distinct
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition

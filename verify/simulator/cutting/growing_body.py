@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from verify.simulator.arrays.distinct import distinct, ranges
-from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays import GrowingArray, distinct, ranges
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.patch import MeshPatch, PatchCutter
 from verify.simulator.cutting.point_numbers import PointNumbers
@@ -159,11 +158,6 @@ class GrowingBody:
         self.piece_label = GrowingArray(label)
         self.cut_count += 1
         return self.cut_count - 1
-
-    def split(self, candidates: Ints, cuts_near: CutsNear) -> Increment | None:
-        """Bring some cells up to date with the cuts; None if nothing changes."""
-        division = self.division(candidates, cuts_near)
-        return None if division is None else self.divide(division)
 
     def division(self, candidates: Ints, cuts_near: CutsNear) -> Division | None:
         """Find how some cells are to be divided, None if they are not; the body stays as it is.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verify.simulator.arrays.distinct import distinct, of_lists
+from verify.simulator.arrays import distinct, of_lists
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
 

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers
+from verify.simulator.arrays import GrowingArray, RowNumbers
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.zero_points import ZeroPoints
 

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.simulator.arrays.distinct import distinct
+from verify.simulator.arrays import distinct
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.arrays import Bools, Floats, Ints

@@ -1,11 +1,10 @@
 """Pieces of a growing body that no cut keeps apart, though planes of cuts divide them."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays import GrowingArray
 from verify.xfem.arrays import Bools, Ints
+from verify.xfem.mesh import connected
 
 
 class TiedParts:
@@ -37,7 +36,7 @@ class TiedParts:
 
     def parted(self, tied: Ints, old: Ints) -> Bools:
         """Which new pieces (p,) come from a part that is several by now."""
-        now = _components(len(old), tied)
+        now = connected(len(old), *tied.T)
         known = np.flatnonzero(old >= 0)
         before = np.unique(self._part.rows[old[known]], return_inverse=True)[1]
         pairs = np.unique(np.stack([before, now[known]]), axis=1)
@@ -59,14 +58,9 @@ class TiedParts:
         if len(tied) == 0:
             self._part.rows[place[place >= 0]] = place[place >= 0]
             return
-        now = _components(len(place), tied)
+        now = connected(len(place), *tied.T)
         stored = np.flatnonzero(place >= 0)
         leader = np.full(len(place), count)
         np.minimum.at(leader, now[stored], place[stored])
         self._part.rows[place[stored]] = leader[now[stored]]
         self.joint[cell[tied[:, 0]]] = True
-
-
-def _components(count: int, pairs: Ints) -> Ints:
-    graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)

@@ -8,11 +8,10 @@ with two new rims along a cut instead of inner facets.
 
 import numpy as np
 
-from verify.simulator.arrays.distinct import ranges
+from verify.simulator.arrays import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
-from verify.simulator.mapping.cut_elements import cut_elements, sub_simplices
 from verify.simulator.mapping.edge_points import EdgePoints
-from verify.simulator.mapping.exposed_kernels import exposed_facets
+from verify.simulator.mapping.exposed_kernels import cut_elements, exposed_facets, sub_simplices
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.arrays import Bools, Floats, Ints
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from verify.simulator.arrays.distinct import distinct
-from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays import GrowingArray, distinct
 from verify.simulator.cutting.point_numbers import NODES, NONE, PointNumbers
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError

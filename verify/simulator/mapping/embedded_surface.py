@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.simulator.arrays.distinct import distinct, of_lists, ranges
+from verify.simulator.arrays import distinct, of_lists, ranges
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers

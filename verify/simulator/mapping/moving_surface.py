@@ -11,8 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csr_array
 
-from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers
+from verify.simulator.arrays import GrowingArray, RowNumbers
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.errors import XfemError
 

@@ -1,1 +1,0 @@
-"""Arrays of integers: rows that are numbered, lists that are sorted, arrays that grow."""
