@@ -14,7 +14,7 @@ import pytest
 from verify.cli import main
 from verify.cli.parser import build_parser
 from verify.cli.solver_parameters import of_one_solver, of_solvers
-from verify.cli.streams import in_colour, print_line, printable_streams
+from verify.cli.streams import print_line, printable_streams
 from verify.cli.waiting import said_to_wait
 from verify.scene import list_cases, load_scene, load_scenes
 
@@ -117,12 +117,6 @@ def printed(monkeypatch, stream, line):
 def environment(monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-
-
-def test_the_first_verdict_of_a_line_has_a_colour_of_its_own():
-    assert in_colour("a  FAIL       1 PASS") == "a  \x1b[31mFAIL\x1b[0m       1 PASS"
-    assert in_colour("a  PASS") == "a  \x1b[32mPASS\x1b[0m"
-    assert in_colour("PASSED") == "PASSED"
 
 
 def test_only_a_terminal_gets_colours_and_no_escapes_of_others(monkeypatch):

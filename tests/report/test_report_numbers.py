@@ -44,20 +44,24 @@ def checked_error(value, half):
     )  # fmt: skip
 
 
-def test_an_error_that_is_not_above_its_uncertainty_is_no_number():
-    assert error_text(2e-3, 5e-3) == "not resolved (< 0.0070)"
+@pytest.mark.parametrize(
+    ("error", "uncertainty", "written"),
+    [
+        (2e-3, 5e-3, "not resolved (< 0.0070)"),
+        (0.0, 1.01e-3, "not resolved (< 0.0011)"),  # the bound is rounded up
+        (0.0, 9.91e-2, "not resolved (< 0.10)"),
+        (6e-3, 5e-3, "0.006000 ± 0.0050"),
+        (0.0, 0.0, "0"),
+        (float("nan"), 1e-3, number(float("nan"))),
+    ],
+)
+def test_an_error_that_is_not_above_its_uncertainty_is_no_number(error, uncertainty, written):
+    assert error_text(error, uncertainty) == written
+
+
+def test_nor_is_it_one_in_the_row_of_its_check():
     assert check_row(checked_error(2e-3, 5e-3))[1].text == "not resolved (< 0.0070)"
-    assert error_text(6e-3, 5e-3) == "0.006000 ± 0.0050"
     assert "[" in check_row(checked_error(6e-3, 5e-3))[1].text
-
-
-def test_the_bound_of_what_is_not_resolved_is_rounded_up():
-    assert error_text(0.0, 1.01e-3) == "not resolved (< 0.0011)"
-    assert error_text(0.0, 9.91e-2) == "not resolved (< 0.10)"
-
-
-def test_an_exact_zero_without_uncertainty_stays_a_number():
-    assert error_text(0.0, 0.0) == "0"
 
 
 def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
@@ -69,35 +73,28 @@ def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
     assert check_row(found)[1].text == "8.078759297"
 
 
+LEAST, MOST = (0.9, 0.5, 0.1), (1e3, 1e4, 1e6)
+
+
 @pytest.mark.parametrize(
-    ("value", "grade", "written"),
+    ("value", "limits", "grade", "written"),
     [
-        (1.0, "good", "1.0"),
-        (0.9, "good", "0.90"),
-        (0.8973, "fair", "0.897"),
-        (0.4968, "poor", "0.497"),
-        (0.34, "poor", "0.34"),
-        (0.0996, "bad", "0.0996"),
-        (9.7e-13, "bad", "9.7×10⁻¹³"),
-        (0.0, "bad", "0"),
+        (1.0, LEAST, "good", "1.0"),
+        (0.9, LEAST, "good", "0.90"),
+        (0.8973, LEAST, "fair", "0.897"),
+        (0.4968, LEAST, "poor", "0.497"),
+        (0.34, LEAST, "poor", "0.34"),
+        (0.0996, LEAST, "bad", "0.0996"),
+        (9.7e-13, LEAST, "bad", "9.7×10⁻¹³"),
+        (0.0, LEAST, "bad", "0"),
+        (1000.0, MOST, "good", "1000"),
+        (1004.0, MOST, "fair", "1004"),
+        (1.004e6, MOST, "bad", "1.004×10⁶"),
     ],
 )
-def test_a_graded_number_is_not_rounded_up_to_the_grade_that_it_misses(value, grade, written):
-    cell = graded(value, (0.9, 0.5, 0.1))
+def test_a_graded_number_is_not_rounded_to_a_grade_that_it_misses(value, limits, grade, written):
+    cell = graded(value, limits, most=limits is MOST)
     assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
-
-
-@pytest.mark.parametrize(
-    ("value", "grade", "written"),
-    [(1000.0, "good", "1000"), (1004.0, "fair", "1004"), (1.004e6, "bad", "1.004×10⁶")],
-)
-def test_a_graded_number_is_not_rounded_down_to_what_it_exceeds(value, grade, written):
-    cell = graded(value, (1e3, 1e4, 1e6), most=True)
-    assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
-
-
-def test_an_error_that_is_no_number_is_shown_as_none():
-    assert error_text(float("nan"), 1e-3) == number(float("nan"))
 
 
 def ranked(root, conformance=False):

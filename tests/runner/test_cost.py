@@ -5,7 +5,7 @@ import json
 import pytest
 
 from verify.cli import main
-from verify.cli.cost_text import case_lines, suites_line
+from verify.cli.cost_text import suites_line
 from verify.runner.cost import case_cost, solver_costs
 from verify.scene import list_cases, load_scenes
 from verify.solvers.body_of_scene import background_mesh
@@ -57,13 +57,6 @@ def test_unknowns_of_a_reference_lie_in_the_range_that_is_said(name, found):
         assert row.unknowns < unknowns < row.at_most
 
 
-def test_a_range_is_said_where_the_mesh_is_graded_and_one_number_where_it_is_known():
-    scene = load_scenes("statics/tissue_strip")[0]
-    own, reference = case_lines(case_cost(scene, ("xfem", "reference")))[:2]
-    assert " to " not in own
-    assert "3e3 to 2e4, " in reference
-
-
 def test_the_smallest_suite_comes_first():
     every = [scene for name in list_cases() for scene in load_scenes(name)]
     costs = [(scene, case_cost(scene, ("xfem",))) for scene in every]
@@ -71,16 +64,6 @@ def test_the_smallest_suite_comes_first():
     assert said.index("-k demo") < said.index("--quick")
     assert f"{sum('demo' in scene.tags for scene in every)} cases" in said
     assert suites_line([], jobs=2) == ""
-
-
-def test_check_says_which_suite_comes_first_where_nothing_was_ever_run(
-    tmp_path, case_text, capsys, monkeypatch
-):
-    (tmp_path / "case.toml").write_text(case_text)
-    for cache, first in ((tmp_path / "none", True), (tmp_path, False)):
-        monkeypatch.setenv("VERIFY_CACHE", str(cache))
-        assert main(["check", str(tmp_path / "case.toml")]) == 0
-        assert ("-k demo" in capsys.readouterr().out) == first
 
 
 def test_the_command_says_it_of_a_file(tmp_path, case_text, capsys):

@@ -1,15 +1,12 @@
 """Cases drawn while others are solved: the page is the one that `verify report` renders later."""
 
 import os
-import pickle
 import signal
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from verify.report import render, rendering
-from verify.report.figures.style import Palette
 from verify.runner import Options, RunStoppedError, drawing, run_cases
 from verify.scene import load_scene
 
@@ -53,21 +50,6 @@ def test_what_was_not_drawn_to_its_end_is_drawn_by_the_report(drawn, tmp_path):
     alone = render(run).read_bytes()
     half = (drawings / "one.pickle").read_bytes()
     (tmp_path / "one.pickle").write_bytes(half[: len(half) // 2])
-    assert render(run, tmp_path).read_bytes() == alone
-
-
-def test_a_case_that_was_drawn_in_other_colours_is_drawn_again(drawn, tmp_path):
-    """Its process did not know of a solver that the page has before it."""
-    run, drawings = drawn
-    alone = render(run).read_bytes()
-    one = pickle.loads((drawings / "one.pickle").read_bytes())
-    palette = Palette.of(["a solver that came later", "b:B"])
-    one.view.title = "in other colours"
-    other = replace(one, styles={"b:B": palette["a solver that came later"]})
-    (tmp_path / "one.pickle").write_bytes(pickle.dumps(other))
-    assert render(run, tmp_path).read_bytes() != alone  # the first that is no known one
-    other = replace(one, styles={"b:B": palette["b:B"]})
-    (tmp_path / "one.pickle").write_bytes(pickle.dumps(other))
     assert render(run, tmp_path).read_bytes() == alone
 
 

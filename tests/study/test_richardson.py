@@ -54,6 +54,7 @@ def of_slopes(*slopes):
         # steady slopes; each error is known to a fifth, the slope between two to .4 / log 2
         ([0.4, 0.2, 0.1], [0.08, 0.04, 0.02],
          "floor: slopes 1.00, 1.00, which the uncertainty of the comparison leaves open by 0.58"),
+        (of_slopes(1.0, 0.95), 0.2 * of_slopes(1.0, 0.95), "floor"),  # nor is a fall within it one
         ([0.1, 0.2, 0.3, 0.4], 0.0, "diverging"),
         ([0.1, 0.05, 0.07, 0.01], 0.0, "oscillating"),
         # a tip that lies elsewhere in its element on every level

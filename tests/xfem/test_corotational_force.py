@@ -14,11 +14,7 @@ from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.polar import (
-    largest_eigenvector,
-    nearest_rotations,
-    rotations_in_space,
-)
+from verify.xfem.polar import largest_eigenvector, nearest_rotations, rotations_in_space
 from verify.xfem.structured_meshes import rectangle_mesh
 
 
