@@ -1,36 +1,63 @@
 """Compact XFEM solver for cutting soft tissue: arrays in, arrays out.
 
 It knows no scene, no file format and no other solver, and needs numpy, scipy and numba only.
-Its parts are layers (`make check` tests that none imports one above it). In an order of
-reading:
+Alternatives of other authors are in `verify.methods`. Numbers in brackets such as (2.48) are
+equations of the thesis that ``docs/theory/xfem.md`` cites; the page derives what the code does.
 
+Words that docstrings take for granted:
+
+cell
+    a simplex of the uncut mesh; a *facet* is a side of one, a point, segment or triangle
+zero point
+    where the level set of a cut, linear on an edge, is zero
+piece, cut-cell part
+    what the cuts leave of a cell on one side; a cell that no cut splits is one piece. Its *label*
+    tells the side of each cut (±1), 0 where the cut does not split it. Pieces that no cut keeps
+    apart (cuts that end on one another leave some) share all dof nodes and are one *part*
+dof node, unknown
+    one displacement vector. A node of the mesh has one for each piece of material around it that
+    the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes
+sliver
+    a piece with a small share in the volume of its cell
+corner
+    a node of a piece. It is a dof node, unless slivers are aggregated: then some corners *follow*
+    the linear field of a *root*, a piece that is no sliver, and have no unknown of their own
+membrane
+    triangles in space, without bending stiffness
+
+Shapes of arrays: n nodes, m cells, p pieces, N dof nodes, B blocks of a matrix, d components of a
+displacement; d + 1 is also the number of corners of a simplex of dimension d.
+
+The parts are layers (`make check` tests that none imports one above it). In an order of reading:
+
+`errors`, `arrays`
+    what is raised; types of arrays, and checks of what a user gives
 `mesh`, `structured_meshes`
-    simplices
-`cuts`, `faceted_cuts`, `tool_path`
-    what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
+    simplices, their neighbours and gradients
+`faceted_cuts`, `tool_path`, `cuts`
+    what a cut is: a polyline, a triangulated surface, what a tool sweeps, a plane or polygon.
+    Begin with the docstring of `cuts`: the solver asks a cut two things only
 `zero_points`, `clip`, `crossing`, `pieces`
     exact division of cells at zero points of level sets; parts of the cells that cuts go through
 `join`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
-`elasticity`, `loads`, `supports`, `mass`
-    material, load vectors, prescribed displacements; masses, side-wise and consistent
-`polar`, `element`, `block_pattern`, `internal_force`
+`elasticity`, `loads`, `supports`
+    material, load vectors, prescribed displacements
+`polar`, `element`, `block_pattern`, `linear_solvers`, `internal_force`
     nearest rotations; force and tangents of an element, linear elasticity being R = I; sparsity
-    and supports; force, energy and stiffness of a body
-`linear_solvers`
-    SciPy behind one protocol, and the operations that `verify.accelerated` replaces
+    and supports in a matrix; SciPy behind one protocol, and the operations that
+    `verify.accelerated` replaces; force, energy and stiffness of a body
 `statics`, `static_newton`, `rigid_motion`, `equilibrium`
     linear statics; Newton's method on the potential energy and load steps at finite rotation
-`body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
-    a body in motion, its energies and its schemes; the state of a body that is cut on the way
+`mass`, `body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
+    masses, side-wise and consistent; a body in motion, its energies and its schemes; the state of
+    a body that is cut on the way
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
-    policies for parts with a small share of their element
+    policies for slivers
 `bases`, `critical_step`, `subdivision`
     other bases of the same space; largest step of explicit schemes; the cut body as a conforming
     mesh
-`errors`
-    what is raised, and checks of what a user gives
 
 Example
 -------

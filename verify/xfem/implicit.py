@@ -53,7 +53,7 @@ class NewtonIntegrator(ABC):
 
     rate: float  # γ: 1 for implicit Euler, 2 for schemes centred in the step
     share: float  # derivative of the forces used with respect to those at the end
-    weight: float | None = None  # h² times the inertia used, by M u₁; without one γ
+    weight: float | None = None  # derivative of h² times the inertia by M u₁; None: γ
     tolerance = 1e-10
     iterations = 80
 

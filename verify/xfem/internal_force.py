@@ -109,7 +109,7 @@ class InternalForce:
 
     @property
     def has_one_pass(self) -> bool:
-        """Whether `linearise` takes the one pass of the kernels: of tetrahedra that follow none."""
+        """Whether `linearise` takes the one pass of the kernels: tetrahedra, none aggregated."""
         solid = self.phantom.mesh.dim == 3 and self.phantom.aggregation is None
         return solid and self.kernels.one_pass is not None
 

@@ -28,7 +28,7 @@ class SubCells:
     Attributes
     ----------
     piece : (k,) int array
-        Virtual cell of each.
+        Piece to which each belongs.
     points : (k, d + 1) int array
         Numbers of the vertices; equal numbers are equal points, mesh nodes keep theirs.
     barycentric : (k, d + 1, d + 1) float array

@@ -1,5 +1,7 @@
 """Points where edges cross the zero sets of the cuts, one number each for the whole mesh.
 
+`verify.xfem.clip` divides cells at them.
+
 An edge is a pair of numbered points: mesh nodes, or zero points of cuts applied before. Asking
 twice for the same edge and cut gives the same number, so that neighbouring elements agree on the
 position, and on the sign of every other cut there, to the last bit.
@@ -36,7 +38,7 @@ class ZeroPoints:
     cut : (k,) int array
         Cut of each zero point.
     turn : (k,) int array
-        When a division of cells first used each zero point, counting `divided`.
+        Number of the division of cells that used each zero point first; `divided` counts them.
     """
 
     def __init__(self, positions: Floats, values: Floats, snap: float) -> None:
