@@ -182,7 +182,7 @@ def _linearise(
 ):  # fmt: skip
     """Write force and tangent of a displacement; return the cells without rotational part."""
     left_out = 0
-    row = begun = 0
+    row = begun = np.int64(0)
     d = np.empty((3, 3))
     force[:] = 0.0
     for batch in range(len(constants)):

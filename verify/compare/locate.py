@@ -109,7 +109,7 @@ class SolutionField:
             return self._on_surface(points, near)[0]
         points = np.ascontiguousarray(points, dtype=float)
         directions = np.zeros((0, points.shape[1])) if near is None else near - points
-        found: NDArray[np.int64] = find_cells(
+        return find_cells(
             points,
             np.ascontiguousarray(directions),
             self._wanted(points, near),
@@ -117,7 +117,6 @@ class SolutionField:
             self._sides,
             ROUND_OFF * self.scale,
         )
-        return found
 
     def _on_surface(
         self, points: Array, near: Array | None = None

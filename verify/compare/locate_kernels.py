@@ -4,11 +4,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.compare.cell_tree import SearchedCells
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _depth(x, normals, corners):
     """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
     d = x.shape[0]
@@ -36,7 +38,7 @@ def segment_distance2(x, a, b):
     return distance2
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _outside_distance2(x, normals, corners):
     """Squared distance to a simplex of a point outside of it."""
     d = x.shape[0]
@@ -56,7 +58,7 @@ def _outside_distance2(x, normals, corners):
     return best
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _is_over(x, height, facet, normals, corners):
     """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
     for other in range(4):
@@ -79,7 +81,7 @@ def _is_over(x, height, facet, normals, corners):
     return True
 
 
-@njit(cache=True)
+@njit(inline="always")
 def allowed(wish, side):
     """Whether sides of cuts do not contradict those that are wished for; 0 is either side."""
     agreed = True
@@ -89,14 +91,13 @@ def allowed(wish, side):
     return agreed
 
 
-@njit(cache=True)
-def _containing(x, direction, sided, wish, searched, sides, tolerance):
+@njit(inline="always")
+def _containing(x, direction, sided, wish, searched, sides, tolerance, stack):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     lower, upper, cells, corners, normals, centres = searched
     d = x.shape[0]
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack = np.empty(64, dtype=np.int64)
     stack[0], top = 1, 1
     best, best_depth, best_side = -1, -np.inf, False
     while top > 0:
@@ -133,13 +134,12 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance):
     return best
 
 
-@njit(cache=True)
-def _nearest(x, wish, searched, sides):
+@njit(inline="always")
+def _nearest(x, wish, searched, sides, stack):
     """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
     lower, upper, cells, corners, normals, _ = searched
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack = np.empty(64, dtype=np.int64)
     stack[0], top = 1, 1
     best, best2 = -1, np.inf
     while top > 0:
@@ -181,46 +181,49 @@ def box_distance2(x, lower, upper):
     return distance2
 
 
-@njit(cache=True)
-def find_cells(points, directions, wanted, searched, sides, tolerance):
+def find_cells(
+    points: Floats,
+    directions: Floats,
+    wanted: NDArray[np.int8],
+    searched: SearchedCells,
+    sides: NDArray[np.int8],
+    tolerance: float,
+    nearest: bool = True,
+) -> Ints:
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
     `directions` is (n, d), or (0, d) where no side is wanted. `wanted` (n, c) is the side of c
     cuts, −1, 1 or 0 (either), that the cell must lie on, and `sides` (m, c) the one that each cell
     lies on, 0 if unknown; `searched` is as `SearchedCells`. A point whose wish no cell fulfils
-    gets what it would without one.
+    gets what it would without one. A point that no cell holds within `tolerance` gets the
+    `nearest` one, or −1.
     """
-    n = points.shape[0]
-    found = np.empty(n, dtype=np.int64)
-    sided = directions.shape[0] == n
-    nowhere, either = np.zeros(points.shape[1]), np.zeros(wanted.shape[1], dtype=wanted.dtype)
-    for i in range(n):
-        direction = directions[i] if sided else nowhere
-        wish = wanted[i]
-        for _ in range(2):
-            cell = _containing(points[i], direction, sided, wish, searched, sides, tolerance)
-            if cell < 0:
-                cell = _nearest(points[i], wish, searched, sides)
-            if cell >= 0:
-                break
-            wish = either
-        found[i] = cell
+    found, stack = np.full(len(points), -1), np.empty(64, dtype=np.int64)
+    some = directions if len(directions) == len(points) else points
+    either = np.zeros(wanted.shape[1], dtype=wanted.dtype)
+    _find_cells(
+        points, some, some is directions, wanted, either, searched, sides, tolerance, nearest,
+        found, stack,
+    )  # fmt: skip
     return found
 
 
 @njit(cache=True)
-def holding_cells(points, searched, tolerance):
-    """Find the cell (n,) that holds each point (n, d), within `tolerance`; −1 where none does."""
-    n, d = points.shape
-    found, nowhere = np.empty(n, dtype=np.int64), np.zeros(d)
-    no_wish, no_sides = (
-        np.zeros(0, dtype=np.int8),
-        np.zeros((len(searched.corners), 0), dtype=np.int8),
-    )
-    sided = np.bool_(False)  # as a constant it would have the search compiled once more
-    for i in range(n):
-        found[i] = _containing(points[i], nowhere, sided, no_wish, searched, no_sides, tolerance)
-    return found
+def _find_cells(
+    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, found, stack
+):
+    for i in range(len(points)):
+        wish = wanted[i]
+        for _ in range(2):
+            cell = _containing(
+                points[i], directions[i], sided, wish, searched, sides, tolerance, stack
+            )
+            if cell < 0 and nearest:
+                cell = _nearest(points[i], wish, searched, sides, stack)
+            if cell >= 0 or not nearest:
+                break
+            wish = either
+        found[i] = cell
 
 
 @njit(cache=True)

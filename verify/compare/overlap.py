@@ -21,7 +21,7 @@ from verify.compare.deformed import (
     is_glued,
 )
 from verify.compare.locate import SolutionField
-from verify.compare.locate_kernels import holding_cells
+from verify.compare.locate_kernels import find_cells
 from verify.compare.overlap_kernels import (
     facet_distances,
     first_exits,
@@ -204,11 +204,12 @@ class OverlapSearch:
         return found
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
-        found: NDArray[np.int64] = holding_cells(
-            np.ascontiguousarray(points), cells.tree.over(cells.shape.corners, cells.shape.normals),
-            _INSIDE * self._size,
+        no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(cells.nodes))]
+        searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
+        return find_cells(
+            np.ascontiguousarray(points), points[:0], no_sides[0], searched, no_sides[1],
+            _INSIDE * self._size, nearest=False,
         )  # fmt: skip
-        return found
 
 
 def _smallest_height(corners: Array) -> Array:

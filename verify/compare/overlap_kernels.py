@@ -7,14 +7,14 @@ the material. `lower`, `upper` and `cells` are a tree, see `verify.compare.cell_
 import numpy as np
 from numba import njit
 
-from verify.compare.locate_kernels import box_distance2, segment_distance2
+from verify.compare.locate_kernels import Floats, Ints, box_distance2, segment_distance2
 
 # A ray through an edge must not slip between two facets.
 _EDGE = 1e-9
 _MOST = 128  # parts that a tetrahedron has at most when four planes have cut it: 3⁴
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _meets_box(x, way, low, high):
     """Whether the ray x + t way, t ≥ 0, meets a box."""
     first, last = 0.0, np.inf
@@ -29,7 +29,7 @@ def _meets_box(x, way, low, high):
     return first <= last + slack
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _crossing(x, way, facet):
     """Parameter t at which the line x + t way crosses a facet, or −1."""
     if x.shape[0] == 2:
@@ -57,19 +57,26 @@ def _crossing(x, way, facet):
     return t / det if u >= -_EDGE and v >= -_EDGE and u + v <= 1.0 + _EDGE else -1.0
 
 
-@njit(cache=True)
-def first_exits(points, ways, lower, upper, cells, facets, normals):
+def first_exits(
+    points: Floats, ways: Floats, lower: Floats, upper: Floats, cells: Ints, facets: Floats,
+    normals: Floats,
+) -> tuple[Floats, Ints]:  # fmt: skip
     """Distance (n,) to the first facet through which a ray leaves material, and which (n,).
 
     Facets through which it enters are passed; infinite and −1 where it leaves nothing. `ways`
     (n, d) are unit vectors, `facets` is (f, d, d), `normals` (f, d).
     """
-    n = points.shape[0]
-    distance, which = np.full(n, np.inf), np.full(n, -1, dtype=np.int64)
+    distance, which = np.full(len(points), np.inf), np.full(len(points), -1)
+    stack = np.empty(64, dtype=np.int64)
+    _first_exits(points, ways, lower, upper, cells, facets, normals, stack, distance, which)
+    return distance, which
+
+
+@njit(cache=True)
+def _first_exits(points, ways, lower, upper, cells, facets, normals, stack, distance, which):
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack = np.empty(64, dtype=np.int64)
-    for i in range(n):
+    for i in range(len(points)):
         stack[0], top = 1, 1
         while top > 0:
             top -= 1
@@ -92,7 +99,6 @@ def first_exits(points, ways, lower, upper, cells, facets, normals):
                 t = _crossing(points[i], ways[i], facets[facet])
                 if 0.0 <= t < distance[i]:
                     distance[i], which[i] = t, facet
-    return distance, which
 
 
 @njit(cache=True)
@@ -121,26 +127,35 @@ def _facet_distance2(x, facet, normal):
     return height * height
 
 
-@njit(cache=True)
-def facet_distances(points, which, facets, normals):
+def facet_distances(points: Floats, which: Ints, facets: Floats, normals: Floats) -> Floats:
     """Distance (n,) of each point to one facet, `which` (n,); infinite for facet −1."""
-    found = np.full(points.shape[0], np.inf)
-    for i in range(points.shape[0]):
-        if which[i] >= 0:
-            facet, normal = facets[which[i]], normals[which[i]]
-            found[i] = np.sqrt(_facet_distance2(points[i], facet, normal))
+    found = np.full(len(points), np.inf)
+    _facet_distances(points, which, facets, normals, found)
     return found
 
 
 @njit(cache=True)
-def nearest_before(points, lower, upper, cells, facets, normals):
+def _facet_distances(points, which, facets, normals, found):
+    for i in range(len(points)):
+        if which[i] >= 0:
+            facet, normal = facets[which[i]], normals[which[i]]
+            found[i] = np.sqrt(_facet_distance2(points[i], facet, normal))
+
+
+def nearest_before(
+    points: Floats, lower: Floats, upper: Floats, cells: Ints, facets: Floats, normals: Floats
+) -> Ints:
     """Nearest facet (n,) that has a point on its inner side; −1 where none has."""
-    n = points.shape[0]
-    found = np.full(n, -1, dtype=np.int64)
+    found, stack = np.full(len(points), -1), np.empty(64, dtype=np.int64)
+    _nearest_before(points, lower, upper, cells, facets, normals, stack, found)
+    return found
+
+
+@njit(cache=True)
+def _nearest_before(points, lower, upper, cells, facets, normals, stack, found):
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack = np.empty(64, dtype=np.int64)
-    for i in range(n):
+    for i in range(len(points)):
         best2 = np.inf
         stack[0], top = 1, 1
         while top > 0:
@@ -167,10 +182,9 @@ def nearest_before(points, lower, upper, cells, facets, normals):
                     distance2 = _facet_distance2(points[i], facets[facet], normals[facet])
                     if distance2 < best2:
                         best2, found[i] = distance2, facet
-    return found
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _measure(simplex):
     """Area or volume of a simplex, whatever its orientation."""
     if len(simplex) == 3:
@@ -194,7 +208,7 @@ def _write_corner(simplex, depth, i, j, corner):
         corner[a] = simplex[i, a] + share * (simplex[j, a] - simplex[i, a])
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _kept(simplex, depth, order, parts, count):
     """Append to `parts` the part of a simplex where a linear function is positive.
 
@@ -255,23 +269,21 @@ def _apart(one, other, inward, tolerance):
     return False
 
 
-@njit(cache=True)
-def _common(one, other, inward, tolerance):
+@njit(inline="always")
+def _common(one, other, inward, tolerance, depth, order, room):
     """Area or volume of what two simplices have in common, less a layer of thickness `tolerance`.
 
     `inward` (d + 1, d) are the unit normals of the facets of `other` opposite to its corners.
     """
     size, d = one.shape
-    parts, cut = np.empty((_MOST, size, d)), np.empty((_MOST, size, d))
+    parts, cut = room[0], room[1]
     for i in range(size):
         for a in range(d):
             parts[0, i, a] = one[i, a]
-    none = np.int64(0)  # as a constant it would have `_kept` compiled once more
-    count = none + 1
-    depth, order = np.empty(size), np.empty(size, dtype=np.int64)
+    count = 1
     for facet in range(size):
         on_it = other[(facet + 1) % size]
-        kept = none
+        kept = 0
         for p in range(count):
             for i in range(size):
                 depth[i] = -tolerance
@@ -279,33 +291,51 @@ def _common(one, other, inward, tolerance):
                     depth[i] += inward[facet, a] * (parts[p, i, a] - on_it[a])
             kept = _kept(parts[p], depth, order, cut, kept)
         parts, cut, count = cut, parts, kept
-        if count == 0:
-            return 0.0
     total = 0.0
     for p in range(count):
         total += _measure(parts[p])
     return total
 
 
-@njit(cache=True)
-def overlapping(seeds, lower, upper, cells, low, high, corners, inward, tolerance):
+def overlapping(
+    seeds: Ints, lower: Floats, upper: Floats, cells: Ints, low: Floats, high: Floats,
+    corners: Floats, inward: Floats, tolerance: float,
+) -> float:  # fmt: skip
     """Area or volume that is covered twice by simplices around the `seeds` (s,).
 
     Starting from the seeds, neighbours of cells that overlap another are looked at as well, so
     that every cell of a connected region of overlap is met. `low` and `high` (m, d) are the boxes
     of the cells, `corners` (m, d + 1, d), `inward` their facets' unit normals.
     """
+    seen = np.zeros(len(low), dtype=np.int64)
+    waiting, near, stack = np.empty((3, max(len(low), 64)), dtype=np.int64)
+    size, d = corners.shape[1:]
+    depth, order, room = (
+        np.empty(size),
+        np.empty(size, dtype=np.int64),
+        np.empty((2, _MOST, size, d)),
+    )
+    return float(
+        _overlapping(
+            seeds, lower, upper, cells, low, high, corners, inward, tolerance,
+            seen, waiting, near, stack, depth, order, room,
+        )
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _overlapping(
+    seeds, lower, upper, cells, low, high, corners, inward, tolerance,
+    seen, waiting, near, stack, depth, order, room,
+):  # fmt: skip
     d = low.shape[1]
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    seen = np.zeros(low.shape[0], dtype=np.bool_)
-    waiting = np.empty(low.shape[0], dtype=np.int64)
     begun = ended = 0
     for seed in seeds:
         if not seen[seed]:
-            seen[seed], waiting[ended] = True, seed
+            seen[seed], waiting[ended] = 1, seed
             ended += 1
-    stack, near = np.empty(64, dtype=np.int64), np.empty(low.shape[0], dtype=np.int64)
     total = 0.0
     while begun < ended:
         one = waiting[begun]
@@ -334,11 +364,13 @@ def overlapping(seeds, lower, upper, cells, low, high, corners, inward, toleranc
             if other == one or _apart(corners[one], corners[other], inward[other], tolerance):
                 continue
             if not _apart(corners[other], corners[one], inward[one], tolerance):
-                own += _common(corners[one], corners[other], inward[other], tolerance)
+                own += _common(
+                    corners[one], corners[other], inward[other], tolerance, depth, order, room
+                )
         total += 0.5 * own
         if own > 0.0:
             for k in range(around):
                 if not seen[near[k]]:
-                    seen[near[k]], waiting[ended] = True, near[k]
+                    seen[near[k]], waiting[ended] = 1, near[k]
                     ended += 1
     return total
