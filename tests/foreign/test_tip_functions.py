@@ -13,8 +13,7 @@ from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
 from verify.result_files import read_result
 from verify.scene import load_scene, scene_content
-from verify.study.measured_scenes import measured_scenes
-from verify.study.variants import variant_of
+from verify.study.measured_scenes import measured_scenes, variant_of
 
 
 @pytest.fixture

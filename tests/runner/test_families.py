@@ -17,7 +17,7 @@ from verify.runner.families import Families
 from verify.runner.selection import select_cases
 from verify.scene import load_scene, load_scenes, loading
 from verify.solvers import named
-from verify.study.variants import variant_of
+from verify.study.measured_scenes import variant_of
 
 ROWS = "\n[parameters]\nepsilon = [0.5, 0.0]\n"
 CHECK = """

@@ -23,11 +23,10 @@ from verify.assess.stress_intensity import exact_intensity
 from verify.assess.time_to_accuracy import time_to_accuracy
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import body_rule
-from verify.compare.errors import ERRORS, Rules
+from verify.compare.errors import ERRORS, NEAR, Rules, near_radius
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
-from verify.compare.near_tip import NEAR, near_radius
 from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy

@@ -4,6 +4,7 @@ Slivers of ε = 1e-12 make the raw condition number 1e24: its smallest eigenvalu
 inverse of the matrix scaled by its diagonal, whose own condition number is small.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from verify.errors import InputError
-from verify.system import System
+from verify.scene import Scene
+from verify.system import System, checked_system
 
 CONDITION, SCALED = "condition number", "condition number scaled by the diagonal"
 STEP = "critical explicit step"
@@ -149,3 +151,18 @@ def _free(matrix: Any, system: System) -> _Floats:
         raise InputError(f"{len(free)} free unknowns; at most {_LARGEST} for a dense matrix")
     dense: _Floats = matrix[free][:, free].toarray()
     return 0.5 * (dense + dense.T)
+
+
+def with_uncut_twin(
+    system: Any, scene: Scene, level: int, parameters: Mapping[str, Any]
+) -> tuple[System, System]:
+    """Return the systems of a scene and of its uncut body, as the hook `system` of a solver gives.
+
+    Raises
+    ------
+    UnsupportedSceneError, InputError
+        If the solver refuses one of them, or hands over no system.
+    """
+    whole = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
+    own, uncut = (checked_system(system(one, level, **parameters)) for one in (scene, whole))
+    return own, uncut

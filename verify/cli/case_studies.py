@@ -88,7 +88,7 @@ def iterations(arguments: argparse.Namespace, announce: Announce) -> "Iterations
     """Solve a motion by every number of iterations and substeps."""
     from verify.scene import load_scene
     from verify.study.iterations import Grid, iterations_study
-    from verify.study.variants import variant_of
+    from verify.study.measured_scenes import variant_of
 
     truth = arguments.truth or f"{arguments.solver} step=solved"
     grid = Grid(arguments.iterations, arguments.substeps, tuple(arguments.names), arguments.most)

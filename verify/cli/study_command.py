@@ -61,8 +61,8 @@ def _over_scenes(arguments: argparse.Namespace, announce: Callable[[str], None])
     """Run the study of slivers or of energy over the cases and solvers that are asked for."""
     from verify.runner.selection import select_cases
     from verify.study.energy import energy_study
+    from verify.study.measured_scenes import variant_of
     from verify.study.slivers import sliver_study
-    from verify.study.variants import variant_of
 
     slivers = arguments.study == "slivers"
     cases = arguments.cases or (["slivers/*"] if slivers else [])

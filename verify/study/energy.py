@@ -10,12 +10,12 @@ from verify.scene import Scene, scene_content
 from verify.study.measured_scenes import (
     MeasuredStudy,
     Measurement,
+    Variant,
     measured_families,
     measured_scenes,
     missing_solutions,
 )
 from verify.study.record import Finding
-from verify.study.variants import Variant
 
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see
 _KEPT = 1e-8

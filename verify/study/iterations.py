@@ -18,8 +18,8 @@ from verify.errors import InputError
 from verify.result import SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution, handed_over
+from verify.study.measured_scenes import Variant
 from verify.study.record import Finding, Study
-from verify.study.variants import Variant
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,9 @@
 """Scenes solved by a variant of a solver in this process, and read by the comparison."""
 
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,47 @@ from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
-from verify.solvers import Solver
+from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import checked_refusal
+from verify.solvers.named import one_name, parameters_in, solver_in
 from verify.study.in_processes import in_processes
 from verify.study.record import Finding, Study
-from verify.study.variants import Variant
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A solver with parameters; `label` is how it was asked for."""
+
+    label: str
+    solver: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    def found(self) -> Solver:
+        """Find the solver; a class of the user's own from where the study was started.
+
+        Raises
+        ------
+        InputError
+            If there is no such solver.
+        """
+        if ":" in self.solver and os.getcwd() not in sys.path:
+            sys.path.append(os.getcwd())
+        return find_solver(self.solver)
+
+
+def variant_of(text: str) -> Variant:
+    """Read ``"xfem slivers=merge mass=consistent"``.
+
+    Raises
+    ------
+    InputError
+        If the solver, one of its parameters or the form is unknown.
+    """
+    label = one_name(text)
+    variant = Variant(label, solver_in(label), parameters_in(label))
+    check_parameters(variant.solver, variant.found(), variant.parameters)
+    return variant
+
 
 # quantity, unit, value, reason and, if the case states one, limit
 Row = tuple[str, str, float | None, str] | tuple[str, str, float | None, str, float]

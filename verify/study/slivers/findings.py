@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import linregress
 from scipy.stats import t as student
 
 from verify.assess.system_numbers import CONDITION, FREQUENCY, SCALED, STEP
@@ -53,19 +54,15 @@ def growth(sizes: Sequence[float], values: Sequence[float | None], below: float 
         text = f"{len(good)} positive values at ε ≤ {below:g}; a fit with its uncertainty needs 3"
         return Growth(None, 0.0, len(good), text)
     x, y = np.log(np.array(good)).T
-    centred = x - x.mean()
-    slope = float(centred @ y / (centred @ centred))
-    residual = y - y.mean() - slope * centred
-    free = len(x) - 2
-    scatter = np.sqrt(residual @ residual / free / (centred @ centred))
-    width = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, free) * scatter)
+    line = linregress(x, y)
+    width = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, len(x) - 2) * line.stderr)
     local = np.diff(y) / np.diff(x)
     spread = 0.5 * float(np.ptp(local))
     if spread > _WANDERING:
         text = f"no single exponent: local slopes from {local.min():.2f} to {local.max():.2f}"
         return Growth(None, spread, len(good), text)
     note = f"without a value at ε = {', '.join(f'{s:g}' for s in bad)}" if bad else ""
-    return Growth(slope, max(width, spread), len(good), note)
+    return Growth(float(line.slope), max(width, spread), len(good), note)
 
 
 NEAR = 1e-2  # ε up to which an error shall be that at ε = 0

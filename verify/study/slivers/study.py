@@ -15,6 +15,7 @@ from verify.assess.system_numbers import (
     condition_numbers,
     critical_step,
     lowest_frequency,
+    with_uncut_twin,
 )
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
@@ -23,13 +24,12 @@ from verify.solvers import Solver
 from verify.study.measured_scenes import (
     MeasuredStudy,
     Measurement,
+    Variant,
     measured_families,
     measured_scenes,
 )
 from verify.study.slivers.findings import findings, growth
 from verify.study.slivers.step_by_running import step_by_running
-from verify.study.uncut_twin import with_uncut_twin
-from verify.study.variants import Variant
 
 _FITTED = (CONDITION, SCALED, STEP)
 Row = tuple[str, str, float | None, str]

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from verify.assess.system_numbers import condition_numbers, critical_step
+from verify.assess.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
-from verify.study.uncut_twin import with_uncut_twin
-from verify.study.variants import variant_of
+from verify.study.measured_scenes import variant_of
 
 _METHODS = (
     "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
