@@ -17,6 +17,7 @@ from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -89,6 +90,18 @@ def test_a_turning_body_does_not_feel_the_penalty(dim):
     # round-off of λ + 2μ over elements of size one
     assert np.abs(force_).max() < 1e-10
     assert energy < 1e-12
+
+
+def test_the_penalty_of_a_kink_is_that_of_its_definition():
+    """u = e max(x − ½, 0) bends across one facet, on both sides of the cut: γ (λ + 2μ) h A e²."""
+    mesh = rectangle_mesh((4, 4))
+    x, y = mesh.points.T
+    mesh = SimplexMesh(np.column_stack([np.where(x > 0.5, 2.0 * x - 0.5, x), y]), mesh.cells)
+    v = cut_mesh(mesh, [Plane([0.5, 0.6], [0.0, 1.0])])
+    bent = 0.01 * np.maximum(v.node_points - 0.5, 0.0) * [1.0, 0.0]
+    modulus, height = 1e4 * 0.7 / (1.3 * 0.4), 0.5 * (0.25 + 0.5)
+    energy = GhostPenalty(v, material(2), 0.1).force(bent)[1]
+    assert energy == pytest.approx(0.1 * modulus * height * 0.25 * 0.01**2, rel=1e-12)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
