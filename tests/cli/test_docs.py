@@ -10,6 +10,7 @@ from command_line import run_here
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = ["guide/write-a-case.md", "guide/cli.md"]
+ELSEWHERE = {"verify doctor"}  # what it finds is held in tests/install
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -35,7 +36,7 @@ def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
     )
     lines = [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
     assert len(lines) >= 3
-    for line in lines:
+    for line in [line for line in lines if line not in ELSEWHERE]:
         done = run(line, tmp_path)
         # cli.md runs the example without its reference: its verdicts stay undecided, code 0
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"

@@ -4,10 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scenes
 from reference_scenes import needs_fenicsx
 
 from reference.exact import exact_solution
-from verify.scene import Material, Scene
+from verify.scene import Material
 from verify.solvers import find_solver
 
 # λ = μ = 1, ρ = 1: c = 1
@@ -126,33 +127,23 @@ def _strip(cells_across, speed, lead):
     tip = [0.0137, 0.0]
     path = [[-reach - 0.5, 0.0, -0.5], [tip[0] + 2.0 * speed, 0.0, -0.5]]
     exact_end = {"displacement": "exact", "components": ["z"]}
-    scene = Scene.model_validate(
-        {
-            "title": "blade",
-            "requirement": "none",
-            "geometry": {"kind": "box", "lower": [-reach, -1.0, 0.0], "upper": [reach, 1.0, h]},
-            "mesh": {"cells": [[6 * cells_across, 2 * cells_across, 1]]},
-            "material": {"young": 2.5, "poisson": 0.25, "density": 1.0},
-            "supports": [
-                {"where": "boundary", "displacement": [0.0, 0.0], "components": ["x", "y"]},
-                {"where": "left", **exact_end},
-                {"where": "right", **exact_end},
-                {"where": "y < -1 + 1e-9", "displacement": [-1.0], "components": ["z"]},
-                {"where": "y > 1 - 1e-9", "displacement": [1.0], "components": ["z"]},
-            ],
-            "exact": {
-                "solution": "blade_strip",
-                "parameters": {"half_width": 1.0, "grip": 1.0, "speed": speed, "tip": tip},
-            },
-            "cuts": [
-                {
-                    "kind": "tool_path", "points": path, "direction": [0.0, 0.0, 1.0],
-                    "depth": 1.5, "speed": speed, "starts_at": (path[0][0] - tip[0]) / speed,
-                }
-            ],
-            "initial": {"kind": "field", "displacement": "exact", "velocity": "exact"},
-            "analysis": {"kind": "dynamic", "duration": 2.0, "time_step": h / 2, "outputs": 2},
-        }
+    parameters = {"half_width": 1.0, "grip": 1.0, "speed": speed, "tip": tip}
+    scene = scenes.scene(
+        [{"kind": "tool_path", "points": path, "direction": [0.0, 0.0, 1.0], "depth": 1.5,
+          "speed": speed, "starts_at": (path[0][0] - tip[0]) / speed}],
+        geometry=scenes.box([reach, 1.0, h], [-reach, -1.0, 0.0]),
+        mesh={"cells": [[6 * cells_across, 2 * cells_across, 1]]},
+        material={"young": 2.5, "poisson": 0.25, "density": 1.0},
+        supports=[
+            {"where": "boundary", "displacement": [0.0, 0.0], "components": ["x", "y"]},
+            {"where": "left", **exact_end},
+            {"where": "right", **exact_end},
+            {"where": "y < -1 + 1e-9", "displacement": [-1.0], "components": ["z"]},
+            {"where": "y > 1 - 1e-9", "displacement": [1.0], "components": ["z"]},
+        ],
+        exact={"solution": "blade_strip", "parameters": parameters},
+        initial={"kind": "field", "displacement": "exact", "velocity": "exact"},
+        analysis={"kind": "dynamic", "duration": 2.0, "time_step": h / 2, "outputs": 2},
     )  # fmt: skip
     found = find_solver("conforming").solve(
         scene, 0, 0, scheme="generalised_alpha", spectral_radius=0.0, delay=-lead * h / speed
