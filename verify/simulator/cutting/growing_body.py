@@ -40,7 +40,7 @@ class Increment:
     cells : int array
         Cells that were split, or whose pieces were.
     touched : int array
-        Cells around the nodes of these.
+        Cells that share an edge with these, or have new unknowns: their surfaces may change.
     moved : int array
         Those of them that have new unknowns, or are split anew.
     nodes_before : int
@@ -207,8 +207,10 @@ class GrowingBody:
         empty = division.cell[~division.solid]
         np.add.at(self._dropped, empty[_among(empty, cells)], 1)
         self.vanished += int(np.count_nonzero(division.fraction[~division.solid]))
-        touched = self.patches.cells_around(self.patches.nodes_of(cells))
-        moved = distinct(np.concatenate([cells, self._moved]))
+        moved, nodes = distinct(np.concatenate([cells, self._moved])), self.patches.nodes_of(cells)
+        around = self.patches.cells_around(nodes)
+        shares_edge = _among(self.mesh.cells[around], nodes).sum(axis=1) > 1
+        touched = around[shares_edge | _among(around, moved)]
         return Increment(cells, touched, moved, before, self._source)
 
     def _held_in(self, patch: MeshPatch, numbers: Ints) -> Held:

@@ -89,21 +89,22 @@ class PointNumbers:
 
     def _number(self, ends: Ints, cut: Ints) -> tuple[Ints, Ints]:
         """Numbers (k,) of the zero points of cuts (k,) on edges (k, 2), and the first new ones."""
+        span, on = np.full((len(cut), NODES), NONE), np.full((len(cut), CUTS), NONE)
+        span[:, :2], on[:, 0] = np.sort(ends, axis=1), cut
         known = self.supports_of(ends)
-        span = distinct_in_rows(known[:, :, :NODES].reshape(-1, 2 * NODES), NODES)
-        on = np.full((len(cut), CUTS), NONE)
-        on[:, 0] = cut
-        first, second = known[:, 0, NODES:], known[:, 1, NODES:]
-        if beyond_one := bool((known[:, :, NODES] < NONE).any()):
+        if on_cuts := bool((ends >= self.nodes).any()):
+            span = distinct_in_rows(known[:, :, :NODES].reshape(-1, 2 * NODES), NODES)
+            first, second = known[:, 0, NODES:], known[:, 1, NODES:]
             common = np.where((first[:, :, None] == second[:, None, :]).any(axis=2), first, NONE)
             on = distinct_in_rows(np.hstack([on, common]), CUTS)
         key = np.hstack([span, on])
-        edge = (span < NONE).sum(axis=1) != (on < NONE).sum(axis=1) + 1
-        key[edge] = -1
-        key[edge, :3] = np.column_stack([cut, ends])[edge]
+        if on_cuts:
+            edge = (span < NONE).sum(axis=1) != (on < NONE).sum(axis=1) + 1
+            key[edge] = -1
+            key[edge, :3] = np.column_stack([cut, ends])[edge]
         number, new = self._table.number(key)
         on = on[new]
-        if beyond_one:
+        if on_cuts:
             # a cut on which one end lies, and that runs exactly through the other
             others, ends = known[new, ::-1, NODES:], ends[new]
             at = np.nonzero((ends[:, :, None] < self.nodes) & (others < NONE))
@@ -126,8 +127,9 @@ class PointNumbers:
 
         The weights of the others at the point are zero; its own may round to zero.
         """
-        spanned = self.supports_of(points)[:, None, :NODES]
-        found: Bools = (spanned == nodes[:, :, None]).any(axis=2)
+        found = np.zeros(nodes.shape, dtype=bool)
+        for spanned in self.supports_of(points)[:, :NODES].T:
+            found |= nodes == spanned[:, None]
         return found
 
 

@@ -16,7 +16,9 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.pieces`
-_NEAR = 1.5  # longest edges: so near to the sweep is every cell that it may part with other cuts
+# longest edges: so near to the sweep is every cell that it may part, alone (`REACH` off its facets)
+# or with other cuts (up to 1 past its rim, too)
+_NEAR = 1.125
 
 
 class SeenCut:
