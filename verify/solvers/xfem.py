@@ -145,7 +145,8 @@ class XfemSolver:
         UnsupportedSceneError
             If `refuses` gives a reason, or the parameters do not suit the scene.
         InputError
-            If a parameter has a value that it cannot have, a mesh file is bad, a support nowhere, or a piece not held.
+            If a parameter has a value that it cannot have, a mesh file is bad, a support nowhere,
+            or a piece not held.
         NotInEquilibriumError, StepFailedError
             If a Newton iteration does not converge, or a motion blows up.
         """
