@@ -2,13 +2,21 @@
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+
+def distance_to_segments(
+    points: NDArray[np.float64], starts: NDArray[np.float64], ends: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d)."""
+    distance = np.empty(len(points))
+    _distances(points, starts, ends, distance)
+    return distance
 
 
 @njit(cache=True)
-def distance_to_segments(points, starts, ends):
-    """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d)."""
+def _distances(points, starts, ends, distance):
     n, d = points.shape
-    distance = np.empty(n)
     for i in range(n):
         best = np.inf
         for k in range(starts.shape[0]):
@@ -23,4 +31,3 @@ def distance_to_segments(points, starts, ends):
                 away2 += (points[i, c] - (1 - t) * starts[k, c] - t * ends[k, c]) ** 2
             best = min(best, away2)
         distance[i] = np.sqrt(best)
-    return distance

@@ -134,7 +134,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, stack):
     return best
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _nearest(x, wish, searched, sides, stack):
     """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
     lower, upper, cells, corners, normals, _ = searched
@@ -226,11 +226,18 @@ def _find_cells(
         found[i] = cell
 
 
-@njit(cache=True)
-def evaluate_linear(points, found, origins, values, slopes):
+def evaluate_linear(
+    points: Floats, found: Ints, origins: Floats, values: Floats, slopes: Floats
+) -> Floats:
     """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
+    result = np.empty(points.shape)
+    _evaluate_linear(points, found, origins, values, slopes, result)
+    return result
+
+
+@njit(cache=True)
+def _evaluate_linear(points, found, origins, values, slopes, result):
     n, d = points.shape
-    result = np.empty((n, d))
     for i in range(n):
         cell = found[i]
         for c in range(d):
@@ -238,16 +245,22 @@ def evaluate_linear(points, found, origins, values, slopes):
             for a in range(d):
                 value += slopes[cell, c, a] * (points[i, a] - origins[cell, a])
             result[i, c] = value
-    return result
+
+
+def evaluate_quadratic(
+    points: Floats, found: Ints, nodes: Ints, values: Floats, corners: Floats, gradients: Floats
+) -> tuple[Floats, Floats]:
+    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
+    n, d = points.shape
+    u, grad, weight = np.zeros((n, d)), np.zeros((n, d, d)), np.empty(d + 1)
+    _evaluate_quadratic(points, found, nodes, values, corners, gradients, weight, u, grad)
+    return u, grad
 
 
 @njit(cache=True)
-def evaluate_quadratic(points, found, nodes, values, corners, gradients):
-    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
+def _evaluate_quadratic(points, found, nodes, values, corners, gradients, weight, u, grad):
     n, d = points.shape
     count = corners.shape[1]
-    u, grad = np.zeros((n, d)), np.zeros((n, d, d))
-    weight = np.empty(count)
     for i in range(n):
         cell = found[i]
         g = gradients[cell]
@@ -273,4 +286,3 @@ def evaluate_quadratic(points, found, nodes, values, corners, gradients):
                 for a in range(d):
                     slope = 4.0 * (weight[p] * g[q, a] + weight[q] * g[p, a])
                     grad[i, c, a] += slope * values[node, c]
-    return u, grad

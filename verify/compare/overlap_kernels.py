@@ -29,7 +29,7 @@ def _meets_box(x, way, low, high):
     return first <= last + slack
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _crossing(x, way, facet):
     """Parameter t at which the line x + t way crosses a facet, or −1."""
     if x.shape[0] == 2:
@@ -269,7 +269,7 @@ def _apart(one, other, inward, tolerance):
     return False
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _common(one, other, inward, tolerance, depth, order, room):
     """Area or volume of what two simplices have in common, less a layer of thickness `tolerance`.
 
