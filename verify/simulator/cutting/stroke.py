@@ -37,7 +37,8 @@ class SeenCut:
 
     def __init__(self, nodes: Floats, values: Floats, sweep: Sweep, front: float) -> None:
         self._nodes, self._values = nodes, values
-        self._part = sweep.until(front)
+        self._sweep, self._front = sweep, front
+        self._asked, self._found = np.empty((0, 0)), np.empty((0, 3))
 
     def level_set(self, points: Floats) -> Floats:
         """Values taken, at the nodes; the distance to the sweep elsewhere."""
@@ -45,11 +46,18 @@ class SeenCut:
             return self._values
         if points.shape == self._nodes.shape and np.array_equal(points, self._nodes):
             return self._values
-        return self._part.level_set(points)
+        return self._probed(points)[:, 0]
 
     def depth(self, points: Floats) -> Floats:
         """Distance to the rim or to the blade, negative past it."""
-        return self._part.depth(points)
+        found = self._probed(points)
+        return np.minimum(found[:, 1], self._front - found[:, 2])
+
+    def _probed(self, points: Floats) -> Floats:
+        """Ask once of points that are asked for level set and depth, one after the other."""
+        if not np.array_equal(points, self._asked):
+            self._asked, self._found = points.copy(), self._sweep.probed(points)
+        return self._found
 
 
 class Stroke:
