@@ -63,10 +63,10 @@ def in_units(found):
     return whole / found["unit"]
 
 
-# 8 s on a core that takes 0.1 s for the unit; the scalpel: all that it needs alone; everything:
-# twice the goal of 30 s, which one process misses
+# 8 s on a core that takes 0.1 s for the unit; the scalpel: all that it needs alone; everything: the
+# goal is 30 s on that core, 300 units, and 314 to 348 were measured, more the busier the machine is
 @pytest.mark.parametrize(
-    ("stages", "most"), [(["plane: statics"], 80.0), (["space: scalpel"], 450.0), ([], 600.0)]
+    ("stages", "most"), [(["plane: statics"], 80.0), (["space: scalpel"], 250.0), ([], 400.0)]
 )
 def test_first_use_of_a_kind_of_scene_compiles_for_a_bounded_number_of_small_kernels(
     stages, most, tmp_path
@@ -78,7 +78,7 @@ def test_kernels_compile_once_and_are_found_in_the_cache_after_that(tmp_path):
     stages = ["plane: statics", "plane: rotation and motion", "comparison"]
     first, second = measure(tmp_path, *stages), measure(tmp_path, *stages)
     in_units(first)
-    assert first["kernels"] > 50
+    assert first["kernels"] > 30
     assert second["kernels"] == 0
-    # no kernel is to make more than a tenth of the wait: it would be one to divide or rewrite
-    assert max(first["seconds"].values()) < 0.1 * sum(first["seconds"].values())
+    # a tenth of the goal for everything (300 units): such a kernel is one to divide or rewrite
+    assert max(first["seconds"].values()) < 30.0 * first["unit"]
