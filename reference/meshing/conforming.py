@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.features import Feature, close_pairs, plane_features
+from reference.meshing.flat_cells import flip_flat_cells
 from reference.meshing.grading import Grading
 from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
@@ -76,7 +77,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
     if scene.final_cuts and not len(facets):
         raise InputError("cuts: none of them lies inside the body", where)
-    points = points * scale + origin
+    points, cells = points * scale + origin, flip_flat_cells(points, cells, facets)
     if grading.smallest < grading.meshed:
         points, cells, facets = shrink_to_points(
             points, cells, facets, grading.points, grading.smallest

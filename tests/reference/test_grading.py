@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scenes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, square
@@ -11,6 +12,7 @@ from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, sq
 from reference.fracture import tips
 from reference.fracture.domain import ring
 from reference.meshing import background_mesh, conforming_mesh
+from reference.meshing.flat_cells import flip_flat_cells
 from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
@@ -248,3 +250,53 @@ def test_only_tips_that_are_asked_for_and_lie_close_to_something_are_graded_to_a
     assert close(ligament, asked, **WIDE) == [[1000.0, 1000.0]]
     common = [polyline("a", (0.2, 0.5), (0.7, 0.6))]
     assert close(common, factors_of(common)) == []
+
+
+@pytest.mark.parametrize("reversed_cell", [False, True])
+@given(angle=st.floats(0, 2 * np.pi), off=st.floats(-1e-9, 1e-9), place=st.floats(0.1, 0.9))
+def test_a_flat_cell_between_nodes_of_a_cut_is_flipped_into_its_neighbour(
+    reversed_cell, angle, off, place
+):
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    points = np.array([[0, 0], [place, off], [1, 0], [0.4, 0.7], [0.5, -0.8]]) @ turn.T + 3.0
+    flat = [0, 2, 1] if reversed_cell else [0, 1, 2]
+    cells, cut = np.array([flat, [0, 2, 3], [0, 4, 1], [1, 4, 2]]), np.array([[0, 1], [1, 2]])
+    flipped = flip_flat_cells(points, cells, cut)
+    corners = points[flipped]
+    edges = corners[:, 1:] - corners[:, :1]
+    area = 0.5 * (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    assert area.min() > 0.02
+    assert area.sum() == pytest.approx(0.75, rel=1e-8)
+    held = {frozenset(pair) for cell in flipped.tolist() for pair in ((*cell[:2],), (*cell[1:],))}
+    held |= {frozenset((cell[0], cell[2])) for cell in flipped.tolist()}
+    assert {frozenset(pair) for pair in cut.tolist()} <= held
+    marked = np.array([[0, 1], [1, 2], [0, 2]])
+    assert np.array_equal(flip_flat_cells(points, cells, marked), cells)
+
+
+class TestFlatCells:
+    pytestmark = needs_fenicsx
+
+    def test_a_cut_that_gmsh_leaves_flat_cells_at_has_a_reference(self):
+        """A branch on a cut, a round region, K at the ends: three nodes on the cut are a cell."""
+        corners = [[0, 0], [0.07, -0.004], [0.075, 0.03], [0.03, 0.041], [-0.003, 0.028]]
+        cuts = [
+            polyline("a", (0.0203, 0.0107), (0.0391, 0.0193)),
+            polyline("b", (0.0297, 0.015), (0.0345, 0.0055)),
+        ]
+        round_region = {"where": "hypot(x - 0.05, y - 0.01) < 0.0123", "young": 1.5e4}
+        given_scene = square(
+            cuts,
+            geometry={"kind": "polygon", "corners": corners},
+            mesh={"pattern": "unstructured", "sizes": [0.006]},
+            material=scenes.soft(density=1.0, regions=[round_region]),
+            quantities=[one for one in factors_of(cuts) if one["name"] != "b start"],
+        )
+        mesh, _ = reference_mesh(given_scene, 2)
+        x, y = np.array(corners).T
+        exact = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+        assert areas(mesh).sum() == pytest.approx(exact, rel=1e-12)
+        lengths = sum(np.linalg.norm(np.subtract(*cut["points"])) for cut in cuts)
+        first = np.unique(mesh.parent, return_index=True)[1]
+        ends = mesh.points[first[mesh.cut_facets]]
+        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(lengths)
