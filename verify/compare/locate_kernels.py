@@ -198,20 +198,21 @@ def find_cells(
     gets what it would without one. A point that no cell holds within `tolerance` gets the
     `nearest` one, or −1.
     """
-    found, stack = np.full(len(points), -1), np.empty(64, dtype=np.int64)
+    found = np.full(len(points), -1)
     some = directions if len(directions) == len(points) else points
     either = np.zeros(wanted.shape[1], dtype=wanted.dtype)
     _find_cells(
         points, some, some is directions, wanted, either, searched, sides, tolerance, nearest,
-        found, stack,
+        found,
     )  # fmt: skip
     return found
 
 
 @njit(cache=True)
 def _find_cells(
-    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, found, stack
+    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, found
 ):
+    stack = np.empty(64, dtype=np.int64)
     for i in range(len(points)):
         wish = wanted[i]
         for _ in range(2):

@@ -315,19 +315,15 @@ def overlapping(
         np.empty(size, dtype=np.int64),
         np.empty((2, _MOST, size, d)),
     )
+    memory = seen, waiting, near, stack, depth, order, room
     return float(
-        _overlapping(
-            seeds, lower, upper, cells, low, high, corners, inward, tolerance,
-            seen, waiting, near, stack, depth, order, room,
-        )
-    )  # fmt: skip
+        _overlapping(seeds, lower, upper, cells, low, high, corners, inward, tolerance, memory)
+    )
 
 
 @njit(cache=True)
-def _overlapping(
-    seeds, lower, upper, cells, low, high, corners, inward, tolerance,
-    seen, waiting, near, stack, depth, order, room,
-):  # fmt: skip
+def _overlapping(seeds, lower, upper, cells, low, high, corners, inward, tolerance, memory):
+    seen, waiting, near, stack, depth, order, room = memory
     d = low.shape[1]
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
