@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
-FLAT = 1e-6  # area over the square of the longest edge, at most, of a flat triangle
+_FLAT = 1e-6  # area over the square of the longest edge, at most, of a flat triangle
 _ROUNDS = 8  # flat triangles that lie on flat ones are flipped from the outside in
 
 
@@ -32,7 +32,7 @@ def flip_flat_cells(points: Array, cells: Cells, facets: Cells) -> Cells:
     marked = {frozenset(pair) for pair in facets.tolist()}
     for _ in range(_ROUNDS):
         shape = _shape(points[cells])
-        flat = np.flatnonzero(shape <= FLAT)
+        flat = np.flatnonzero(shape <= _FLAT)
         before = cells.copy()
         for cell in flat:
             edges = points[np.roll(cells[cell], -1)] - points[np.roll(cells[cell], 1)]
@@ -42,11 +42,12 @@ def flip_flat_cells(points: Array, cells: Cells, facets: Cells) -> Cells:
             if len(around) != 1 or frozenset((int(a), int(c))) in marked:
                 continue
             other = int(around[0])
+            both = np.array([cell, other])
             far = cells[other].sum() - a - c
             x, y, _ = np.roll(cells[other], -1 - int(np.argmax(cells[other] == far)))
             flipped = np.array([[x, middle, far], [middle, y, far]])
-            if _shape(points[flipped]).min() > _shape(points[cells[[cell, other]]]).min():
-                cells[[cell, other]] = flipped
+            if _shape(points[flipped]).min() > _shape(points[cells[both]]).min():
+                cells[both] = flipped
         if np.array_equal(cells, before):
             break
     return cells
