@@ -25,6 +25,7 @@ from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import distance_to_segments
+from verify.compare.locate import SolutionField
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.overlap import OverlapSearch
 from verify.compare.simplices import simplices
@@ -133,7 +134,7 @@ def _scalpel(mesh: SimplexMesh, kind: State) -> None:
 
 
 def _comparison() -> None:
-    """Ask fields in the plane and in space for values, cuts for distances and overlaps."""
+    """Ask fields in the plane, in space and of a membrane; cuts for distances and overlaps."""
     for mesh in (rectangle_mesh((3, 3)), box_mesh((2, 2, 2))):
         points, corners = mesh.points[:3] + 0.1, mesh.points[mesh.cells]
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
@@ -149,6 +150,9 @@ def _comparison() -> None:
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
         distance_to_segments(points, points, points)
+    sheet = _flat_membrane()
+    still = np.zeros((1, *sheet.points.shape))
+    SolutionField(Solution(sheet.points, sheet.cells, still)).cells_at(sheet.points)
     below, above = rectangle_mesh((2, 2)), rectangle_mesh((2, 2))
     above.points[:, 1] += 1.0
     pressed = np.concatenate([np.zeros_like(below.points), np.full_like(above.points, -0.1)])
