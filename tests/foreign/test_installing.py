@@ -33,6 +33,10 @@ def test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_
     assert main(["solvers", "list", "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)
     assert (row["name"], row["version"], row["licence"]) == ("fake", "1.5", "Apache-2.0")
+    assert main(["solvers", "list"]) == 0
+    own, foreign, *_ = capsys.readouterr().out.splitlines()
+    assert {"xfem", "conforming", "virtual_node"} <= set(own.replace(",", "").split())
+    assert foreign.startswith("fake")
     # the lock of another version of the project: what is there is not what it names
     with (locked / "requirements.lock").open("a") as lock:
         lock.write("# newer\n")

@@ -1,10 +1,11 @@
-"""``verify solvers``: solvers of others, and whether they are here."""
+"""``verify solvers``: names of all solvers; of those of others, whether they are here."""
 
 import argparse
 import json
 from typing import Any
 
 from verify.foreign import foreign_solvers, install, remove, state_of
+from verify.solvers.interface import solver_names
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -24,6 +25,8 @@ def execute(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(rows, indent=2, ensure_ascii=False))
         return 0
+    others = [name for name in solver_names() if name not in {row["name"] for row in rows}]
+    print(f"of the project, and plugged in: {', '.join(others)}")
     for row in rows:
         here = f"{row['version']}, {row['python']}" if row["python"] else "not installed"
         print(f"{row['name']}  {row['title']}  [{row['licence']}]  {here}")
