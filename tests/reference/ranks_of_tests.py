@@ -12,7 +12,7 @@ from verify.runner.ranks import mpiexec
 
 _BEFORE = """
 import pickle, sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {tests!r}
 from reference.dolfinx_versions import import_dolfinx
 import_dolfinx()
 import numpy as np
@@ -33,7 +33,8 @@ def on_ranks(count, code, folder):
     except InputError as error:
         pytest.skip(str(error))
     out = folder / f"{count}.pickle"
-    before = _BEFORE.format(tests=str(Path(__file__).parent))
+    here = Path(__file__).parent
+    before = _BEFORE.format(tests=[str(here), str(here.parent)])
     done = subprocess.run(
         [launcher, "-n", str(count), sys.executable, "-c",
          f"{before}\n{code}\n{_AFTER.format(out=str(out))}"],
