@@ -18,6 +18,7 @@ def test_the_compact_solver_conforms_in_every_basis(basis):
     kept = {result.name for result in results if result.state is State.PASS}
     # the three bases share the mesh; none may hide behind refusals
     wanted = {"cut-patch", "rigid-rotation-3d", "parted-3d", "renumbering", "mirrored-cut"}
+    wanted |= {"two-materials", "two-cuts"}
     if basis == "sidewise":
         wanted |= {"finite-rotation-2d", "finite-rotation-3d", "free-fall"}
     assert wanted <= kept
@@ -35,7 +36,7 @@ def test_the_conforming_solver_conforms():
     results = conform("conforming")
     assert exit_code_of(results) == 0, [r for r in results if r.state is not State.PASS]
     kept = {result.name for result in results if result.state is State.PASS}
-    assert {"cut-patch", "energy-account", "traction", "weight", "mirrored-cut"} <= kept
+    assert {"cut-patch", "two-materials", "two-cuts", "traction", "weight", "mirrored-cut"} <= kept
 
 
 def test_the_command_prints_the_checks_as_a_table_and_as_json(capsys):

@@ -32,6 +32,30 @@ class IgnoresTheCut(XfemSolver):
         return super().solve(changed(scene, cuts=[]), level, repetitions)
 
 
+class TakesTheFirstCut(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        return super().solve(changed(scene, cuts=scene.cuts[:1]), level, repetitions)
+
+
+class TakesTheLastCut(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        return super().solve(changed(scene, cuts=scene.cuts[-1:]), level, repetitions)
+
+
+class TakesOneMaterial(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        return super().solve(changed(scene, material=scene.material.each[0]), level, repetitions)
+
+
+class TakesThePoissonRatioOfOne(XfemSolver):
+    """Reads the moduli of the regions, and not their Poisson's ratios."""
+
+    def solve(self, scene, level, repetitions=1):
+        regions = [one.model_copy(update={"poisson": None}) for one in scene.material.regions]
+        material = scene.material.model_copy(update={"regions": regions})
+        return super().solve(changed(scene, material=material), level, repetitions)
+
+
 class SwapsTheSides(XfemSolver):
     """Gives each of the two nodes at a place on the cut what the other has."""
 

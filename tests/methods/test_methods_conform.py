@@ -9,7 +9,7 @@ from verify.conformance import State, conform
 LOSES_MATERIAL = {
     "rigid-translation-2d", "rigid-rotation-2d", "rigid-translation-3d", "rigid-rotation-3d",
     "finite-rotation-2d", "finite-rotation-3d", "parted-3d",
-    "cut-patch", "energy-account", "closed-cut", "traction",
+    "cut-patch", "two-cuts", "energy-account", "closed-cut", "traction", "two-materials",
 }  # fmt: skip
 BREAKS: dict[str, set[str]] = {
     "subdivision": set(),
@@ -19,9 +19,14 @@ BREAKS: dict[str, set[str]] = {
     "virtual_node_arbitrary": set(),
     "removal": LOSES_MATERIAL,
     "removal_refined": LOSES_MATERIAL,
-    "uncut": {"parted-3d", "free-fall", "cut-patch", "energy-account", "traction", "free-piece"},
-    "mass_spring": {"cut-patch", "energy-account", "closed-cut", "traction", "weight"},
-}
+    "uncut": {
+        "parted-3d", "free-fall", "cut-patch", "two-cuts", "energy-account", "traction",
+        "two-materials", "free-piece",
+    },
+    "mass_spring": {
+        "cut-patch", "energy-account", "closed-cut", "traction", "two-materials", "weight",
+    },
+}  # fmt: skip
 
 
 @pytest.mark.heavy
@@ -43,3 +48,9 @@ def test_a_method_keeps_all_checks_but_those_that_it_cannot(method):
 def test_some_checks_are_kept_and_some_broken(method, parameters, broken):
     results = conform(method, parameters, only=["uncut-2d", "cut-patch"])
     assert {result.name for result in results if result.state is State.FAIL} == broken
+
+
+@pytest.mark.parametrize("method", [name for name, broken in BREAKS.items() if not broken])
+def test_a_method_keeps_two_cuts_and_two_materials_apart(method):
+    for result in conform(method, only=["two-cuts", "two-materials"]):
+        assert result.state is State.PASS, result

@@ -42,9 +42,11 @@ def checks(folder: Path) -> list[Check]:
         _turned(3),
         _parted_halves(),
         _strained_sides(),
+        _two_cuts(),
         _energy_account(),
         _closed_cut(),
         _pulled_halves(),
+        _two_materials(),
         _hanging_halves(),
         _freed_half(),
         _mirrored_cut(),
@@ -170,6 +172,16 @@ def _freed_half() -> Check:
 def _strained_sides() -> Check:
     claim = "each side of a cut takes its own strain (patch test on a cut)"
     return _named(_is_field(*scenes.strained_sides()), "cut-patch", claim)
+
+
+def _two_materials() -> Check:
+    claim = "of two materials each strains with its own constants, on both sides of a cut"
+    return _named(_is_field(*scenes.two_materials()), "two-materials", claim)
+
+
+def _two_cuts() -> Check:
+    claim = "the three parts between two cuts move without strain"
+    return _named(_is_field(*scenes.two_cuts(), 0.0), "two-cuts", claim)
 
 
 def _pulled_halves() -> Check:

@@ -32,6 +32,11 @@ _TILTED_PLANE: dict[str, Any] = {
     "points": [[-0.1, -0.1, 0.37], [1.1, -0.1, 0.37], [1.1, 1.1, 0.61], [-0.1, 1.1, 0.61]],
 }
 _BOUNDARY_EXACT = [{"where": "boundary", "displacement": "exact"}]
+_ROLLERS = [
+    {"where": "bottom", "displacement": [0.0], "components": ["y"]},
+    {"where": "left", "displacement": [0.0], "components": ["x"]},
+    {"where": "right", "displacement": [0.0], "components": ["x"]},
+]
 
 
 def _scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
@@ -199,11 +204,7 @@ def pulled_halves() -> tuple[Scene, Field]:
         "pulled-halves",
         material={"young": YOUNG, "poisson": POISSON, "plane": "stress"},
         cuts=[_UPRIGHT],
-        supports=[
-            {"where": "bottom", "displacement": [0.0], "components": ["y"]},
-            {"where": "left", "displacement": [0.0], "components": ["x"]},
-            {"where": "right", "displacement": [0.0], "components": ["x"]},
-        ],
+        supports=_ROLLERS,
         loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
     )
 
@@ -211,6 +212,62 @@ def pulled_halves() -> tuple[Scene, Field]:
         fixed = np.where(near[:, 0] < _UPRIGHT_AT, 0.0, 1.0)
         strain = traction / YOUNG
         return np.column_stack([-POISSON * strain * (points[:, 0] - fixed), strain * points[:, 1]])
+
+    return scene, field
+
+
+def two_materials() -> tuple[Scene, Field]:
+    """Pull two halves, cut apart lengthwise, of which the upper end is of another material.
+
+    Both materials contract alike across the pull, ν/E being equal: each half stays straight. Mesh
+    lines follow the interface, and still do where nodes were moved onto the cut.
+    """
+    traction, interface = 0.05, 0.5
+    young, poisson = np.array([1.0, 4.0]) * YOUNG, np.array([0.1, 0.4])  # below, above
+    other = {"where": f"y > {interface}", "young": float(young[1]), "poisson": float(poisson[1])}
+    scene = _scene(
+        "two-materials",
+        material={
+            "young": float(young[0]), "poisson": float(poisson[0]), "plane": "stress",
+            "regions": [other],
+        },
+        cuts=[_UPRIGHT],
+        supports=_ROLLERS,
+        loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
+    )  # fmt: skip
+
+    def field(points: Array, near: Array) -> Array:
+        x, y = points.T
+        fixed = np.where(near[:, 0] < _UPRIGHT_AT, 0.0, 1.0)
+        below = np.minimum(y, interface)
+        height = below / young[0] + (y - below) / young[1]
+        return traction * np.column_stack([-poisson[0] / young[0] * (x - fixed), height])
+
+    return scene, field
+
+
+def two_cuts() -> tuple[Scene, Field]:
+    """Move and turn (infinitesimally) each of three parts between two cuts, held off the cuts."""
+    cuts = np.array([[[-0.1, 0.14], [1.1, 0.23]], [[-0.1, 0.85], [1.1, 0.77]]])
+    held = ["bottom", "x < 1e-9 and y > 0.3 and y < 0.7", "top"]
+    motions = np.array([[0.02, -0.03, 0.1], [-0.04, 0.05, -0.06], [0.05, 0.08, 0.03]])
+    scene = _scene(
+        "two-cuts",
+        mesh={"cells": [[5, 8], [10, 16]]},
+        supports=[
+            {"where": where, "displacement": [f"{a} - {turn} * y", f"{b} + {turn} * x"]}
+            for where, (a, b, turn) in zip(held, motions.tolist(), strict=True)
+        ],
+        cuts=[
+            {"kind": "polyline", "name": name, "points": ends.tolist()}
+            for name, ends in zip(("lower", "upper"), cuts, strict=True)
+        ],
+    )
+
+    def field(points: Array, near: Array) -> Array:
+        heights = [np.interp(near[:, 0], ends[:, 0], ends[:, 1]) for ends in cuts]
+        a, b, turn = motions[np.sum([near[:, 1] > height for height in heights], axis=0)].T
+        return np.column_stack([a - turn * points[:, 1], b + turn * points[:, 0]])
 
     return scene, field
 
