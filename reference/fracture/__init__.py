@@ -3,6 +3,7 @@
 They are computed from a `verify.solution.Solution` alone, so from any solver's.
 """
 
+from reference.fracture.domain import DomainError
 from reference.fracture.front import CircularFront, Front, FrontCoordinates, StraightFront
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
 from reference.fracture.intensity import StressIntensity, stress_intensity
@@ -10,6 +11,7 @@ from reference.fracture.tips import Tip, no_tip, tips
 
 __all__ = [
     "CircularFront",
+    "DomainError",
     "Front",
     "FrontCoordinates",
     "FrontIntensity",

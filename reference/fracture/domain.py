@@ -12,6 +12,10 @@ from verify.solution import Solution
 Array = NDArray[np.float64]
 
 
+class DomainError(InputError):
+    """A domain around a tip is too small for the cells there, or larger than the body."""
+
+
 @dataclass(frozen=True)
 class Ring:
     """The cells that a domain integral runs over.
@@ -54,8 +58,10 @@ def ring(
 
     Raises
     ------
-    InputError
+    DomainError
         If the circle is so small that a cell of the tip reaches across it, or leaves no cells.
+    InputError
+        If the field is not plane, or the radius not positive.
     """
     if solution.dimension != 2 or not radius > 0:
         raise InputError(
@@ -67,9 +73,9 @@ def ring(
     at_tip = away.min(axis=1) <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
     mixed = inside.any(axis=1) & ~inside.all(axis=1)
     if not mixed.any() or (mixed & at_tip).any() or inside.all():
-        raise InputError(
+        raise DomainError(
             f"a domain of radius {radius:.4g} m around ({tip[0]:.4g}, {tip[1]:.4g}) does not fit "
-            "between the cells at the tip and the body's boundary"
+            "between the cells at the tip and what is next to it"
         )
     cells = np.flatnonzero(mixed | inside.all(axis=1)) if whole else np.flatnonzero(mixed)
     at = cell_gradients(solution, cells, step)

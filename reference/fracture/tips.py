@@ -33,6 +33,8 @@ class Tip:
         Unit vector in which the cut would go on.
     reach : float
         Distance to the next feature that a domain must not meet, m.
+    nearest : str
+        That feature, in words.
     arc : ArcCut, optional
         The cut, if it is an arc.
     """
@@ -42,6 +44,7 @@ class Tip:
     point: Array
     direction: Array
     reach: float
+    nearest: str
     arc: ArcCut | None = None
 
     def radii(self, count: int = 3) -> Array:
@@ -76,7 +79,7 @@ def no_tip(scene: Scene, name: str, end: End) -> str | None:
         return f"{said} it is outside the body"
     ending, away = _features_around(scene, point)
     # where more than its own end ends, branches meet
-    if ending > 1 or min(away) <= touching:
+    if ending > 1 or min(away)[0] <= touching:
         return f"{said} it meets another cut"
     return None
 
@@ -89,14 +92,14 @@ def _ends(cut: ArcCut | PolylineCut) -> Array:
     return np.asarray(cut.centre) + cut.radius * np.column_stack([np.cos(turned), np.sin(turned)])
 
 
-def _features_around(scene: Scene, point: Array) -> tuple[int, list[float]]:
-    """Count the features that end at a point, and give the distances of the others, m."""
+def _features_around(scene: Scene, point: Array) -> tuple[int, list[tuple[float, str]]]:
+    """Count the features that end at a point, and give distances (m) and names of the others."""
     ending, away = 0, []
     for feature in plane_features(scene):
         if np.array_equal(point, feature.start) or np.array_equal(point, feature.end):
             ending += 1
         else:
-            away.append(float(feature.distance(point[None])[0]))
+            away.append((float(feature.distance(point[None])[0]), feature.name))
     return ending, away
 
 
@@ -108,14 +111,20 @@ def _tip(scene: Scene, cut: ArcCut | PolylineCut, end: End) -> Tip:
     _, away = _features_around(scene, point)
     touching = _TOUCHING * float(np.ptp(scene.geometry.outline(), axis=0).max())
     singular = np.linalg.norm(singular_points(scene) - point, axis=1)
-    reach = min([*away, *singular[singular > touching].tolist()])
+    own = f"the next kink or end of cut '{cut.name}'"  # whatever else is singular is on a feature
+    away += [(float(one), own) for one in singular[singular > touching]]
     # the fields of the integral know no interface between materials
-    reach = min([reach, *(float(f.distance(point[None])[0]) for f in plane_interfaces(scene))])
+    interface = "an interface between materials"
+    away += [(float(f.distance(point[None])[0]), interface) for f in plane_interfaces(scene)]
+    before = cut.vertices()[[1, -2][at]]
+    length = float(np.linalg.norm(point - before))
+    if isinstance(cut, PolylineCut):
+        away.append((length, own))
+    # round-off does not tell whether a singular point is that of a feature
+    reach, nearest = min(away, key=lambda one: one[0] * (1 + _TOUCHING * (one[1] == own)))
     if isinstance(cut, ArcCut):
         spoke = (point - np.asarray(cut.centre)) / cut.radius
         sign = 1.0 if end == "end" else -1.0
         ahead = sign * np.array([-spoke[1], spoke[0]])
-        return Tip(cut.name, end, point, ahead, reach, cut)
-    before = cut.vertices()[[1, -2][at]]
-    length = float(np.linalg.norm(point - before))
-    return Tip(cut.name, end, point, (point - before) / length, min(reach, length))
+        return Tip(cut.name, end, point, ahead, reach, nearest, cut)
+    return Tip(cut.name, end, point, (point - before) / length, reach, nearest)

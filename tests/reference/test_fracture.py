@@ -59,7 +59,7 @@ def test_the_intensity_does_not_depend_on_the_axes():
 
 def test_only_ends_inside_the_body_that_end_free_are_tips():
     cuts = [
-        polyline("edge", (-0.1, 0.3), (0.4, 0.3)),
+        polyline("edge", (-0.1, 0.35), (0.4, 0.35)),
         polyline("main", (0.2, 0.6), (0.8, 0.6)),
         polyline("branch", (0.5, 0.6), (0.5, 0.9)),
     ]
@@ -68,6 +68,9 @@ def test_only_ends_inside_the_body_that_end_free_are_tips():
     assert found["branch", "end"].direction == pytest.approx([0.0, 1.0])
     assert found["branch", "end"].reach == pytest.approx(0.1)  # the boundary
     assert found["main", "end"].reach == pytest.approx(0.2)
+    assert found["branch", "end"].nearest == "the boundary"
+    assert found["edge", "end"].reach == pytest.approx(0.25)
+    assert found["edge", "end"].nearest == "cut 'main'"
 
 
 INCLINED = 0.4 / np.sqrt(2)

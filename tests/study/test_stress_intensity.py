@@ -13,7 +13,7 @@ from verify.assess.stress_intensity import exact_intensity, solution_intensity
 from verify.assess.unavailable import unavailable_quantities
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
@@ -128,6 +128,36 @@ def test_what_only_fine_levels_have_is_known_from_those():
     fewer = conforming_reference(case, {k: levels[k] for k in (0, 1, 2)}, body, law, 0.5)
     assert "K_I at the end" not in fewer.quantities
     assert "does not fit" in fewer.record.missing["K_I at the end"]
+
+
+@pytest.mark.parametrize(
+    "end, more, nearest",
+    [
+        ([0.97, 0.57], {}, "the boundary, 0.03 m away"),
+        ([0.61, 0.57], {"where": "x > 0.63"}, "an interface between materials, 0.02 m away"),
+        ([0.61, 0.57], {"where": "hypot(x - 0.81, y - 0.57) < 0.19"}, "materials, 0.01 m away"),
+        ([0.61, 0.57], {"points": [[0.65, 0.13], [0.65, 0.91]]}, "cut 'other', 0.04 m away"),
+        ([0.34, 0.51], {}, "the next kink or end of cut 'a', 0.05 m away"),
+    ],
+)
+def test_a_factor_without_room_names_what_is_next_to_the_tip(end, more, nearest):
+    cuts = [{"kind": "polyline", "name": "a", "points": [[0.31, 0.47], end]}]
+    cuts += [{"kind": "polyline", "name": "other"} | more] if "points" in more else []
+    stiff = [more | {"young": 3.0}] if "where" in more else []
+    case = griffith(
+        geometry={"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
+        mesh={"cells": [[6, 5]]},
+        material={"young": 1.0, "poisson": 0.3, "plane": "strain", "regions": stiff},
+        supports=[{"where": "boundary", "displacement": ["0.1*x", "0.2*y"]}],
+        cuts=cuts,
+        exact=None,
+        reference={},
+        quantities=[{**ASKED[2], "cut": "a"}],
+    )
+    solution = find_solver("xfem").solve(case, 0, repetitions=0)
+    with pytest.raises(UnsupportedSceneError, match="does not fit") as refused:
+        solution_intensity(case, solution, case.quantities[0])
+    assert str(refused.value).endswith(nearest)
 
 
 def solved(solver, level, value=None, why=""):

@@ -133,13 +133,16 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
 def _tip_modes(
     scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
 ) -> tuple[float, ...]:
-    from reference.fracture import stress_intensity, tips
+    from reference.fracture import DomainError, stress_intensity, tips
 
     tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
     material = _material_around(scene, tip.point, max(tip.radii()))
-    found = stress_intensity(
-        solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc, **given
-    )
+    try:
+        found = stress_intensity(
+            solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc, **given
+        )
+    except DomainError as problem:
+        raise InputError(f"{problem}: {tip.nearest}, {tip.reach:.4g} m away") from None
     return found.mode_1, found.mode_2
 
 
