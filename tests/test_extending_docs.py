@@ -51,10 +51,9 @@ def run(line, folder):
 
 @pytest.fixture
 def examples(tmp_path):
-    """A folder with the example files and the case of the page."""
-    for file in (DOCS / "examples").glob("*.py"):
+    """A folder with the example files of the page."""
+    for file in [*(DOCS / "examples").glob("*.py"), DOCS / "examples/square.toml"]:
         (tmp_path / file.name).write_text(file.read_text())
-    (tmp_path / "square.toml").write_text(blocks("guide/your-solver.md", "toml")[0])
     return tmp_path
 
 
@@ -62,6 +61,8 @@ def test_the_page_shows_the_example_files_as_they_are():
     shown = set(blocks("guide/your-solver.md", "python"))
     files = {file.name: file.read_text() for file in (DOCS / "examples").glob("*.py")}
     assert set(files.values()) == shown
+    case = blocks("guide/your-solver.md", "toml")[0]
+    assert (DOCS / "examples/square.toml").read_text() == case
 
 
 @needs_skfem

@@ -66,6 +66,18 @@ def test_the_smallest_suite_comes_first():
     assert suites_line([], jobs=2) == ""
 
 
+def test_a_mesh_that_no_machine_holds_is_warned_of_in_one_line(tmp_path, case_text, capsys):
+    file = tmp_path / "case.toml"
+    file.write_text(case_text)
+    assert main(["check", str(file)]) == 0
+    assert capsys.readouterr().err == ""
+    assert "cells = [[2, 2], [4, 4]]" in case_text
+    file.write_text(case_text.replace("cells = [[2, 2], [4, 4]]", "sizes = [0.5, 1e-7]"))
+    assert main(["check", str(file)]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "warning: level 1 of xfem would take about 5e+08 GB" in line
+
+
 def test_the_command_says_it_of_a_file(tmp_path, case_text, capsys):
     (tmp_path / "case.toml").write_text(case_text)
     assert main(["check", str(tmp_path / "case.toml")]) == 0

@@ -6,7 +6,7 @@ import sys
 from dataclasses import asdict
 from typing import Any
 
-from verify.cli.cost_text import case_lines, costs_of
+from verify.cli.cost_text import case_lines, costs_of, memory_line
 from verify.errors import InputError
 from verify.printable import one_line
 from verify.runner.checking import check_scene
@@ -28,8 +28,11 @@ def execute(arguments: argparse.Namespace) -> int:
                 print(f"verify: error: {row['error']}", file=sys.stderr)
             else:
                 print(f"{row['file']}: ok ({row['title']})")
-                for line in case_lines([LevelCost(**one) for one in row["cost"]]):
+                costs = [LevelCost(**one) for one in row["cost"]]
+                for line in case_lines(costs):
                     print(f"  {line}")
+                if hopeless := memory_line(costs):
+                    print(f"verify: {row['file']}: {hopeless}", file=sys.stderr)
     if not arguments.json and not cache_folder().exists():  # nothing was ever run here
         print("which suite first: `verify run -k demo` (a minute) shows that all works here")
     return 2 if any(row["error"] for row in rows) else 0

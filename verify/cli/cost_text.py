@@ -1,5 +1,6 @@
 """Expected cost of cases in words, before anything is solved."""
 
+import os
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
@@ -9,6 +10,7 @@ from verify.runner.options import Options
 from verify.runner.plan import solvers_of
 from verify.scene import Scene
 
+_HOPELESS = 10.0  # times the memory of the machine: the estimate is good to a factor of about 3
 _START = 0.8  # s: half of what a run takes before and after its cases; comparing a small case
 
 
@@ -29,6 +31,19 @@ def case_lines(costs: Sequence[LevelCost]) -> list[str]:
         unknowns = ", ".join(_unknowns(row) for row in rows)
         lines.append(f"{solver}: about {unknowns} unknowns, {_spent(rows)}")
     return [*lines, f"in all {_spent(costs)}; rough, by mesh sizes"]
+
+
+def memory_line(costs: Iterable[LevelCost]) -> str:
+    """Warn of the first level that this machine cannot hold by far; empty if there is none."""
+    available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    for row in costs:
+        if row.memory > _HOPELESS * available:
+            return (
+                f"warning: level {row.level} of {row.solver} would take about "
+                f"{memory_text(row.memory)}, and this machine has {memory_text(available)}; "
+                "expected mesh sizes in metres that fit the body"
+            )
+    return ""
 
 
 def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> str:
