@@ -24,6 +24,12 @@ def test_the_compact_solver_conforms_in_every_basis(basis):
     assert wanted <= kept
 
 
+def test_a_ghost_penalty_keeps_two_cuts_and_two_materials():
+    """It joins gradients around a cut: a right one fails if the interface is there."""
+    for found in conform("xfem", {"slivers": "penalise"}, only=["two-cuts", "two-materials"]):
+        assert found.state is State.PASS, found
+
+
 def test_a_scheme_of_first_order_in_time_conforms_and_that_is_said():
     (found,) = conform("xfem", {"scheme": "implicit_euler"}, only=["free-fall"])
     assert found.state is State.PASS

@@ -18,7 +18,7 @@ def state(solver, *names, **options):
         ("SwapsTheSides", "traction", "displacement off by"),
         ("TakesTheFirstCut", "two-cuts", "displacement off by"),
         ("TakesTheLastCut", "two-cuts", "displacement off by"),
-        ("TakesOneMaterial", "two-materials", "displacement off by 6.0"),
+        ("TakesOneMaterial", "two-materials", "displacement off by"),
         ("TakesThePoissonRatioOfOne", "two-materials", "displacement off by"),
         ("WrongEnergy", "energy-account", "ledger"),
         ("HalfAsStiff", "traction", "displacement off by 1.0"),

@@ -175,7 +175,7 @@ def _strained_sides() -> Check:
 
 
 def _two_materials() -> Check:
-    claim = "of two materials each strains with its own constants, on both sides of a cut"
+    claim = "of two materials each strains with its own constants, beside a cut"
     return _named(_is_field(*scenes.two_materials()), "two-materials", claim)
 
 
