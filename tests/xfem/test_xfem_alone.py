@@ -1,5 +1,6 @@
 """The compact solver needs nothing of the rooms above it, nor private parts of its compiler."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -20,6 +21,23 @@ def test_the_compact_solver_loads_nothing_of_verify_but_itself():
     loaded = done.stdout.split()
     assert "verify.xfem.linear_solvers" in loaded
     assert [name for name in loaded if not name.startswith("verify.xfem")] == []
+
+
+def test_in_the_order_of_reading_no_module_needs_one_that_comes_later():
+    """But `cuts`, of which the docstring says so; each module is in it once."""
+    folder = Path(verify.xfem.__path__[0])
+    headings = re.findall(r"^(?:`\w+`(?:, )?)+$", verify.xfem.__doc__, re.M)
+    order = re.findall(r"`(\w+)`", " ".join(headings))
+    assert sorted([*order, "__init__"]) == sorted(path.stem for path in folder.glob("*.py"))
+    later = {
+        (name, node.module.removeprefix("verify.xfem."))
+        for k, name in enumerate(order)
+        for node in ast.walk(ast.parse((folder / f"{name}.py").read_text()))
+        if isinstance(node, ast.ImportFrom)
+        and str(node.module).startswith("verify.xfem.")
+        and node.module.removeprefix("verify.xfem.") not in order[:k]
+    }
+    assert later == {("cuts", "faceted_cuts"), ("cuts", "tool_path")}
 
 
 def test_kernels_are_written_without_private_parts_of_the_compiler():

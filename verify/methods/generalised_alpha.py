@@ -7,14 +7,12 @@ numerical dissipation: the generalized-α method, J. Appl. Mech. 60 (1993) 371�
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody, FreeMass, MotionState, RayleighDamping, StepForces
 from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.linear_solvers import LinearSolver
-
-_Floats = NDArray[np.float64]
 
 _JUMP = 1e-6  # of a load: it jumps if it changes by more within 1e-9 of a step
 
@@ -23,7 +21,7 @@ class _End(NamedTuple):
     """The end of a step, and what it was computed with."""
 
     state: MotionState
-    external: _Floats
+    external: Floats
     damping: RayleighDamping
     step_size: float
 
@@ -49,6 +47,11 @@ class GeneralisedAlpha(NewtonIntegrator):
     ----------
     acceleration : (N, d) float array
         Of the scheme, at the end of the last step, in m/s².
+
+    Raises
+    ------
+    XfemError
+        If ρ is outside 0…1, or the step is not positive and finite.
     """
 
     def __init__(
@@ -87,7 +90,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         if not self._goes_on(external):
             self.acceleration = self._balanced()
 
-    def _goes_on(self, external: _Floats) -> bool:
+    def _goes_on(self, external: Floats) -> bool:
         """Whether the step begins where the last one ended, under the same conditions."""
         end, start = self._end, self._start
         if (
@@ -102,7 +105,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         largest = max(np.abs(external).max(), np.abs(end.external).max())
         return bool(np.abs(external - end.external).max() <= _JUMP * largest)
 
-    def _balanced(self) -> _Floats:
+    def _balanced(self) -> Floats:
         """Acceleration that balances the forces of the start; supports say their own.
 
         With damping c of the stiffness a mode out of balance would start with c/m v, and
@@ -121,7 +124,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         found = self._correction(start.displacement.copy(), forces)
         return held + (1.0 - self.alpha_m) / (self.beta * self.step_size**2) * found
 
-    def _acceleration_after(self, displacement: _Floats) -> _Floats:
+    def _acceleration_after(self, displacement: Floats) -> Floats:
         h, start, a = self.step_size, self._start, self.acceleration
         found = (displacement - start.displacement - h * start.velocity) / (h**2 * self.beta)
         found -= (0.5 / self.beta - 1.0) * a
@@ -129,7 +132,7 @@ class GeneralisedAlpha(NewtonIntegrator):
             found[self.body.fixed] = 0.0
         return found
 
-    def _velocity(self, displacement: _Floats) -> _Floats:
+    def _velocity(self, displacement: Floats) -> Floats:
         after = self._acceleration_after(displacement)
         change = (1.0 - self.gamma) * self.acceleration + self.gamma * after
         velocity = self._start.velocity + self.step_size * change
@@ -137,7 +140,7 @@ class GeneralisedAlpha(NewtonIntegrator):
             velocity[self.body.fixed] = 0.0
         return velocity
 
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         body, before = self.body, self._before
         internal = self._internal(displacement)
         new, old = 1.0 - self.alpha_f, self.alpha_f

@@ -23,10 +23,10 @@ dof nodes (`PhantomMesh.part`) are one part: what both papers call the element i
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from verify.xfem.arrays import check_choice
+from verify.xfem.arrays import Floats, Ints, check_choice
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import (
     AggregatedMass,
@@ -40,8 +40,6 @@ from verify.xfem.phantom import PhantomMesh
 
 _NEARLY_ZERO = 1e-3  # ε_λ: of the largest eigenvalue of the part's mass
 _ADDED = 1e-3  # ε_S: likewise
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 ShiftedLumping = Literal["enrichment", "row sum", "weighted diagonal"]
 
@@ -85,7 +83,8 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
     columns = np.concatenate([np.arange(nodes), base, extra, base, extra])
     values = np.concatenate([own, enriched, -enriched, -enriched, enriched])
     matrix = csr_array(coo_array((values, (rows, columns)), shape=(count, count)))
-    # v_other = v_own ± ȧ, so that M⁻¹ = T diag(1/m) Tᵀ with T = [[1, 0], [1, 1]]
+    # v_other = v_own ± ȧ, so that M⁻¹ = T diag(1/m) Tᵀ with
+    # T = [[1, 0], [1, 1]]: the sign is squared
     change = coo_array(
         (
             np.ones(count + len(extra)),
@@ -99,7 +98,7 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
 
 def _enriched_mass(
     phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumping, side_wise: Mass
-) -> NDArray[np.float64]:
+) -> Floats:
     """M^aa of the nodes with a second unknown, in the order of these unknowns."""
     nodes = len(phantom.mesh.points)
     if lumping == "enrichment":
@@ -170,7 +169,7 @@ def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayL
     return _raised(phantom, density, first, np.einsum("pik,pk,pjk->pij", modes, added, modes))
 
 
-def _split_parts(phantom: PhantomMesh) -> tuple[_Ints, _Floats]:
+def _split_parts(phantom: PhantomMesh) -> tuple[Ints, Floats]:
     """First piece (q,) and moments (q, d + 1, d + 1) of each part of a split cell."""
     if phantom.aggregation is not None:
         raise XfemError("a stabilised mass of aggregated cells: they have no slivers left")
@@ -182,14 +181,14 @@ def _split_parts(phantom: PhantomMesh) -> tuple[_Ints, _Floats]:
     return first, found
 
 
-def _raised(phantom: PhantomMesh, density: ArrayLike, first: _Ints, added: _Floats) -> Mass:
+def _raised(phantom: PhantomMesh, density: ArrayLike, first: Ints, added: Floats) -> Mass:
     """Return the consistent mass plus density times `added` for the parts of pieces `first`."""
     moments = second_moments(phantom)
     moments[first] += added
     return assembled_mass(phantom, density, moments)
 
 
-def _pencil(energy: _Floats, moments: _Floats) -> tuple[_Floats, _Floats]:
+def _pencil(energy: Floats, moments: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues λ (p, k), ascending, and Mφ (p, i, k) of Kφ = λMφ.
 
     Scaled to a unit diagonal, the moments of a sliver are as regular as those of a cell.

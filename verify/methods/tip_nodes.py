@@ -7,8 +7,7 @@ the cut goes through one of these parts and stops at their common node. So the j
 from the nodes of the edge by which the cut comes in to zero at its end: the partially cut element
 of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a node.
 
-A split that ends at a node, as subdivision does it, needs the first of these divisions alone:
-`add_tip_points`.
+`verify.methods.subdivision` needs the first of these divisions alone: `add_tip_points`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,24 +15,20 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import nodal_values
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
-
 _LEAST = 0.15  # share in an element or an edge that each part of it has at least
 # Linear elements act as if a cut ended 0.4 elements behind the node at its end (the study of
 # ends of cuts): a place ahead of the end costs less than one as far behind it.
 _BEHIND = 4.0
-_HALVINGS = 52
-_ROUND_OFF = 1e-9
+_HALVINGS = 52  # of a way through an element, in search of the end: down to round-off
+_ROUND_OFF = 1e-9  # of a share, and of a way
 _NEAR = 0.05  # element sizes: an end farther from the cut than that is none
 _AT_EDGE = 1e-6  # barycentric: an end as near as that to an edge or node lies on it
 
@@ -55,22 +50,22 @@ class EndingCut:
     """
 
     cut: Cut
-    ends: _Floats
-    others: _Floats
-    levels: _Floats
+    ends: Floats
+    others: Floats
+    levels: Floats
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Level set of the cut, as stated at the new nodes."""
         found = np.array(self.cut.level_set(points), dtype=float)
         for place, level in zip(self.others, self.levels, strict=True):
             found[(points == place).all(axis=1)] = level
         return self._zero_at_ends(found, points)
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Depth of the cut, zero at its ends."""
         return self._zero_at_ends(np.array(self.cut.depth(points), dtype=float), points)
 
-    def _zero_at_ends(self, values: _Floats, points: _Floats) -> _Floats:
+    def _zero_at_ends(self, values: Floats, points: Floats) -> Floats:
         for end in self.ends:
             values[(points == end).all(axis=1)] = 0.0
         return values
@@ -94,8 +89,8 @@ class TipNodes(NamedTuple):
 
     mesh: SimplexMesh
     cuts: list[EndingCut]
-    asked: _Floats
-    moved: _Floats
+    asked: Floats
+    moved: Floats
 
 
 class _Chord(NamedTuple):
@@ -109,9 +104,9 @@ class _Chord(NamedTuple):
     """
 
     cell: int
-    entry: _Floats
-    end: _Floats
-    exit: _Floats
+    entry: Floats
+    end: Floats
+    exit: Floats
 
 
 def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
@@ -155,7 +150,7 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     return TipNodes(divided, ending, asked, np.array(division.moved))
 
 
-def _met(mesh: SimplexMesh, cut: Cut, values: _Floats) -> tuple[_Bools, list[_Chord]]:
+def _met(mesh: SimplexMesh, cut: Cut, values: Floats) -> tuple[Bools, list[_Chord]]:
     """Which cells (m,) a cut with nodal values (n,) meets, and its way through those it ends in."""
     plus = values[mesh.cells] >= 0.0
     cells = np.flatnonzero(plus.any(axis=1) & ~plus.all(axis=1))
@@ -199,13 +194,13 @@ class _Division:
         Cells that are not to be divided, nor are ends to be at their nodes.
     """
 
-    def __init__(self, mesh: SimplexMesh, taken: _Bools) -> None:
+    def __init__(self, mesh: SimplexMesh, taken: Bools) -> None:
         self._mesh, self._taken = mesh, taken
         self._cells = mesh.cells.copy()
-        self._places: list[_Floats] = []
-        self._more: list[_Ints] = []
-        self._from: list[tuple[int, _Floats]] = []
-        self.asked: list[_Floats] = []
+        self._places: list[Floats] = []
+        self._more: list[Ints] = []
+        self._from: list[tuple[int, Floats]] = []
+        self.asked: list[Floats] = []
         self.moved: list[float] = []
         self._inner = np.ones(len(mesh.points), dtype=bool)
         cell, opposite = mesh.boundary_facets.T
@@ -216,12 +211,12 @@ class _Division:
         points = np.concatenate([self._mesh.points, *(place[None] for place in self._places)])
         return SimplexMesh(points, np.concatenate([self._cells, *self._more]))
 
-    def interpolated(self, values: _Floats) -> _Floats:
+    def interpolated(self, values: Floats) -> Floats:
         """Values (n, c) at the nodes as (k, c) at the new ones, linear in the divided cells."""
         found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
         return np.array(found).reshape(len(found), values.shape[1])
 
-    def end_at(self, chord: _Chord, met: _Bools) -> _Floats | None:
+    def end_at(self, chord: _Chord, met: Bools) -> Floats | None:
         """Divide cells where a cut ends; the place of its end, if there is a good one.
 
         `met` (m,) are the cells that this cut meets: it must not end on another part of itself.
@@ -260,7 +255,7 @@ class _Division:
             self._more.append(parts[1:])
         return self._places[-1]
 
-    def _joins(self, chord: _Chord, cells: list[int], met: _Bools) -> bool:
+    def _joins(self, chord: _Chord, cells: list[int], met: Bools) -> bool:
         """Whether the cut is in some of the cells otherwise than on its way to its end."""
         before = int(self._mesh.neighbours[chord.cell, chord.entry.argmin()])
         others = {cell for cell in cells if met[cell]} - {chord.cell}
@@ -270,7 +265,7 @@ class _Division:
             waiting += [int(cell) for cell in self._mesh.neighbours[here] if cell in others]
         return bool(others)
 
-    def _around(self, cell: int, at: _Floats) -> list[int] | None:
+    def _around(self, cell: int, at: Floats) -> list[int] | None:
         """Cells around a place in a cell; None on the outline of the body."""
         mesh = self._mesh
         match int((at > 0.0).sum()):
@@ -286,12 +281,12 @@ class _Division:
         return [cell]
 
 
-def _parts(cell: _Ints, replaced: _Ints, node: int) -> _Ints:
+def _parts(cell: Ints, replaced: Ints, node: int) -> Ints:
     """Parts (k, 3) of a triangle, in each of which a new node takes the place of a corner (k,)."""
     return np.where(cell == replaced[:, None], node, cell)
 
 
-def _places(chord: _Chord, corners: _Floats) -> Iterator[_Floats]:
+def _places(chord: _Chord, corners: Floats) -> Iterator[Floats]:
     """Barycentric coordinates of places in an element at which a cut may end."""
     way = chord.exit - chord.entry
     # of the way through the element, where all parts are large enough
@@ -318,10 +313,17 @@ def _places(chord: _Chord, corners: _Floats) -> Iterator[_Floats]:
         yield foot
 
 
-def add_tip_points(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[SimplexMesh, _Ints]:
+def add_tip_points(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[SimplexMesh, Ints]:
     """Divide each triangle in which an open polyline ends into three.
 
     Ends on an edge, at a node or outside the body need nothing, as a split ends there anyway.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+        Others than triangles in the plane are given back.
+    cuts : sequence of Cut
+        Others than polylines have no ends here.
 
     Returns
     -------

@@ -6,8 +6,12 @@ equations of the thesis that ``docs/theory/xfem.md`` cites; the page derives wha
 
 Words that docstrings take for granted:
 
-cell
-    a simplex of the uncut mesh; a *facet* is a side of one, a point, segment or triangle
+cell, element
+    a simplex of the uncut mesh; a *facet* is a side of one: a segment (2D) or triangle (3D)
+level set, depth
+    of a cut: signed distance from it, and distance inward from its ends (docstring of `cuts`)
+realised cut
+    the zero set of the level set as the mesh interpolates it, as far as it splits cells
 zero point
     where the level set of a cut, linear on an edge, is zero
 piece, cut-cell part
@@ -16,7 +20,10 @@ piece, cut-cell part
     apart (cuts that end on one another leave some) share all dof nodes and are one *part*
 dof node, unknown
     one displacement vector. A node of the mesh has one for each piece of material around it that
-    the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes
+    the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes. These are
+    the *side-wise* unknowns, against those of an enrichment, u and a (`bases`)
+free body
+    pieces that hang together by shared dof nodes; a cut through the whole makes two of one
 sliver
     a piece with a small share in the volume of its cell
 corner
@@ -25,36 +32,40 @@ corner
 membrane
     triangles in space, without bending stiffness
 
-Shapes of arrays: n nodes, m cells, p pieces, N dof nodes, B blocks of a matrix, d components of a
-displacement; d + 1 is also the number of corners of a simplex of dimension d.
+Shapes of arrays: n nodes, m cells, p pieces, N dof nodes, B blocks of a matrix; other letters only
+tell which lengths are equal. The dimension d is that of points and displacements, and d + 1 the
+number of corners of a cell; of a membrane, points have 3 components and cells 3 corners. Kernels
+for all of them count corners by c. Units are SI; in the plane they are per metre of thickness.
 
-The parts are layers (`make check` tests that none imports one above it). In an order of reading:
+In an order of reading, in which each module imports only those before it (but `cuts`, which hands
+on what the two after it define, and is easier read first):
 
 `errors`, `arrays`
     what is raised; types of arrays, and checks of what a user gives
 `mesh`, `structured_meshes`
     simplices, their neighbours and gradients
-`faceted_cuts`, `tool_path`, `cuts`
-    what a cut is: a polyline, a triangulated surface, what a tool sweeps, a plane or polygon.
-    Begin with the docstring of `cuts`: the solver asks a cut two things only
+`cuts`, `faceted_cuts`, `tool_path`
+    what a cut is: a plane or polygon, a polyline, a triangulated surface, what a tool sweeps. The
+    solver asks a cut two things only
 `zero_points`, `clip`, `crossing`, `pieces`
-    exact division of cells at zero points of level sets; parts of the cells that cuts go through
+    exact division of cells at zero points of level sets; through which cells a cut goes. Begin
+    with the docstring of `pieces`, which says what the other three are for
 `join`, `phantom`
-    which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
+    which pieces share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
-`elasticity`, `loads`, `supports`
-    material, load vectors, prescribed displacements
-`polar`, `element`, `block_pattern`, `linear_solvers`, `internal_force`
-    nearest rotations; force and tangents of an element, linear elasticity being R = I; sparsity
-    and supports in a matrix; SciPy behind one protocol, and the operations that
-    `verify.accelerated` replaces; force, energy and stiffness of a body
+`elasticity`, `polar`, `loads`, `supports`
+    material, nearest rotations, load vectors, prescribed displacements
+`contacts`, `aggregation`, `slivers`
+    which pieces touch; policies for slivers (may be skipped at first)
+`block_pattern`, `mass`, `ghost_penalty`
+    sparsity and supports in a matrix; masses, side-wise and consistent; a penalty on slivers
+`element`, `linear_solvers`, `internal_force`
+    force and tangents of an element, linear elasticity being R = I; SciPy behind one protocol, and
+    the operations that `verify.accelerated` replaces; force, energy and stiffness of a body
 `statics`, `static_newton`, `rigid_motion`, `equilibrium`
     linear statics; Newton's method on the potential energy and load steps at finite rotation
-`mass`, `body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
-    masses, side-wise and consistent; a body in motion, its energies and its schemes; the state of
-    a body that is cut on the way
-`contacts`, `aggregation`, `slivers`, `ghost_penalty`
-    policies for slivers
+`body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
+    a body in motion, its energies and its schemes; the state of a body that is cut on the way
 `bases`, `critical_step`, `subdivision`
     other bases of the same space; largest step of explicit schemes; the cut body as a conforming
     mesh

@@ -1,13 +1,17 @@
 """Cell aggregation: nodes that only slivers use follow the linear field of a root cell.
 
 Badia, Verdugo & Martín, *The aggregated unfitted finite element method for elliptic problems*,
-Comput. Methods Appl. Mech. Engrg. 336 (2018), for the cut-cell parts of a body: a part that is
-small reaches a root, a part that is not, through the faces that it shares with its neighbours on
-its own side of all cuts. The field stays continuous on each side and every affine field stays in
+Comput. Methods Appl. Mech. Engrg. 336 (2018), for the pieces of a body: a piece that is small
+reaches a root, a piece that is not, through the faces that it shares with its neighbours on its
+own side of all cuts. The field stays continuous on each side and every affine field stays in
 the space, so that patch tests hold and rigid motion costs nothing. Differences: there a node
-follows the root of the one cell that owns it; here, of the roots of all small parts around it, the
-one that continues its field over the shortest way. And a small part that reaches no root keeps its
-unknowns.
+follows the root of the one cell that owns it; here, of the roots of all small pieces around it,
+the one that continues its field over the shortest way. And a small piece that reaches no root keeps
+its unknowns.
+
+How far a field is continued to a point is measured by its *reach*, Σ|λ_i| of the barycentric
+coordinates λ of the point in the root: one inside, the larger the farther away, and the norm of the
+extrapolation.
 """
 
 from dataclasses import replace
@@ -23,7 +27,7 @@ _DIGITS = 9  # to which extrapolations are compared: symmetric meshes have many 
 
 
 def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Bools, Bools]:
-    """Let nodes that only small parts use follow root cells.
+    """Let nodes that only small pieces use follow root cells.
 
     Parameters
     ----------
@@ -38,9 +42,9 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
     aggregated : PhantomMesh
         `phantom` itself if no node follows a root.
     following : (p,) bool array
-        Small parts with a node that follows a root cell.
+        Small pieces with a node that follows a root cell.
     rootless : (p,) bool array
-        Small parts with a node that only small parts use, and that follows none.
+        Small pieces with a node that only small pieces use, and that follows none.
     """
     alone = np.ones(phantom.node_count, dtype=bool)
     alone[phantom.cells[~small]] = False
@@ -58,9 +62,9 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
 
 
 def _reached(phantom: PhantomMesh, small: Bools) -> tuple[Ints, Ints]:
-    """Pairs (k,), (k,) of small parts and a root each, layer by layer away from the roots.
+    """Pairs (k,), (k,) of small pieces and a root each, layer by layer away from the roots.
 
-    A part takes the root from which its own corners are continued over the shortest way, among
+    A piece takes the root from which its own corners are continued over the shortest way, among
     those of its neighbours one layer closer.
     """
     contacts = face_contacts(phantom, near=True)

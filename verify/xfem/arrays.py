@@ -1,4 +1,7 @@
-"""Types of arrays, and checks of the arrays and words that a user gives."""
+"""Types of arrays, and checks of the arrays and words that a user gives.
+
+`what` and `name` say in the message which argument is wrong.
+"""
 
 from typing import Any, get_args
 
@@ -26,7 +29,7 @@ def check_choice(given: str, choices: Any, what: str) -> None:
 
 
 def real_array(given: ArrayLike, what: str) -> Floats:
-    """Real numbers of any shape: a copy, so that what is made of them stays when they change.
+    """Real numbers of any shape, as a copy: the caller may change the array afterwards.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def finite_array(given: ArrayLike, what: str, *shapes: tuple[int | None, ...]) -
 
 
 def index_array(given: ArrayLike, what: str) -> Ints:
-    """Whole numbers of any shape, a copy; an empty list has none, and so may be of any type.
+    """Integers of any shape, as a copy; an empty list may be of any type.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 Unknowns q stack u of all mesh nodes over a of the enriched ones. With H = ±1 above and below the
 cut, the shifted basis (2.48) is u = Σ N_i u_i + Σ N_j ½(H − H_j) a_j and the plain one is
-u = Σ N_i u_i + Σ N_j H a_j. Both are linear changes of the side-wise unknowns, p = T q.
+u = Σ N_i u_i + Σ N_j H a_j. Both are linear changes of the side-wise unknowns p = T q.
 """
 
 from typing import Literal
@@ -19,13 +19,15 @@ Basis = Literal["shifted", "heaviside"]
 
 
 def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
-    """T of p = T q, for each component of the displacement (N, n + enriched).
+    """T (N, n + enriched) of p = T q, the same for each component of the displacement.
 
     Raises
     ------
     XfemError
-        If the basis is unknown, or a node has more than two unknowns or two that no single cut
-        separates: there the side-wise basis is the only one.
+        If the basis is unknown.
+    BasisError
+        If a node has more than two unknowns, or two that no single cut separates: there the
+        side-wise unknowns are the only ones.
     """
     check_choice(basis, Basis, "basis")
     own, other, sign = _pairs(phantom)

@@ -213,7 +213,7 @@ def _with_pairs(cells: Ints, pairs: Ints) -> Ints:
 
 
 def pattern_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> Ints:
-    """Blocks at the given rows and columns.
+    """Blocks (k,) at the given rows (k,) and columns (k,).
 
     Raises
     ------
@@ -229,7 +229,7 @@ def pattern_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> Ints:
 
 
 def find_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> tuple[Ints, Bools]:
-    """Blocks at the given rows and columns, and whether the pattern has them."""
+    """Blocks (k,) at the given rows and columns (k,), and whether the pattern has them (k,)."""
     of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
     keys = of_row * pattern.node_count + pattern.columns
     wanted = rows * pattern.node_count + columns
@@ -238,13 +238,16 @@ def find_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> tuple[Ints,
 
 
 def add_mass(blocks: Floats, places: Ints, values: Floats, scale: float) -> None:
-    """Add `scale` times the mass to the diagonals of its nodal blocks."""
+    """Add `scale` times mass entries (k,) to the diagonals of the nodal blocks at `places` (k,)."""
     for component in range(blocks.shape[1]):
         blocks[places, component, component] += scale * values
 
 
 def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
-    """Entries of the blocks, flat, in rows and columns of fixed components, but the diagonal's."""
+    """Entries (k,) of the blocks, flattened, in rows and columns of fixed components (N, d).
+
+    Those on the diagonal of the matrix are left out.
+    """
     rows = np.repeat(np.arange(len(fixed)), np.diff(pattern.starts))
     some = fixed.any(axis=1)
     at = np.flatnonzero(some[rows] | some[pattern.columns])

@@ -45,7 +45,7 @@ class MotionState:
 
 @dataclass(frozen=True)
 class RayleighDamping:
-    """C = α M + β K, K with the rotations of the moment, so that β does not damp rotations.
+    """C = α M + β K, K the rotation-fixed tangent of the moment, so that β damps no rotation.
 
     Attributes
     ----------
@@ -117,6 +117,17 @@ class DynamicBody:
     supports : Supports or MovingSupports, optional
         Without it the body is free.
     damping : RayleighDamping
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (N, d), of displacements, velocities and forces.
+    fixed : (N, d) bool array
+        Of the supports.
+    moving : bool
+        Whether the supports are `MovingSupports`.
+    pattern : BlockPattern
+        Sparsity of stiffness and mass together.
 
     Raises
     ------

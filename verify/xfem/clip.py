@@ -29,7 +29,7 @@ _Path = list[tuple[int, int]]
 
 
 class Staircase(NamedTuple):
-    """Sub-simplices of a clipped simplex, for every pattern of signs.
+    """Sub-simplices of a clipped simplex, for every pattern of signs: a table.
 
     The pattern of a simplex is Σ 2^k over the corners k on the plus side. Its sub-simplices are
     the entries ``start[pattern]`` to ``start[pattern + 1]`` of the other arrays.
@@ -66,6 +66,7 @@ def staircase(corners: int) -> Staircase:
         for sign, vertices, steps in _parts(above, below) if above and below else ():
             plus.append([a for a, _ in vertices])
             minus.append([b for _, b in vertices])
+            # filled up with s_00, which `divided` sets to one
             factors.append(steps + [(1, 0, 0)] * (corners - len(steps)))
             side.append(sign)
         start.append(len(side))
@@ -153,7 +154,7 @@ class Simplices:
 
 
 def staircase_entries(plus: Bools) -> tuple[Ints, Ints]:
-    """Entries (k,) of the staircase for simplices with these signs (q, c); of which each is."""
+    """Entries (k,) of the staircase for simplices with signs (q, c); the simplex (k,) of each."""
     stairs = staircase(plus.shape[1])
     pattern = plus @ (1 << np.arange(plus.shape[1]))
     count = stairs.start[pattern + 1] - stairs.start[pattern]
@@ -169,7 +170,9 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
     ----------
     simplices : Simplices
     zero : ZeroPoints
+        Of all cuts; points of this one are added.
     cut : int
+        Its number.
     below : (p,) int array
         Piece that takes what is on the minus side of each piece; −1 if that is not divided.
     """
@@ -191,7 +194,7 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
     stairs = staircase(ids.shape[1])
     at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
     kind, a, b = (stairs.factors[entry][:, :, k] for k in range(3))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # pairs on one side, which no entry uses
         r = level[:, :, None] / (level[:, :, None] - level[:, None, :])
         s = -level[:, None, :] / (level[:, :, None] - level[:, None, :])
     diagonal = np.arange(ids.shape[1])
@@ -263,7 +266,7 @@ def _edge_keys(one: Ints, other: Ints) -> Ints:
 
 
 def _halves(simplices: Simplices, zero: ZeroPoints, at: Ints, edge: Ints) -> Simplices:
-    """Halves of simplices at points (q,) on their edges (q, 2), local corners."""
+    """Halves of simplices at points (q,), by place in `ends`, on their edges (q, 2) of corners."""
     row, ends = np.arange(len(simplices)), zero.ends[at]
     turned = simplices.points[row, edge[:, 0]] != ends[:, 0]
     plus, minus = np.where(turned[:, None], edge[:, ::-1], edge).T
@@ -297,7 +300,7 @@ class Partition:
     points : ZeroPoints
         Mesh nodes and zero points.
     snapped : int
-        Nodal level-set values within round-off that were taken as exactly zero.
+        How many nodal level-set values within round-off were taken as exactly zero.
     tied : (t, 2) int array
         Pairs of pieces of one cell that no cut keeps apart: together they are one.
     """

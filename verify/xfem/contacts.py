@@ -16,7 +16,7 @@ from verify.xfem.phantom import PhantomMesh
 
 
 def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]:
-    """Pairs of pieces (k,), (k,) of neighbouring cells that share all unknowns of their face.
+    """Pairs of pieces (k,), (k,), of neighbouring cells, that share all dof nodes of a face.
 
     Parameters
     ----------
@@ -34,6 +34,7 @@ def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]
     facet = connected(len(facets), *equal_rows(facets))
     starts = np.arange(len(pieces) + 1) * phantom.cells.shape[1]
     has = csr_array((np.ones(len(facet)), facet, starts), shape=(len(pieces), len(facets)))
+    # not two by two: pieces that are one part have all their faces in common
     both = triu(has @ has.T, 1).tocoo()
     first, second = pieces[both.row], pieces[both.col]
     apart = parent[first] != parent[second]
@@ -41,8 +42,10 @@ def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]
 
 
 def sibling_contacts(phantom: PhantomMesh, cells: Ints) -> tuple[Ints, Ints, Floats]:
-    """Pairs of pieces inside the given cells, and the area of the cut between them.
+    """Pairs of pieces (k,), (k,) in the given cells, and the area (k,) of the cut between them.
 
+    Each pair comes in both orders, and once for each facet of sub-simplices that they have in
+    common; its area is in m^(d − 1).
     Pieces with a piece without volume between them do not appear.
     """
     sub = phantom.sub_cells
@@ -111,9 +114,22 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
 
 
 def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
-    """Mesh node of each new unknown; new number of each old one, -1 if not used; old of new.
+    """Give the unknowns that stay, N of N_old, new numbers.
 
     Each mesh node must keep an unknown; the first of them takes the node's number.
+
+    Parameters
+    ----------
+    phantom : PhantomMesh
+    used : (N_old,) bool array
+
+    Returns
+    -------
+    node_parent : (N,) int array
+        Mesh node of each.
+    node : (N_old,) int array
+        New number of each old unknown, −1 if it goes.
+    old_of_new : (N,) int array
     """
     kept = np.flatnonzero(used)
     parent = phantom.node_parent[kept]

@@ -27,7 +27,7 @@ def critical_step(
     fixed: Bools | None = None,
     tolerance: float = 1e-6,
 ) -> float:
-    """Critical step of the assembled body, by a Lanczos iteration on Cᵀ K C, M⁻¹ = C Cᵀ.
+    """Critical step of the assembled body, by a Lanczos iteration on Lᵀ K L, M⁻¹ = L Lᵀ.
 
     The scaling on both sides keeps the iteration accurate with slivers, whose mass and stiffness
     go to zero together.
@@ -74,8 +74,8 @@ def critical_step(
             raise XfemError("every component is fixed: no step is critical")
     M = csr_array(kron(mass.matrix, block))
     if mass.root is not None and (mass.diagonal is not None or fixed is None):
-        C = csr_array(kron(mass.root, block))
-        A = C.T @ K @ C
+        L = csr_array(kron(mass.root, block))
+        A = L.T @ K @ L
         if mass.diagonal is not None:
             A = A[free][:, free]
         return _step(_largest(A, tolerance))
@@ -93,7 +93,10 @@ def _largest(A: csr_array, tolerance: float) -> float:
 
 
 def _largest_general(K: csr_array, M: csr_array, tolerance: float) -> float:
-    """Scaled to a unit diagonal of M first: slivers make its raw condition number 1/ε."""
+    """Largest λ of K x = λ M x, M not diagonal.
+
+    Scaled to a unit diagonal of M first: slivers make its raw condition number 1/ε.
+    """
     scale = 1.0 / np.sqrt(M.diagonal())
     K = K * scale[:, None] * scale[None, :]
     M = M * scale[:, None] * scale[None, :]
@@ -115,7 +118,10 @@ def element_critical_steps(
 
     Parameters
     ----------
-    mesh, material, density
+    mesh : SimplexMesh
+    material : Material
+    density : float or (m,) array_like
+        In kg/m³.
     strain : float
         For corotational motion: the largest principal stretch − 1 in reach, up to 2. With polar
         rotations R the second derivative of the potential is, in the axes of the stretch,

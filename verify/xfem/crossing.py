@@ -1,12 +1,16 @@
 """Crossing of pieces by cuts: by one alone, and by several that end on one another.
 
-A cut alone divides a piece only if it goes through, which the points tell where it crosses the
-edges of the piece.
+A cut alone divides a piece only if it goes through. That is read off the zero points on the edges
+of the piece: are they inside the extent of the cut?
 
 Where several end in one point (2D) or along one line (3D) inside an element, none goes through, and
-yet together they part the material. There every cut divides whatever its plane crosses. Of the
-facets between the pieces that this leaves, those inside the extent of a cut keep apart; pieces that
-meet in another one are tied: one piece.
+yet together they part the material. There every cut divides whatever its plane crosses, on trial.
+Of the facets between the pieces that this leaves, those inside the extent of a cut keep apart;
+pieces that meet in another facet are *tied*: one part. If no more parts result than by each cut
+alone, the trial is dropped.
+
+The rules for a cut that ends in a cell (`TipRule`) are told by `verify.xfem.pieces.split_cells`,
+which calls all of this.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +30,7 @@ TipRule = Literal["inside", "through", "nearest"]
 Reached = Callable[[Ints, Floats], Bools]
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
-_ASIDE = 1e-4  # element sizes: steps in which a cut is felt for
+_ASIDE = 1e-4  # element sizes: steps of difference quotients, and to beside the end of a cut
 _SPECK = 1e-24  # of a cell: what rounding leaves between three planes with a common line
 
 
@@ -77,7 +81,7 @@ def crossed_through(
     tip: TipRule,
     reached: Reached | None = None,
 ) -> tuple[Bools, Bools]:
-    """Which pieces (p,) a cut goes through, and in which it ends by the rule `inside`.
+    """Which pieces (p,) a cut goes through, and in which (p,) it ends by the rule `inside`.
 
     Parameters
     ----------
@@ -95,6 +99,7 @@ def crossed_through(
         return _mostly_crossed(cut, positions, crossing), np.zeros(pieces, dtype=bool)
     wanted, at = np.unique(zero, return_inverse=True)
     level, depth = level_and_depth(cut, positions[wanted])
+    # an end on an edge has gone through the element before it, and not into the one behind it
     margin = 1.0 if tip == "through" else -1.0
     inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
     if reached is not None:
@@ -138,18 +143,18 @@ class _Facets(NamedTuple):
 def meeting_cells(
     partition: Partition, ends: Sequence[Ints], cells: int, joint: Bools | None
 ) -> Bools:
-    """Which cuts (m, cuts) meet cells, of those where several do and one at least ends.
+    """Which cuts (m, cuts) meet which cells, where several do and one at least ends.
 
     Parameters
     ----------
     partition : Partition
         By the rule that a cut divides what it goes through.
     ends : sequence of int arrays
-        Cells in pieces of which each cut ends.
+        For each cut the cells in pieces of which it ends.
     cells : int
         Number of cells of the mesh.
     joint : (m,) bool array, optional
-        Further cells, in which several meet.
+        Further cells, which several have parted together before.
     """
     meets = np.zeros((cells, len(ends)), dtype=bool)
     for cut, some in enumerate(ends):
@@ -183,14 +188,15 @@ def joint_cuts(
     Parameters
     ----------
     trial : Partition
-        Of suspicious cells: every cut that meets them divides whatever its plane crosses.
+        Of the cells of `meeting_cells` alone: every cut that meets them divides whatever its plane
+        crosses.
     alone : Partition
         By the rule that a cut divides what it goes through.
     cuts : sequence of Cut
     sizes : (m,) float array
         Longest edges of the cells, in metres.
     joint : (m,) bool array, optional
-        Cells that have been parted so before.
+        Cells that several have parted together before: they stay parted as cuts grow.
     """
     cells = len(sizes)
     chosen = np.zeros(cells, dtype=bool)
@@ -257,8 +263,8 @@ def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: Fl
 def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, size: Floats) -> Bools:
     """Which points past the end of a cut it reaches all the same: it ends on another cut there.
 
-    A cut that is bent inside an element is realised beside itself, and what ends on it goes on to
-    where it is: over points that lie past the other cut as given and not past it as realised.
+    A cut that is bent inside an element is realised a little beside where it was given. A branch
+    that ends on the given one goes on to the realised one, over the points between the two.
 
     Parameters
     ----------
@@ -292,7 +298,10 @@ def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, siz
 
 
 def _end(cut: Cut, points: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Nearest end (q, space) of a cut to points past it, and the direction from there to it."""
+    """Nearest end (q, space) of a cut to points past it, and the unit vectors that lead inwards.
+
+    The depth is a distance from the end: its slope is that direction.
+    """
     step = _ASIDE * size
     slope = np.empty_like(points)
     for axis, unit in enumerate(np.eye(points.shape[1])):

@@ -7,10 +7,12 @@ A cut is a geometric object in the material frame. The solver asks it two things
     the cut along its tangent there.
 ``depth(points)``
     How far inside the ends of the cut a point of its (extended) zero set lies, in metres:
-    positive inside, negative past an end, infinite where there is no end.
+    positive inside, negative past an end, infinite where there is no end. Where it is positive
+    lies the *extent* of the cut.
 
 One nodal φ per cut, interpolated linearly, makes the realised cut planar in every element and the
-same on shared faces.
+same on shared faces. Cuts made of facets and tool paths have modules of their own and are handed
+on here.
 """
 
 from collections.abc import Callable
@@ -88,7 +90,7 @@ class ImplicitCut:
     function : callable
         Level set (n,) of points (n, d), in metres; near the cut it should be a distance.
     extent : callable, optional
-        `Cut.depth`; without it the cut has no end.
+        Depth (n,) of points (n, d), as `Cut.depth`; without it the cut has no end.
     """
 
     function: Callable[[Floats], Floats]

@@ -19,7 +19,8 @@ class Material:
     Attributes
     ----------
     lam, mu : (m,) or () float array
-        Lamé parameters in pascal, for all cells of the uncut mesh or one for each.
+        Lamé parameters in pascal (of membranes times the thickness, in N/m), for all cells of the
+        uncut mesh or one for each.
     """
 
     lam: Floats
@@ -60,7 +61,7 @@ def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
     Raises
     ------
     XfemError
-        If a parameter is outside its bounds or the state is unknown.
+        If a parameter is outside its bounds, shapes do not match or the state is unknown.
     """
     E, nu = real_array(young, "Young's modulus"), real_array(poisson, "Poisson's ratio")
     check_choice(state, State, "state")

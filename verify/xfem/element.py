@@ -1,17 +1,18 @@
 """Force and tangent of corotational linear elements, per cell of a cut body.
 
-With b_i the material gradient of shape function i, w the volume of a cell, F = I + Σ u_i b_iᵀ = R U
-and E = sym(Rᵀ F) − I, the potential is w (μ‖E‖² + ½λ tr² E). The force f_i = P b_i,
-P = w R (2μE + λ tr(E) I), is its gradient as long as R is the nearest rotation; R = I is linear
-elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative of P by F:
+With b_i the material gradient of shape function i, w the volume of a piece,
+F = I + Σ u_i b_iᵀ = R U and E = sym(Rᵀ F) − I, the potential is w (μ‖E‖² + ½λ tr² E). The force
+f_i = w P b_i, P = R (2μE + λ tr(E) I), is its gradient as long as R is the nearest rotation; R = I
+is linear elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative of P by F:
 
     rotation-fixed   A = μ (δ_kl δ_nm + R_km R_ln) + λ R_kn R_lm,
     consistent       A = 2μ δ_kl δ_nm + λ R_kn R_lm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm.
 
-A membrane is the same with F and I restricted to its tangent plane. It has no stiffness against
-the displacement φ along its turned normal n but w (∇φ · S ∇φ) of its tension S, the second
-Piola–Kirchhoff stress with principal values (2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches
-λ_k. The geometric stiffness takes its positive part alone, so that it has no negative mode.
+A membrane (in the kernels c == d: as many corners as dimensions) is the same with F and I
+restricted to its tangent plane. It has no stiffness against the displacement φ along its turned
+normal n but w (∇φ · S ∇φ) of its tension S, the second Piola–Kirchhoff stress with principal values
+(2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches λ_k. The geometric stiffness takes its
+positive part alone, so that it has no negative mode.
 """
 
 from typing import NamedTuple
@@ -24,7 +25,7 @@ from verify.xfem.elasticity import Material
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import SPINS, adjugate
 
-_SINGULAR = 1e-8  # of the trace of the stretch: a rotation without a derivative
+_SINGULAR = 1e-8  # determinant over the power of the trace: a rotation without a derivative
 _COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
 
 
@@ -34,12 +35,13 @@ class Elements(NamedTuple):
     Attributes
     ----------
     cells : (p, c) int array
-        Nodes.
+        Corners of each piece, as in `PhantomMesh`.
     parent : (p,) int array
         Cells of the uncut mesh.
     gradients : (m, c, d) float array
         Of the shape functions, in 1/m.
     volumes : (p,) float array
+        Of the pieces, in m^d.
     normals : (m, d) float array
         Unit normals of membranes; one row of zeros of all other bodies.
     lam, mu : (m,) float array
@@ -110,7 +112,7 @@ def deform(elements, displacement, share, F):
 
 @njit(cache=True)
 def add_force(elements, R, F, share, scale, force):
-    """Add `scale` times the forces of E = sym(Rᵀ F) − `share` I; return as much of the energy.
+    """Add `scale` times the forces of E = sym(Rᵀ F) − `share` I; return `scale` times the energy.
 
     With F from `deform`: the internal force for a share of one, for a share of zero the product of
     rotation-fixed tangent and vector.

@@ -2,7 +2,7 @@
 
 A step is p = f_ext − f_int − f_visc + r with the reactions r at the supports and the inertia p,
 M Δv/h unless the scheme says otherwise. Multiplied by Δu this is an identity, whatever scheme has
-chosen the forces:
+chosen the forces; with T the kinetic and W the strain energy:
 
     ΔT + ΔW − Δu·f_ext − Δu·r + Δu·f_visc + D = − Δu·(residual at free components),
 
@@ -95,7 +95,13 @@ class BalanceRecorder:
         self._rows = [self._row(state)]
 
     def record(self, state: MotionState, forces: StepForces) -> None:
-        """Enter one step, from the state of the last entry to this one."""
+        """Enter one step, from the state of the last entry to this one.
+
+        Raises
+        ------
+        XfemError
+            If no time has passed in between.
+        """
         body, last = self.body, self._last
         h = state.time - last.time
         if h == 0.0:

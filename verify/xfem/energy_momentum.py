@@ -36,6 +36,8 @@ from verify.xfem.polar import SPINS, adjugate, nearest_rotations
 _REGULAR = 1e-6  # smallest pivot of A over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
 _SINGULAR = 1e-18  # determinant over the cube of the trace: a rotation without a derivative
+# after so many evaluations in a step, cells that have taken the substitute keep it
+_FREE_EVALUATIONS = 8
 # ∂(t R)/∂F in the plane: t R = [[a, −b], [b, a]], a = F₀₀ + F₁₁, b = F₁₀ − F₀₁
 _IN_PLANE = np.einsum("kn,lm->knlm", np.eye(2), np.eye(2))
 _IN_PLANE += np.einsum("akn,alm->knlm", SPINS[2], SPINS[2])
@@ -172,17 +174,13 @@ def _substitute(ends: StepEnds) -> tuple[Floats, Floats]:
     return middle + factor * D, dT + factor[..., None, None] * moved
 
 
-# after so many evaluations in a step, cells that have taken the substitute keep it
-_FREE_EVALUATIONS = 8
-
-
 class EnergyMomentum(NewtonIntegrator):
     """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
 
-    The internal force is a discrete gradient of the potential; see
-    `verify.xfem.energy_momentum`. Its stiffness is not symmetric, and differs
-    from half of that at the end by the square of the turn in a step. Corrections take the latter,
-    which is found in a tenth of the time, as long as each takes half of the residual off.
+    The internal force is a discrete gradient of the potential; the docstring of the module has the
+    equations. Its stiffness is not symmetric, and differs from half of that at the end by the
+    square of the turn in a step. Corrections take the latter, which is found in a tenth of the
+    time, as long as each takes half of the residual off.
 
     Parameters
     ----------
@@ -194,6 +192,11 @@ class EnergyMomentum(NewtonIntegrator):
     ----------
     substituted : (p,) bool array
         Pieces that, in the last step, were too inverted for the stress in its plain form.
+
+    Raises
+    ------
+    XfemError
+        If the body is one of springs, which have no stress to average, or the step is none.
     """
 
     rate = 2.0

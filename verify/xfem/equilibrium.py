@@ -241,7 +241,7 @@ class LoadPath:
 
 
 class StaticEquilibrium(NamedTuple):
-    """A converged state.
+    """Equilibrium of a cut body at finite rotation.
 
     Attributes
     ----------
@@ -290,7 +290,7 @@ def static_equilibrium(
     ----------
     force : InternalForce
     fixed : (N, d) bool array
-        Every cell must be held.
+        Every free body must be held.
     prescribed : callable, optional
         Displacement (N, d) at a fraction s in (0, 1] of the path, read where fixed; zero without.
     load : (N, d) float array, optional

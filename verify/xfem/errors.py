@@ -6,7 +6,7 @@ class XfemError(ValueError):
 
 
 class BasisError(XfemError):
-    """The basis cannot express the cuts; the side-wise one can."""
+    """An enrichment (`verify.xfem.bases`) cannot express the cuts; side-wise unknowns can."""
 
 
 class SingularStiffnessError(XfemError):

@@ -1,4 +1,4 @@
-"""Explicit schemes: central differences, symplectic Euler, and forward Euler as it is printed.
+"""Explicit schemes: central differences, symplectic Euler, and the forward Euler of the thesis.
 
 Central differences are written in velocity form, so that displacement and velocity belong to the
 same instant. All of them are free of any linear solve if the mass is diagonal.
@@ -76,7 +76,8 @@ class CentralDifferences(_Explicit):
     body : DynamicBody
     step_size : float
         In seconds; stable below `verify.xfem.critical_step.critical_step` if linear. Damping
-        is taken at the velocity of the middle of the step before.
+        is taken at the velocity of the start in the first half of a step, at that of its middle in
+        the second.
     """
 
     def __init__(self, body: DynamicBody, step_size: float) -> None:

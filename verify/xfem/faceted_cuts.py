@@ -1,5 +1,8 @@
 """Cuts made of facets: polylines in the plane, triangulated surfaces in space.
 
+Facets are here the segments or triangles of the cut, not the sides of cells. The *rim* is where
+the cut ends: the vertices or edges that belong to one facet only.
+
 The side of a point is told by the normal of the nearest face, edge or vertex, angle-weighted at
 vertices (Bærentzen & Aanæs 2005). Where the nearest feature is on the rim, the level set is that
 of the tangent plane there.
@@ -26,7 +29,17 @@ _FLAT = 1e-12  # area over squared edge below which a triangle has none
 
 @njit(cache=True)
 def nearest_on_facet(x, corners, weights):
-    """Write the weights (k,) of the point of a facet (or, k = 1, of a point) nearest to x."""
+    """Write the weights (k,) of the point of a facet nearest to x; k = 1 is a point of the rim.
+
+    Of a triangle abc: by the signs of (x − a)·ab, … and of the areas that the foot of x spans with
+    the edges (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+
+    Parameters
+    ----------
+    x : (s,) float array
+    corners : (k, s) float array
+    weights : (k,) float array
+    """
     for k in range(len(weights)):
         weights[k] = 0.0
     if corners.shape[0] == 1:
@@ -115,12 +128,13 @@ class FacetArrays(NamedTuple):
     Attributes
     ----------
     corners : (t, k, k) float array
+        In metres; the last axis is that of the coordinates.
     normals : (t, k) float array
         Of length one.
     edge_normals, vertex_normals : (t, k, k) float array
         At the edge opposite to, and at, each corner; of length one.
     edge_rim, vertex_rim : (t, k) bool array
-        Whether the surface ends there.
+        Whether the cut ends there.
     rim : (r, k - 1, k) float array
         The facets of the rim: points in 2D, edges in 3D.
     travel : (t, k) float array
@@ -188,6 +202,8 @@ def _corner_angles(corners: Floats) -> Floats:
 def _probe_points(points: Floats, facets: FacetArrays) -> Floats:
     """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
     facet, weights, square = _nearest(points, facets.corners)
+    # of the weights: none is zero on a face, one on an edge, all but one at a vertex. In the plane
+    # an edge is a vertex, and the second assignment holds
     zeros = (weights == 0.0).sum(axis=1)
     corner, opposite = weights.argmax(axis=1), weights.argmin(axis=1)
     normal, rim = facets.normals[facet], np.zeros(len(points), dtype=bool)
@@ -204,7 +220,7 @@ def _probe_points(points: Floats, facets: FacetArrays) -> Floats:
     distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)
     level = np.where(rim | (zeros == 0), along, distance)
     gap = _nearest(points, facets.rim)[2]
-    # measured along the facets: without the part across it
+    # measured along the facets: without the part across them
     depth = np.where(beyond > 0.0, -beyond, np.sqrt(np.maximum(gap - level**2, 0.0)))
     travel = np.einsum("nk,nk->n", weights, facets.travel[facet])
     return np.stack([level, depth, travel], axis=1)

@@ -47,8 +47,9 @@ class GhostPenalty:
     Raises
     ------
     XfemError
-        If the factor is not positive, or the body is a membrane in space: across its creases
-        the gradient of a rigid turn jumps, so that turning would cost energy.
+        If the factor is not positive, cells are aggregated (there are no slivers left), or the
+        body is a membrane in space: across its creases the gradient of a rigid turn jumps, so that
+        turning would cost energy.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class GhostPenalty:
         lam, mu = material.of_cells(len(phantom.mesh.cells))
         self.phantom, self.factor = phantom, factor
         pieces = np.stack(face_contacts(phantom, near=True))
+        # pieces of one part have the same unknowns: the first stands for all
         counts_once = phantom.split[pieces].any(axis=0) & (phantom.part[pieces] == pieces).all(
             axis=0
         )

@@ -1,4 +1,4 @@
-"""Implicit schemes that solve their step to the end by Newton's method: Euler, trapezoidal."""
+"""Implicit schemes whose step Newton's method solves to a tolerance: Euler, trapezoidal rule."""
 
 from abc import ABC, abstractmethod
 
@@ -171,6 +171,7 @@ class NewtonIntegrator(ABC):
         return float(np.linalg.norm(self._inverse_mass * force))
 
     def _solve(self, displacement: Floats) -> tuple[Floats, Floats, StepForces]:
+        """Displacement, velocity and forces of the end of the step, from a first guess (N, d)."""
         body = self.body
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
@@ -301,11 +302,11 @@ class NewtonIntegrator(ABC):
 
 
 class ImplicitEuler(NewtonIntegrator):
-    """(2.45–46) solved to the end. Dissipates: a mode of frequency ω loses half of its energy in
-    about ln 2/(ω² h), whatever its amplitude.
+    """Implicit Euler (2.45–46), solved to the tolerance.
 
-    Parameters are those of `NewtonIntegrator`.
-    """  # noqa: D205
+    It dissipates: a mode of frequency ω loses half of its energy in about ln 2/(ω² h), whatever its
+    amplitude. Parameters are those of `NewtonIntegrator`.
+    """
 
     rate = 1.0
     share = 1.0
@@ -316,11 +317,11 @@ class ImplicitEuler(NewtonIntegrator):
 
 
 class Trapezoidal(NewtonIntegrator):
-    """Newmark's method with β = ¼, γ = ½. Keeps the energy of linear motion exactly and that of
-    small nonlinear motion well; not unconditionally stable at large amplitudes.
+    """Trapezoidal rule: Newmark's method with β = ¼, γ = ½.
 
-    Parameters are those of `NewtonIntegrator`.
-    """  # noqa: D205
+    It keeps the energy of linear motion exactly and that of small nonlinear motion well, and is not
+    unconditionally stable at large amplitudes. Parameters are those of `NewtonIntegrator`.
+    """
 
     rate = 2.0
     share = 0.5

@@ -1,7 +1,7 @@
 """Internal force, energy and stiffness of a cut body, linear or corotational (2.42, 2.66-70).
 
-Every cell of the phantom-node mesh has one polar rotation of its own, so that the parts of a cut
-cell need not agree on one. `verify.xfem.element` has the equations.
+Every piece, being a cell of the phantom-node mesh, has one polar rotation of its own.
+`verify.xfem.element` has the equations.
 """
 
 from typing import Literal
@@ -64,7 +64,7 @@ class InternalForce:
         another body. By every method: if an array has another shape or type than the body's.
     """
 
-    has_stress = True  # that can be averaged over a step
+    has_stress = True  # that can be averaged over a step; springs (`verify.methods`) have none
 
     def __init__(
         self,
@@ -378,7 +378,13 @@ class InternalForce:
 
 
 def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:
-    """Cells whose deformation gradient has a negative determinant (solids only)."""
+    """Pieces (k,) whose deformation gradient has a negative determinant.
+
+    Raises
+    ------
+    XfemError
+        If the body is a membrane: it has no such determinant.
+    """
     if force.is_membrane:
         raise XfemError("inversion of a membrane in space is not defined")
     return np.flatnonzero(np.linalg.det(force.deformation(displacement)) < 0.0)

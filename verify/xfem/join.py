@@ -1,11 +1,11 @@
-"""Degrees of freedom that cut-cell parts share: by contact across faces, not by sign vectors.
+"""Degrees of freedom that pieces share: by contact across faces, not by sign vectors.
 
-Two (part, local node) pairs at one node are the same dof node when the parts, in cells that share
+Two (piece, local node) pairs at one node are the same dof node when the pieces, in cells that share
 a face with that node, touch across the face, in an area (2D: a length). What touches in a corner
-or an edge only is apart, as parts that turn about a hinge are no body, and a part without volume
+or an edge only is apart, as pieces that turn about a hinge are no body, and a piece without volume
 joins nothing. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along
-faces all follow from this one rule (formulation: "one set of node values per piece of material
-connected inside the element"). On which side of the cuts their material lies is told last.
+faces all follow from this one rule. The last two functions tell on which side of every cut the
+material of a dof node lies, whether the cut splits a cell there or not.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from verify.xfem.zero_points import ZeroPoints
 
 @dataclass(frozen=True)
 class PatchNodes:
-    """Equivalence classes of (part, local node) in all cells around the nodes of split cells.
+    """Equivalence classes of (piece, local node) in all cells around the nodes of split cells.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class PatchNodes:
         Place in `cells` of each piece of the patch: the pieces of the partition first, then the
         cells that are not split.
     group : (p, d + 1) int array
-        Class of each local node, numbered in the order of their first ones.
+        Class of each local node.
     """
 
     cells: Ints
@@ -46,8 +46,8 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     ----------
     mesh : SimplexMesh
     partition : Partition
-    solid : (q,) bool array
-        Pieces that have a volume; the others join nothing.
+    solid : (p,) bool array
+        Pieces of the partition that have a volume; the others join nothing.
     """
     near = np.zeros(len(mesh.points), dtype=bool)
     near[mesh.cells[partition.parent]] = True
@@ -62,6 +62,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     label[: len(solid)] = partition.label
     alive = np.concatenate([solid, np.ones(len(whole), dtype=bool)])
 
+    # faces inside the patch, each once, from the cell with the smaller number
     across = mesh.neighbours[patch]
     here, opposite = np.nonzero(across > patch[:, None])
     there = place[across[here, opposite]]
@@ -70,6 +71,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     on_face = facets_of(np.arange(corners)[None])
     nodes = mesh.cells[patch[here, None], on_face[opposite]]
 
+    # cuts divide a face into regions; across each of them one piece of either side touches another
     dividing = np.zeros((len(patch), label.shape[1]), dtype=bool)
     piece, cut = np.nonzero(partition.label)
     dividing[piece_cell[piece], cut] = True
@@ -140,7 +142,7 @@ def _fitting(piece_cell: Ints, label: Sides, cells: Ints, side: Sides) -> Ints:
 def number_nodes(
     mesh: SimplexMesh, partition: Partition, joined: PatchNodes, solid: Bools
 ) -> tuple[Ints, Ints]:
-    """Mesh node (N,) of each dof node, and the dof node of each class of local nodes.
+    """Mesh node (N,) of each dof node, and the dof node of each class; −1 for one without volume.
 
     The first dof nodes are the nodes of the mesh, each with the material in which it lies.
 
@@ -150,7 +152,7 @@ def number_nodes(
     partition : Partition
     joined : PatchNodes
     solid : (p,) bool array
-        Pieces that have a volume; classes without any get the number -1.
+        Pieces of the partition that have a volume.
     """
     nodes = mesh.cells[joined.cells[joined.piece_cell]]
     pieces = len(partition.parent)

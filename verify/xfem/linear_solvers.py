@@ -22,7 +22,7 @@ from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemEr
 
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
 _SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than iterations
-_IN_ITS_ORDER = {"SymmetricMode": True}
+_IN_ITS_ORDER = {"SymmetricMode": True}  # of SuperLU: pivots on the diagonal, rows as columns
 
 
 class LinearSolver(Protocol):
@@ -220,7 +220,8 @@ def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> Floats:
 class OnePass(Protocol):
     """Force and stiffness of corotational tetrahedra in one pass over the elements.
 
-    `InternalForce.linearise` and `linearise_average` of `verify.xfem.internal_force` ask for it.
+    `InternalForce.linearise` and `linearise_average` of `verify.xfem.internal_force` ask for it and
+    say what the arguments are.
     """
 
     pattern: BlockPattern

@@ -1,8 +1,8 @@
 """Consistent nodal loads of a cut body: body forces and tractions, integrated per piece.
 
-The true integrals of N_i over the pieces, exact for constant loads. Not the lumped
-V_piece/(d + 1) of the diagonal mass: the two differ on cut cells, and only the exact one makes
-statics exact (patch tests under load).
+A load counts with the true integrals of N_i over the pieces, exact if it is constant, and not with
+the lumped V_piece/(d + 1) of the diagonal mass. The two differ on cut cells, and only the exact one
+passes patch tests under load.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from verify.xfem.phantom import PhantomMesh
 
 @cache
 def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
-    """Points and weights exact for polynomials up to a degree.
+    """Points and weights exact for polynomials up to a degree: a conical product of Gauß rules.
 
     Parameters
     ----------
@@ -59,10 +59,15 @@ def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int =
     phantom : PhantomMesh
     density : (d,) or (m, d) array_like or callable
         Force per volume in N/m³, e.g. ρg, of all cells of the uncut mesh or of each; a function
-        of positions and sides.
+        of positions (q, d) and sides of the cuts (q, cuts) gives (q, d).
     degree : int
         Polynomial degree of density times shape function that is integrated exactly on each
         piece, if `density` is a function.
+
+    Raises
+    ------
+    XfemError
+        If the density has a wrong shape or is not finite, or the degree makes no sense.
     """
     load = np.zeros_like(phantom.corners.node_points)
     piece, barycentric, share = phantom.solid_simplices
@@ -91,7 +96,7 @@ def traction(
         Pairs (cell, local node opposite to the facet) of the uncut mesh, such as rows of
         ``mesh.boundary_facets``.
     density : (d,) array_like or callable
-        Force per area in pascal; a function of positions and sides.
+        Force per area in pascal; a function as in `body_force`.
     degree : int
         As in `body_force`.
 
@@ -121,7 +126,10 @@ def traction(
 
 
 def _facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Floats, Floats]:
-    """Simplices of the facets opposite to a corner: piece, barycentric corners, measure."""
+    """Material of the facets of `cells` opposite to a corner, as simplices.
+
+    Pieces (q,), barycentric coordinates (q, d, d + 1) of the corners, and measures (q,).
+    """
     mesh = phantom.mesh
     others = [k for k in range(mesh.dim + 1) if k != local]
     # |∇λ| = 1/height and V = height·A/d

@@ -1,9 +1,10 @@
 """Mass of a cut body, as a scalar matrix on dof nodes (the same for every component).
 
-Side-wise lumping gives each dof node its share ρ V_piece/n of the pieces around it. It is
+Side-wise lumping gives each dof node its share ρ V_piece/(d + 1) of the pieces around it. It is
 diagonal, conserves the mass of every piece exactly, and bounds the explicit step by that of the
 uncut elements, however small the pieces. The consistent mass integrates shape functions exactly.
-`verify.methods.mass_variants` has others: the lumpings that the thesis compares, and raised ones.
+`verify.methods.mass_variants` has others: the lumpings that the thesis compares, and masses
+stabilised against slivers.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class Mass:
     matrix : (N, N) csr_array
         In kilograms (per metre of thickness in 2D).
     root : (N, N) csr_array or None
-        C with M⁻¹ = C Cᵀ where it is known in closed form.
+        L with M⁻¹ = L Lᵀ where it is known in closed form.
     weights : (N,) float array
         Physical mass that belongs to each unknown: what gravity pulls at. For the lumpings of
         the thesis it differs from the row sums of the matrix, which is their defect.
@@ -124,8 +125,9 @@ class Mass:
 class AggregatedMass(Mass):
     """CᵀMC: the mass of the corners on unknowns that some of them follow, u = C û.
 
-    Not diagonal where a root cell carries others, else it is if M is. Lumped anew it would be no
-    bound of the explicit step any more: K ≤ ω²M gives CᵀKC ≤ ω²CᵀMC, and no other mass.
+    It couples the unknowns of root cells that others follow, and is diagonal elsewhere if M is.
+    Lumped anew it would not bound the explicit step: from K ≤ ω²M follows CᵀKC ≤ ω²CᵀMC, and
+    nothing of other masses.
 
     Attributes
     ----------
@@ -199,13 +201,18 @@ def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
 
 
 def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
-    """Side-wise lumped mass: diag(ρ V_piece/n) in side-wise unknowns.
+    """Side-wise lumped mass: the diagonal Σ ρ V_piece/(d + 1) over the pieces of each dof node.
 
     Parameters
     ----------
     phantom : PhantomMesh
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
+
+    Raises
+    ------
+    XfemError
+        If the density is not positive and finite, or neither one value nor one per cell.
     """
     if phantom.aggregation is not None:
         return AggregatedMass.of(side_wise_mass(phantom.corners, density), phantom.aggregation)
@@ -235,7 +242,7 @@ def second_moments(phantom: PhantomMesh) -> Floats:
 def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     """Consistent mass (2.72–75) in side-wise unknowns: ∫ρ N_i N_j over each piece.
 
-    Its explicit step vanishes with the smallest piece.
+    Its explicit step vanishes with the smallest piece. Parameters are those of `side_wise_mass`.
     """
     if phantom.aggregation is not None:
         return AggregatedMass.of(consistent_mass(phantom.corners, density), phantom.aggregation)

@@ -1,7 +1,7 @@
 """Simplicial meshes: triangles in the plane, triangles in space, tetrahedra.
 
 The dimension is a number, not a case: ``dim`` is that of the simplex, ``space`` that of its
-points, and every formula below holds for any of them.
+points. Only measures and gradients tell membranes (``dim < space``) from the others.
 """
 
 from dataclasses import dataclass
@@ -159,31 +159,37 @@ def _check(points: Floats, cells: Ints) -> None:
 
 
 def facets_of(cells: NDArray) -> NDArray:
-    """(m·(d + 1), d) corners of all facets, of each cell (m, d + 1) that opposite to its first."""
+    """(m·(d + 1), d) corners of the facets of cells (m, d + 1), opposite to each corner in turn."""
     corners = cells.shape[1]
     others = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
     return cells[:, others].reshape(-1, corners - 1)
 
 
 def equal_rows(rows: Ints) -> tuple[Ints, Ints]:
-    """Pairs (q,), (q,) of equal rows, of those in ascending order the one and the next."""
+    """Numbers (q,), (q,) of equal rows, each one with the next: three equal rows make two pairs."""
     order = np.lexsort(rows.T[::-1])
     same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
     return order[:-1][same], order[1:][same]
 
 
 def connected(count: int, first: Ints, second: Ints) -> Ints:
-    """(count,) number of the connected component of each of so many things, joined in pairs."""
+    """(count,) component of each node of a graph with edges from `first` (q,) to `second` (q,)."""
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def neighbours_across(cells: Ints) -> Ints:
-    """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary."""
+    """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary.
+
+    Raises
+    ------
+    XfemError
+        If a facet is shared by more than two cells, or a cell is given twice.
+    """
     corners = cells.shape[1]
     facets = np.sort(facets_of(cells), axis=1)
     first, second = equal_rows(facets)
-    thrice = np.intersect1d(first, second)
+    thrice = np.intersect1d(first, second)  # a facet that is in two pairs
     if len(thrice):
         raise XfemError(f"facet {facets[thrice[0]].tolist()} is shared by more than two cells")
     across = np.full(len(facets), -1, dtype=np.int64)

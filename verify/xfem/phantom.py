@@ -1,8 +1,8 @@
 """The cut body as a mesh of cut-cell parts: standard finite elements with a weight.
 
 Every piece of a cell becomes a whole cell of its own (phantom nodes; Hansbo & Hansbo 2004) whose
-stiffness, mass and load count by the piece's share of the volume. The same space as the shifted
-Heaviside enrichment (2.48), in side-wise unknowns. After that nothing downstream knows of cuts.
+stiffness, mass and load count by the piece's share of the volume. The space is that of the shifted
+Heaviside enrichment (2.48), in side-wise unknowns. Force, mass and solvers need not know of cuts.
 """
 
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ class Aggregation:
 
 @dataclass(frozen=True)
 class PhantomMesh:
-    """A cut mesh. "Dof node" means: one displacement vector.
+    """A cut mesh.
 
     With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no
     unknown of their own but follow others: `cells` counts corners, and everything else here that

@@ -1,11 +1,14 @@
-"""Cut-cell parts: a binary space partition of the cells that cuts go through, one cut at a time.
+"""Pieces of cells: a binary space partition of the cells that cuts go through, one cut at a time.
 
-A cut splits a part only when it goes through: when the zero points on its edges lie inside the
-extent of the cut. So tips end on element edges (2D) or faces (3D), and a branch splits only the
-part that it crosses. |φ| below round-off is exactly zero, and zero counts as the plus side: the
-cut is in effect moved a little to its minus side, the same at every node. Parts that have no
-volume then still take their place at the face in which they lie, so that nothing else is joined
-across it, and are left out afterwards.
+A cut splits a piece only when it goes through: when the zero points on its edges lie inside the
+extent of the cut (`verify.xfem.crossing`). So tips end on element edges (2D) or faces (3D), and a
+branch splits only the piece that it crosses. `verify.xfem.clip` then divides the piece at these
+points, numbered once for the mesh by `verify.xfem.zero_points`.
+
+|φ| below round-off is exactly zero, and zero counts as the plus side: the cut is in effect moved a
+little to its minus side, the same at every node. Pieces that have no volume then still take their
+place at the face in which they lie, so that nothing else is joined across it, and are left out
+afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,9 +34,10 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 
+# cells (q,) and labels (q, cuts) of pieces, and the number of a cut, to whether it splits them
 Held = Callable[[Ints, Sides, int], Bools]
 
-ROUND_OFF = 8.0 * np.finfo(float).eps
+ROUND_OFF = 8.0 * np.finfo(float).eps  # of the extent of the mesh: a level set that is zero
 
 
 class _Rules(NamedTuple):
@@ -98,8 +102,9 @@ def split_cells(
 
     def parted(cells: Ints, rules: _Rules) -> tuple[Partition, list[Ints]]:
         points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
-        return _parted(Partition.whole(mesh.cells, cells, points, snapped), rules)
+        return _split_by_all(Partition.whole(mesh.cells, cells, points, snapped), rules)
 
+    # first each cut divides what it goes through
     rules = _Rules(cuts, sizes, tip, held, opened)
     partition, ends = parted(crossed, rules)
     if tip != "inside" or len(cuts) < 2:
@@ -111,10 +116,12 @@ def split_cells(
     suspects = np.flatnonzero(meets.any(axis=1))
     if len(suspects) == 0:
         return partition.only_split()
+    # where several meet and one ends, each divides on trial whatever its plane crosses
     trial = parted(suspects, free._replace(through=meets))[0]
     through = joint_cuts(without_specks(trial, meets.any(axis=1)), alone, cuts, sizes, joint)
     if not through.any():
         return partition.only_split()
+    # and once more with what the trial has found
     cells = through.any(axis=1)
     partition = parted(crossed, rules._replace(through=through))[0]
     partition = without_specks(partition, cells).only_split()
@@ -144,7 +151,7 @@ def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
     return values, int(tiny.sum())
 
 
-def _parted(partition: Partition, rules: _Rules) -> tuple[Partition, list[Ints]]:
+def _split_by_all(partition: Partition, rules: _Rules) -> tuple[Partition, list[Ints]]:
     """Divide pieces by all cuts; also the cells in pieces of which each cut ends."""
     ends = [np.empty(0, dtype=np.int64)] * len(rules.cuts)
     # a branch given before its stem can split only once the stem has: hence more than one pass

@@ -2,10 +2,11 @@
 
 The maximum t = tr(Rᵀ F) is the trace of the stretch; R has determinant +1 whatever the sign of
 det F, so a collapsed or inverted element has a rotation too. In the plane R is closed form. In
-space tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q. Such a form has no local maximum on
-the sphere besides the global one, so Newton's method on SO(3) may start anywhere: where its Hessian
-tr(S) I − S is positive definite it has found the rotation, and where it is not, the eigenvector of
-the form (a Jacobi iteration, which cannot fail) is taken instead.
+space tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q (Horn, J. Opt. Soc. Am. A 4, 1987).
+Such a form has no local maximum on the sphere besides the global one, so Newton's method on SO(3)
+may start anywhere: where its Hessian tr(S) I − S, S = sym(Rᵀ F), is positive definite it has found
+the rotation, and where it is not, the eigenvector of the form (a Jacobi iteration, which cannot
+fail) is taken instead.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ SPINS[3] = SPINS[3].transpose(0, 2, 1)
 
 
 def nearest_rotations(F: Floats) -> Floats:
-    """Rotations nearest to deformation gradients (p, d, d), any, also singular or inverted."""
+    """Rotations (p, d, d) nearest to deformation gradients (p, d, d), also singular or inverted."""
     R = np.empty(F.shape)
     if F.shape[1] == 2:
         rotations_in_plane(F, R)
@@ -146,5 +147,5 @@ def largest_eigenvector(F, q):
     square = 0.0
     for k in range(4):
         square += vectors[k, best] ** 2
-    for k in range(4):  # not as rows: numba would compile its words for a misfit
+    for k in range(4):  # not as a whole: numba would compile its message for shapes that do not fit
         q[k] = vectors[k, best] / np.sqrt(square)

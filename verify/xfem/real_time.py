@@ -1,7 +1,8 @@
 """Implicit Euler with one linearisation per step: the scheme of real-time simulation.
 
-(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K the rotation-fixed tangent, of membranes with
-the geometric stiffness: symmetric positive definite, so that the step always has a solution.
+(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v) (Baraff & Witkin, SIGGRAPH 1998), K the
+rotation-fixed tangent, of membranes with the geometric stiffness: symmetric positive definite, so
+that the step always has a solution.
 """
 
 import numpy as np
@@ -33,6 +34,13 @@ class RealTimeEuler:
         In seconds.
     solver : LinearSolver, optional
         For the sparsity of the body; by default the one that its kernels have for steps.
+
+    Attributes
+    ----------
+    blocks : (B, d, d) float array
+        Matrix of the last step.
+    load : (N, d) float array
+        Right-hand side of the last step, in kg m/s.
     """
 
     def __init__(
@@ -139,7 +147,7 @@ class RealTimeEuler:
         return np.where(body.fixed[nodes], change, 0.0)
 
     def _support(self, driven: Floats) -> None:
-        """Let fixed components move as prescribed; what that does to the others goes right."""
+        """Let fixed components move as prescribed: what that does to others is a load on them."""
         body, nodes = self.body, self._supported
         if driven.any():
             whole = np.zeros(body.shape)

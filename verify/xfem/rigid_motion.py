@@ -75,9 +75,10 @@ class RigidMotions:
     def _turns(
         self, displacement: Floats, change: Floats
     ) -> Iterator[tuple[Ints, Floats, Floats, Floats]]:
-        """Nodes of each body that turns, its rotation, and the centre of what holds it: two places.
+        """Nodes of each body that turns, its rotation, and the centre of what holds it, twice.
 
-        Bodies that turn by little are left to the linear response.
+        The centre is that before, and that after the change. Bodies that turn by little are left
+        to the linear response.
         """
         if not change.any():
             return

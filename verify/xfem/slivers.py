@@ -97,12 +97,19 @@ def treat_slivers(
     Parameters
     ----------
     phantom : PhantomMesh
+        If it has been aggregated, it is treated anew, from its corners.
     policy : {"keep", "drop", "merge"}
     threshold : float
         Volume fraction in (0, ½) below which a piece is a sliver.
     held : (N,) bool array, optional
         Dof nodes that a support is going to hold. Aggregation leaves them their unknown, so
         that a prescribed value is what they have; elsewhere a root decides.
+
+    Returns
+    -------
+    treated : PhantomMesh
+        The same object if nothing is changed.
+    report : SliverReport
 
     Raises
     ------

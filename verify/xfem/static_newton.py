@@ -14,7 +14,8 @@ _TOLERANCE = 1e-10  # of the residual, over the largest of load, reactions and i
 _ITERATIONS = 60  # allowed per load step
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
-# of membranes, tensions over μ: at first, below which the consistent tangent is tried, the least
+# of membranes, tensions over μ: at first, below which the consistent tangent is tried, the least;
+# and the factor by which a full step lets it fall
 _TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises
 # of the rotational part of the tangent, the shares that are tried until it is positive definite
@@ -32,11 +33,11 @@ class NotInEquilibriumError(RuntimeError):
 
 
 class Place(NamedTuple):
-    """Displacement (N, d), its residual (N, d) and what both are judged by."""
+    """An iterate: displacement (N, d) in m, residual (N, d) in N and what both are judged by."""
 
     displacement: Floats
     residual: Floats
-    norm: float
+    norm: float  # of the residual, N
     scale: float  # to which the norm compares, N
     energy: float  # potential, J
 
@@ -71,7 +72,22 @@ class Newton:
         return float(np.abs(self._blocks).max(initial=0.0))
 
     def solve(self, displacement: Floats, change: Floats, load: Floats) -> tuple[Floats, int]:
-        """Equilibrium after a change of the fixed components, and the solves that it took."""
+        """Equilibrium after a change of the fixed components, and the solves that it took.
+
+        Parameters
+        ----------
+        displacement, change : (N, d) float array
+            Where the load step starts; what the supports add, zero at free components. In metres.
+        load : (N, d) float array
+            At the end of the load step, in newtons.
+
+        Raises
+        ------
+        NotInEquilibriumError
+            If the iterations do not suffice.
+        SingularStiffnessError
+            If even the tangent with rotations held is not positive definite.
+        """
         start = self.place(displacement, load)
         place = self.place(displacement + self._spread(start, change), load)
         count = 1
@@ -278,7 +294,7 @@ class Descent(Newton):
 
 
 def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float) -> Ints:
-    """Cells whose rotation, and with it the force, is not unique, or nearly so.
+    """Pieces (k,) whose rotation, and with it the force, is not unique, or nearly so.
 
     That is where the two principal stretches of a plane cell cancel (of an inverted cell the
     smallest is negative), where the two smallest do in space, and where a membrane has shrunk

@@ -27,7 +27,7 @@ _MOST = 2000  # iterations before a factorisation is the quicker way
 
 @dataclass(frozen=True)
 class StaticSolution:
-    """Equilibrium of a cut body.
+    """Equilibrium of a cut body with linear kinematics.
 
     Attributes
     ----------
@@ -78,9 +78,8 @@ def solve_static(
         Nodal forces in newtons.
     solver : {"auto", "direct", "iterative"}
         Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
-        ``auto`` takes the faster one: the latter for solids
-        of 2000 nodes and more, without a ghost penalty; and the former after all if the latter do
-        not converge (thin bodies that bend).
+        ``auto`` takes the faster one: iterations for solids of 2000 nodes and more, without a ghost
+        penalty; and the factorisation after all if they do not converge (thin bodies that bend).
     ghost : GhostPenalty, optional
         Added to the stiffness.
     kernels : Kernels
@@ -89,7 +88,7 @@ def solve_static(
     Raises
     ------
     UnsupportedBodyError
-        If a free piece can move rigidly.
+        If a free body can move rigidly.
     SingularStiffnessError
         If the stiffness is not positive definite for another reason.
     XfemError
@@ -162,14 +161,14 @@ class StaticSolver:
         limit: int,
     ) -> None:
         kernels, block = force.kernels, fixed.shape[1]
-        self._made = partial(kernels.direct, pattern, block, fixed.all(axis=1))
+        self._make_direct = partial(kernels.direct, pattern, block, fixed.all(axis=1))
         self._iterative = kernels.iterative(pattern, block, tolerance, limit) if limit else None
         self._first = self._iterative or self._direct
         self.used: set[str] = set()
 
     @cached_property
     def _direct(self) -> LinearSolver:
-        return self._made()
+        return self._make_direct()
 
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks; see `LinearSolver`."""

@@ -29,8 +29,8 @@ def rectangle_mesh(
     lower, upper : (2,) array_like
         Opposite corners, in metres.
     diagonal : {"right", "left", "alternating", "crossed"}
-        ``right`` splits from the lower left to the upper right; ``crossed`` puts a node in the
-        middle of every rectangle.
+        ``right`` splits from the lower left to the upper right, ``alternating`` right and left
+        like a chessboard; ``crossed`` puts a node in the middle of every rectangle.
 
     Raises
     ------
@@ -64,6 +64,13 @@ def box_mesh(
     All six share the diagonal from the lower to the upper corner of their box, so the mesh is
     conforming and translation invariant.
 
+    Parameters
+    ----------
+    divisions : (3,) sequence of int
+        Boxes along x, y and z.
+    lower, upper : (3,) array_like
+        Opposite corners, in metres.
+
     Raises
     ------
     XfemError
@@ -72,6 +79,7 @@ def box_mesh(
     nodes, points = _grid(divisions, lower, upper)
     counts = [k - 1 for k in nodes.shape]
     cells = []
+    # a tetrahedron for each way along three edges from the lower to the upper corner
     for order in permutations(range(3)):
         offset = np.zeros(3, dtype=int)
         path = []
@@ -85,14 +93,14 @@ def box_mesh(
 
 
 def _grid(divisions: Sequence[int], lower: ArrayLike, upper: ArrayLike) -> tuple[Ints, Floats]:
-    """Node numbers by grid index (first axis slowest in x), and their coordinates."""
+    """Node numbers, indexed by the place in the grid (x, y, z), and coordinates (n, d)."""
     low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
     counts = np.asarray(divisions)
     if counts.shape != low.shape or (counts < 1).any() or counts.dtype.kind != "i":
         raise XfemError(f"divisions {divisions!r}; expected {len(low)} positive integers")
     if low.shape != high.shape or not (high > low).all():
         raise XfemError(f"box from {low.tolist()} to {high.tolist()}; expected lower < upper")
-    # x runs fastest in the node numbers, as in a picture read line by line
+    # numbers run along x first, as in a picture read line by line
     nodes = np.arange(np.prod(counts + 1)).reshape(tuple(counts[::-1] + 1)).T
     axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, counts, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)

@@ -26,7 +26,7 @@ class Subdivision:
     points : (k, d) float array
         Material positions, doubled on the cut, in metres.
     cells : (c, d + 1) int array
-        Simplices, positively oriented.
+        Simplices; positively oriented where they fill the space.
     cell_piece : (c,) int array
         Piece (cut-cell part) that holds each.
     cell_parent : (c,) int array
@@ -97,7 +97,7 @@ def _conforming(phantom: PhantomMesh) -> Simplices:
     """Solid simplices, bisected where a neighbour has a point that they do not have."""
     sub, mesh = phantom.sub_cells, phantom.mesh
     whole = np.flatnonzero(~phantom.split)
-    sign = np.ones(len(sub.piece), dtype=np.int8)
+    sign = np.ones(len(sub.piece), dtype=np.int8)  # not read: `_oriented` has positions
     simplices = Simplices.of_cells(whole, mesh.cells[phantom.parent[whole]])
     simplices += Simplices(sub.piece, sub.points, sub.barycentric, sub.fraction, sign)
     used = np.unique(sub.points)

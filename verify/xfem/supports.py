@@ -15,8 +15,11 @@ from verify.xfem.polar import SPINS
 PrescribedField = Callable[[Floats, Sides], Floats]
 
 
+_LOOSE = 1e-14  # square of the share of a rigid mode that supports hold at least
+
+
 class UnsupportedBodyError(XfemError):
-    """A free piece of the cut body can move rigidly, so that statics has no solution."""
+    """A free body can move rigidly, so that statics has no solution."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,8 @@ class Supports:
             Nodes of the *uncut* mesh; every dof node there is prescribed. None may follow a
             root cell (aggregation): its value would be what the root says.
         values : float, (d,) array_like, or callable
-            A function is called with the positions (k, d) and the sides (k, cuts) of the unknown
-            nodes, so that a field that jumps across a cut is evaluated on the right side.
+            In metres. A function is called with the positions (k, d) and the sides (k, cuts) of the
+            dof nodes, so that a field that jumps across a cut is evaluated on the right side.
         components : tuple of int, optional
             Components to fix; all by default.
 
@@ -120,12 +123,12 @@ def check_fixed(fixed: Bools, shape: tuple[int, int]) -> None:
 
 
 def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
-    """Check that no free piece can move rigidly.
+    """Check that no free body can move rigidly.
 
     Raises
     ------
     UnsupportedBodyError
-        Naming the first such piece by its size and position.
+        Naming the first such body by its size and position.
     XfemError
         If the supports are of another body, not of type bool, or a value is not finite.
     """
@@ -152,7 +155,7 @@ def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: Ints) -> Ints
         held = modes[supports.fixed[nodes]]
         size = np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)
         gram = (held / size).T @ (held / size)
-        if len(held) == 0 or np.linalg.eigvalsh(gram)[0] < 1e-14:
+        if len(held) == 0 or np.linalg.eigvalsh(gram)[0] < _LOOSE:
             found.append(body)
     return np.array(found, dtype=np.int64)
 

@@ -62,13 +62,13 @@ class ToolPath:
             if positions.shape[2] == 2:
                 moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > _STILL * self.length)
                 Polyline(positions[moves, 0])  # raises if it turns back or intersects itself
-            _ = self.surface
+            _ = self.surface  # raises if the blade turns back on its sweep
 
     @classmethod
     def of_tip(
         cls, tips: ArrayLike, times: ArrayLike, depth: ArrayLike | None = None
     ) -> "ToolPath":
-        """Path of a straight blade: tip points (k, s), and in space the blade from tip to edge.
+        """Path of a straight blade, given by its tip and, in space, the vector to its other end.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class ToolPath:
         return np.where(self.travel[at] == wanted, self.times[at], between)
 
     def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
-        """Append positions (k, b, s): for a tool that moves as one looks."""
+        """Append positions (k, b, s) at times (k,): for a tool whose path is not known ahead."""
         more = finite_array(blades, "further blades", (None, *self.blades.shape[1:]))
         later = np.atleast_1d(finite_array(times, "further times", (), (None,)))
         return ToolPath(np.concatenate([self.blades, more]), np.concatenate([self.times, later]))
@@ -136,9 +136,8 @@ class ToolPath:
 class Sweep(FacetCut):
     """The surface swept by a path, as a cut.
 
-    The side of a point is told by the angle-weighted normal of the nearest face, edge or vertex;
-    past the rim the level set is that of the tangent plane there. In the plane the positive side
-    is on the left of the path, in space it is that of (direction of motion) × (blade).
+    In the plane the positive side is on the left of the path, in space it is that of (direction
+    of motion) × (blade).
     """
 
     path: ToolPath
@@ -164,7 +163,14 @@ class Sweep(FacetCut):
 
 @dataclass(frozen=True)
 class PartOfSweep:
-    """A sweep under way: the level set of the whole, ending where the blade is."""
+    """A sweep under way: the level set of the whole, ending where the blade is.
+
+    Attributes
+    ----------
+    sweep : Sweep
+    front : float
+        Travel of the blade so far, in metres.
+    """
 
     sweep: Sweep
     front: float

@@ -23,9 +23,9 @@ class ZeroPoints:
     positions : (n, d) float array
         Mesh nodes, in metres.
     values : (n, cuts) float array
-        Nodal level sets, already snapped.
+        Nodal level sets in metres; those up to `snap` in size are exactly zero already.
     snap : float
-        Level-set values up to this size are taken as exactly zero, in metres.
+        Values at new points up to this size are taken as exactly zero, in metres.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ZeroPoints:
     cut : (k,) int array
         Cut of each zero point.
     turn : (k,) int array
-        Number of the division of cells that used each zero point first; `divided` counts them.
+        When each zero point was first used: the number of that call of `divided`.
     """
 
     def __init__(self, positions: Floats, values: Floats, snap: float) -> None:
@@ -53,12 +53,12 @@ class ZeroPoints:
         self._known: dict[int, tuple[Ints, Ints]] = {}
 
     def shares(self, cut: int | Ints, plus: Ints, minus: Ints) -> tuple[Floats, Floats]:
-        """(r, s) of the zero points z = s·plus + r·minus on edges from φ ≥ 0 to φ < 0."""
+        """(r, s), (q,) each, of the zero points z = s·plus + r·minus on edges (plus, minus)."""
         above, below = self.values[plus, cut], self.values[minus, cut]
         return above / (above - below), -below / (above - below)
 
     def find(self, cut: int, plus: Ints, minus: Ints) -> Ints:
-        """Numbers of the zero points of `cut` on edges (plus, minus).
+        """Numbers (q,) of the zero points of `cut` on edges from `plus`, φ ≥ 0, to `minus`, φ < 0.
 
         Where φ is exactly zero at the plus end, the zero point is that end. New points are
         numbered in the order of their ends, whatever the order in which they are asked for.
@@ -96,11 +96,13 @@ class ZeroPoints:
         self._turns += 1
 
     def in_order(self, numbers: Ints) -> Ints:
-        """Places (k,) of zero points in `ends`, as divisions used them, last ends first.
+        """Sort places (k,) of zero points in `ends` as divisions used them, last ends first.
 
-        Bisecting edges in this order gives the diagonals of the staircase on faces.
+        Bisecting edges in this order gives the diagonals by which `verify.xfem.clip` divides faces.
         """
         ends = self.ends[numbers]
+        # points that were put together elsewhere (by the simulator) were never used: there cuts
+        # have divided in the order of their numbers
         turn = self.turn if len(self.turn) == len(self.cut) else self.cut
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], turn[numbers]])]
 
