@@ -279,6 +279,8 @@ class Integrator(Protocol):
         StepFailedError
             If the step's equation was not solved or the result is not finite; the state is then
             left as it was.
+        XfemError
+            If the state is not one of the body.
         """
         ...
 

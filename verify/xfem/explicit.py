@@ -22,6 +22,8 @@ from verify.xfem.errors import XfemError
 
 
 class _Explicit:
+    """Accelerations of a body, and the end of a step: what the schemes have in common."""
+
     def __init__(self, body: DynamicBody, step_size: float) -> None:
         """Prepare a body and a step in seconds."""
         self.body = body

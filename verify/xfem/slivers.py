@@ -108,7 +108,6 @@ def treat_slivers(
     Returns
     -------
     treated : PhantomMesh
-        The same object if nothing is changed.
     report : SliverReport
 
     Raises
