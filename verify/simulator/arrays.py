@@ -60,9 +60,12 @@ class RowNumbers:
 
         New rows get the next numbers, in their order.
         """
-        keys = np.ascontiguousarray(rows).view(f"V{8 * rows.shape[1]}").ravel().tolist()
+        # equal rows often follow each other
+        other = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))[: len(rows)]
+        keys = rows[other].view(f"V{8 * rows.shape[1]}").ravel().tolist()
         last = len(self._number) - 1
         found = np.fromiter(map(self._number.__getitem__, keys), np.int64, len(keys))
+        found = found[np.cumsum(other) - 1]
         before = np.maximum.accumulate(np.concatenate([[last], found[:-1]]))
         return found, np.flatnonzero(found > before)
 

@@ -186,26 +186,27 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
     if len(parts) == 0:
         return whole
     order = np.argsort(parts.points, axis=1, kind="stable")
-    ids = np.take_along_axis(parts.points, order, axis=1)
-    corners = np.take_along_axis(parts.barycentric, order[:, :, None], axis=1)
+    row = np.arange(len(parts))[:, None]
+    ids, corners = parts.points[row, order], parts.barycentric[row, order]
     level = zero.values[ids, cut]
     number = zero.on_edges(cut, ids)
     entry, of = staircase_entries(level >= 0.0)
     stairs = staircase(ids.shape[1])
     at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
-    kind, a, b = (stairs.factors[entry][:, :, k] for k in range(3))
+    kind, a, b = np.moveaxis(stairs.factors[entry], 2, 0)
     with np.errstate(divide="ignore", invalid="ignore"):  # pairs on one side, which no entry uses
         r = level[:, :, None] / (level[:, :, None] - level[:, None, :])
         s = -level[:, None, :] / (level[:, :, None] - level[:, None, :])
-    diagonal = np.arange(ids.shape[1])
-    r[:, diagonal, diagonal], s[:, diagonal, diagonal] = 0.0, 1.0
-    share = np.where(kind == 0, r[at, a, b], s[at, a, b]).prod(axis=1)
+        diagonal = np.arange(ids.shape[1])
+        r[:, diagonal, diagonal], s[:, diagonal, diagonal] = 0.0, 1.0
+        places = s[..., None] * corners[:, :, None] + r[..., None] * corners[:, None]
+    share = np.stack([r, s])[kind, at, a, b].prod(axis=1)
     swaps = sum(parts.points[:, i] > parts.points[:, j] for i, j in combinations(diagonal, 2))
     turned = (1 - 2 * (np.asarray(swaps) % 2)).astype(np.int8)
     new = Simplices(
         np.where(stairs.side[entry] > 0, parts.piece[of], below[parts.piece[of]]),
         number[at, p, m],
-        s[at, p, m][..., None] * corners[at, p] + r[at, p, m][..., None] * corners[at, m],
+        places[at, p, m],
         parts.fraction[of] * share,
         parts.sign[of] * turned[of] * stairs.sign[entry],
     )

@@ -131,9 +131,11 @@ class FacetArrays(NamedTuple):
         In metres; the last axis is that of the coordinates.
     normals : (t, k) float array
         Of length one.
-    edge_normals, vertex_normals : (t, k, k) float array
-        At the edge opposite to, and at, each corner; of length one.
-    edge_rim, vertex_rim : (t, k) bool array
+    part_normals : (t, 2^k, k) float array
+        At parts of the facet: number Σ 2^j over the corners j that do not belong to it, so that
+        0 is the facet itself, 2^j the edge opposite to corner j. Of length one; at an edge where
+        the cut ends that of the facet.
+    part_rim : (t, 2^k) bool array
         Whether the cut ends there.
     rim : (r, k - 1, k) float array
         The facets of the rim: points in 2D, edges in 3D.
@@ -143,10 +145,8 @@ class FacetArrays(NamedTuple):
 
     corners: Floats
     normals: Floats
-    edge_normals: Floats
-    vertex_normals: Floats
-    edge_rim: Bools
-    vertex_rim: Bools
+    part_normals: Floats
+    part_rim: Bools
     rim: Floats
     travel: Floats
 
@@ -165,22 +165,26 @@ def facet_arrays(points: Floats, facets: Ints, travel: Floats | None = None) -> 
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     across = neighbours_across(facets)
     rim = across < 0
-    edge_normals = normals[:, None] + np.where(
-        rim[..., None], normals[:, None], normals[np.maximum(across, 0)]
-    )
+    beside = np.where(rim[..., None], 0.0, normals[np.maximum(across, 0)])
     total = np.zeros_like(points)
     np.add.at(total, facets, angles[:, :, None] * normals[:, None])
     facet, k = np.nonzero(rim)
     rim_facets = facets[facet[:, None], facets_of(np.arange(count)[None])[k]]
     on_rim = np.zeros(len(points), dtype=bool)
     on_rim[rim_facets] = True
+    part_normals = np.repeat(normals[:, None], 2**count, axis=1)
+    part_rim = np.zeros((len(facets), 2**count), dtype=bool)
+    edges = 1 << np.arange(count)
+    vertices = 2**count - 1 - edges  # in the plane they are the edges
+    part_normals[:, edges] = _of_length_one(normals[:, None] + beside)
+    part_normals[:, vertices] = _of_length_one(total)[facets]
+    part_rim[:, edges] = rim
+    part_rim[:, vertices] = on_rim[facets]
     return FacetArrays(
         corners=corners,
         normals=normals,
-        edge_normals=_of_length_one(edge_normals),
-        vertex_normals=_of_length_one(total)[facets],
-        edge_rim=rim,
-        vertex_rim=on_rim[facets],
+        part_normals=part_normals,
+        part_rim=part_rim,
         rim=np.ascontiguousarray(points[rim_facets]),
         travel=np.zeros(facets.shape) if travel is None else travel[facets],
     )
@@ -199,31 +203,26 @@ def _corner_angles(corners: Floats) -> Floats:
     return angles
 
 
-def _probe_points(points: Floats, facets: FacetArrays) -> Floats:
-    """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
+class _Foot(NamedTuple):
+    """Of points: nearest facet (n,), weights (n, k) there, level set, distance past the rim."""
+
+    facet: Ints
+    weights: Floats
+    level: Floats
+    beyond: Floats
+
+
+def _foot(points: Floats, facets: FacetArrays) -> _Foot:
     facet, weights, square = _nearest(points, facets.corners)
-    # of the weights: none is zero on a face, one on an edge, all but one at a vertex. In the plane
-    # an edge is a vertex, and the second assignment holds
-    zeros = (weights == 0.0).sum(axis=1)
-    corner, opposite = weights.argmax(axis=1), weights.argmin(axis=1)
-    normal, rim = facets.normals[facet], np.zeros(len(points), dtype=bool)
-    edge = zeros == 1
-    rim[edge] = facets.edge_rim[facet[edge], opposite[edge]]
-    edge &= ~rim
-    normal[edge] = facets.edge_normals[facet[edge], opposite[edge]]
-    vertex = zeros == weights.shape[1] - 1
-    rim[vertex] = facets.vertex_rim[facet[vertex], corner[vertex]]
-    normal[vertex] = facets.vertex_normals[facet[vertex], corner[vertex]]
+    part = (weights == 0.0) @ (1 << np.arange(weights.shape[1]))
+    normal, rim = facets.part_normals[facet, part], facets.part_rim[facet, part]
     off = points - np.einsum("nk,nki->ni", weights, facets.corners[facet])
     along = np.einsum("ni,ni->n", off, normal)
-    beyond = np.where(rim, np.linalg.norm(off - along[:, None] * normal, axis=1), 0.0)
     distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)
-    level = np.where(rim | (zeros == 0), along, distance)
-    gap = _nearest(points, facets.rim)[2]
-    # measured along the facets: without the part across them
-    depth = np.where(beyond > 0.0, -beyond, np.sqrt(np.maximum(gap - level**2, 0.0)))
-    travel = np.einsum("nk,nk->n", weights, facets.travel[facet])
-    return np.stack([level, depth, travel], axis=1)
+    level = np.where(rim | (part == 0), along, distance)
+    beside = off - along[:, None] * normal
+    beyond = np.where(rim, np.sqrt(np.einsum("ni,ni->n", beside, beside)), 0.0)
+    return _Foot(facet, weights, level, beyond)
 
 
 class FacetCut:
@@ -238,7 +237,7 @@ class FacetCut:
 
     def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to the facets, to their tangent plane past the rim."""
-        return self.probed(points)[:, 0]
+        return _foot(self._checked(points), self.arrays).level
 
     def depth(self, points: Floats) -> Floats:
         """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
@@ -246,8 +245,16 @@ class FacetCut:
 
     def probed(self, points: Floats) -> Floats:
         """(n, 3): level set, depth, and of a sweep the travel at the nearest point, in metres."""
-        at = finite_array(points, f"{self._name}: points", (None, self.arrays.corners.shape[2]))
-        return _probe_points(at, self.arrays)
+        at, facets = self._checked(points), self.arrays
+        foot = _foot(at, facets)
+        # measured along the facets: without the part across them
+        inside = np.sqrt(np.maximum(_nearest(at, facets.rim)[2] - foot.level**2, 0.0))
+        depth = np.where(foot.beyond > 0.0, -foot.beyond, inside)
+        travel = np.einsum("nk,nk->n", foot.weights, facets.travel[foot.facet])
+        return np.stack([foot.level, depth, travel], axis=1)
+
+    def _checked(self, points: Floats) -> Floats:
+        return finite_array(points, f"{self._name}: points", (None, self.arrays.corners.shape[2]))
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,8 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
 def _fitting(piece_cell: Ints, label: Sides, cells: Ints, side: Sides) -> Ints:
     """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
     order = np.argsort(piece_cell, kind="stable")
-    first, end = np.searchsorted(piece_cell[order], [cells, cells + 1])
+    ends = np.cumsum(np.bincount(piece_cell))
+    first, end = np.concatenate([[0], ends])[cells], ends[cells]
     count = end - first
     of = np.repeat(np.arange(len(cells)), count)
     piece = order[np.arange(len(of)) + np.repeat(end - np.cumsum(count), count)]

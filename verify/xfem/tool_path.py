@@ -152,6 +152,10 @@ class Sweep(FacetCut):
         """Keep the part that is swept when the blade has come so far."""
         return PartOfSweep(self, travel)
 
+    def level_set(self, points: Floats) -> Floats:
+        """Signed distance (n,) to what is swept, to its tangent plane past the rim."""
+        return super().level_set(points) if self.path.sweeps else self.probed(points)[:, 0]
+
     def probed(self, points: Floats) -> Floats:
         """(n, 3): level set, depth, and how far the blade has come as it passes, in metres."""
         if self.path.sweeps:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from verify.simulator.arrays import distinct
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
@@ -42,3 +44,10 @@ class Division:
     def changed_cells(self) -> Ints:
         """Cells of the pieces whose labels are new, ascending."""
         return distinct(self.cell[self.changed & self.solid])
+
+    @cached_property
+    def at_changed_cells(self) -> Bools:
+        """Which nodes of the patch are nodes of these."""
+        found = np.zeros(len(self.patch.whole_nodes), dtype=bool)
+        found[self.patch.cells[np.searchsorted(self.patch.whole_cells, self.changed_cells)]] = True
+        return found

@@ -40,7 +40,8 @@ class Increment:
     cells : int array
         Cells that were split, or whose pieces were.
     touched : int array
-        Cells that share an edge with these, or have new unknowns: their surfaces may change.
+        Cells that share an edge with these and are not on one side of all cuts, or have new
+        unknowns: their surfaces may change.
     moved : int array
         Those of them that have new unknowns, or are split anew.
     nodes_before : int
@@ -207,11 +208,14 @@ class GrowingBody:
         empty = division.cell[~division.solid]
         np.add.at(self._dropped, empty[_among(empty, cells)], 1)
         self.vanished += int(np.count_nonzero(division.fraction[~division.solid]))
-        moved, nodes = distinct(np.concatenate([cells, self._moved])), self.patches.nodes_of(cells)
-        around = self.patches.cells_around(nodes)
-        shares_edge = _among(self.mesh.cells[around], nodes).sum(axis=1) > 1
-        touched = around[shares_edge | _among(around, moved)]
-        return Increment(cells, touched, moved, before, self._source)
+        patch, level = division.patch, division.partition.points.values
+        is_moved = _among(patch.whole_cells, distinct(np.concatenate([cells, self._moved])))
+        # faces and edges on one side of all cuts are as they were where the unknowns are
+        above, below = (sign * level[patch.cells] > 0.0 for sign in (1, -1))
+        beside = ~(above.all(axis=1) | below.all(axis=1)).all(axis=1)
+        shares_edge = division.at_changed_cells[patch.cells].sum(axis=1) > 1
+        touched = patch.whole_cells[is_moved | (shares_edge & beside)]
+        return Increment(cells, touched, patch.whole_cells[is_moved], before, self._source)
 
     def _held_in(self, patch: MeshPatch, numbers: Ints) -> Held:
         """Make the rule that what a cut has separated it separates, whatever came later."""

@@ -91,8 +91,8 @@ class PointNumbers:
         """Numbers (k,) of the zero points of cuts (k,) on edges (k, 2), and the first new ones."""
         span, on = np.full((len(cut), NODES), NONE), np.full((len(cut), CUTS), NONE)
         span[:, :2], on[:, 0] = np.sort(ends, axis=1), cut
-        known = self.supports_of(ends)
         if on_cuts := bool((ends >= self.nodes).any()):
+            known = self.supports_of(ends)
             span = distinct_in_rows(known[:, :, :NODES].reshape(-1, 2 * NODES), NODES)
             first, second = known[:, 0, NODES:], known[:, 1, NODES:]
             common = np.where((first[:, :, None] == second[:, None, :]).any(axis=2), first, NONE)

@@ -55,8 +55,6 @@ def slots_before(division: Division, local: Ints, first_piece: Ints) -> Slots:
     """
     patch, partition = division.patch, division.partition
     parts, cells = len(partition.parent), patch.cells[local]
-    inner = np.zeros(len(patch.whole_nodes), dtype=bool)
-    inner[patch.cells[np.searchsorted(patch.whole_cells, division.changed_cells)]] = True
     cell = patch.whole_cells[local]
     old, solid = first_piece[cell], np.ones(len(local), dtype=bool)
     old[:parts], solid[:parts] = division.old, division.solid
@@ -64,7 +62,7 @@ def slots_before(division: Division, local: Ints, first_piece: Ints) -> Slots:
     above = partition.points.values[patch.cells[partition.parent]] >= 0.0
     label = partition.label[:, None]
     home[:parts] = ((label == 0) | ((label > 0) == above)).all(axis=2)
-    return Slots(cell, old, solid, inner[cells], home)
+    return Slots(cell, old, solid, division.at_changed_cells[cells], home)
 
 
 def number_groups(

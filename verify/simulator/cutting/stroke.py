@@ -138,9 +138,11 @@ class Stroke:
         are those of `verify.xfem.crossing`, so that a cell that is crossed through is one that is
         split.
         """
+        self.level_sets(distinct(self._mesh.cells[cells]))
+        above = self.values[self._mesh.cells[cells]] >= 0.0
+        mixed = above.any(axis=1) & ~above.all(axis=1)
+        cells, above = cells[mixed], above[mixed]
         nodes = self._mesh.cells[cells]
-        self.level_sets(distinct(nodes))
-        above = self.values[nodes] >= 0.0
         cell, one, other = np.nonzero(above[:, :, None] & ~above[:, None, :])
         edges, edge = np.unique(nodes[cell, one] << 32 | nodes[cell, other], return_inverse=True)
         plus, minus = edges >> 32, edges & 0xFFFFFFFF
@@ -194,16 +196,15 @@ def _cells_hit(
 ) -> Ints:
     """Cells near what is swept between two travels; may hold doubles."""
     corners, travel = sweep.corners, sweep.travel
-    points, there = [corners], [(travel >= after) & (travel <= front)]
-    # where an edge passes one of the two
-    for k, j in combinations(range(travel.shape[1]), 2):
-        begin, step = travel[:, k], travel[:, j] - travel[:, k]
-        for limit in (after, front):
-            passes = (begin < limit) != (begin + step < limit)
-            share = np.divide(limit - begin, step, out=np.zeros_like(step), where=passes)[:, None]
-            points.append(((1.0 - share) * corners[:, k] + share * corners[:, j])[:, None])
-            there.append(passes[:, None])
-    place, known = np.concatenate(points, axis=1), np.concatenate(there, axis=1)
+    # corners there, and where an edge passes one of the two
+    k, j = np.array(list(combinations(range(travel.shape[1]), 2))).T
+    limits, begin = np.array([after, front])[:, None, None], travel[:, k]
+    step = travel[:, j] - begin
+    passes = (begin < limits) != (begin + step < limits)
+    share = np.divide(limits - begin, step, out=np.zeros(passes.shape), where=passes)[..., None]
+    on_edges = (1.0 - share) * corners[:, k] + share * corners[:, j]
+    place = np.concatenate([corners, *on_edges], axis=1)
+    known = np.concatenate([(travel >= after) & (travel <= front), *passes], axis=1)
     some = np.flatnonzero(known.any(axis=1))
     place, known = place[some], known[some, :, None]
     floor = np.where(known, place, np.inf).min(axis=1, initial=np.inf) - margin

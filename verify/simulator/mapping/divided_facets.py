@@ -55,7 +55,7 @@ def divide_facets(
     sides = above[crossed]
     alone = np.argmax(sides == (sides.sum(axis=1) == 1)[:, None], axis=1)
     turn = (alone[:, None] + np.arange(3)) % 3
-    corners = np.take_along_axis(facets[crossed], turn, axis=1)
+    corners = facets[crossed[:, None], turn]
     positive = sides[np.arange(len(alone)), alone]
     # the points on the edges from that corner to both others, each edge once
     other, first = corners[:, 1:].ravel(), np.repeat(corners[:, 0], 2)
@@ -92,8 +92,10 @@ def divide_facets(
     parts[:] = [[0, 3, 4], [3, 1, 2], [3, 2, 4]]
     parts[lower, 1, 2], parts[lower, 2, 0] = 4, 1
     triangles = ids[rows[:, :, None], parts]
-    is_one = (triangles != np.roll(triangles, 1, axis=2)).all(axis=2)
-    whole = np.setdiff1d(np.arange(len(facets)), crossed, assume_unique=True)
+    is_one = (triangles != triangles[:, :, [2, 0, 1]]).all(axis=2)
+    is_whole = np.ones(len(facets), dtype=bool)
+    is_whole[crossed] = False
+    whole = np.flatnonzero(is_whole)
     source = np.concatenate([whole, np.repeat(crossed, 3)[is_one.ravel()]])
     order = np.argsort(source, kind="stable")
     side = np.stack([mine, -mine, -mine], axis=1)[is_one]

@@ -6,12 +6,12 @@ elements meet lie on an edge of the mesh, or on the line in which a cut crosses 
 record is by these.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from verify.simulator.arrays import GrowingArray, distinct
+from verify.simulator.arrays import GrowingArray
 from verify.simulator.cutting.point_numbers import NODES, NONE, PointNumbers
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError
@@ -21,11 +21,9 @@ _SHORT = 1e-2  # of an edge: what has given a line its direction was too short t
 _MOST = 10_000  # parts of a facet: each point bisects a few, those around its edge
 
 
-@dataclass
-class _Line:
+class _Line(list[int]):
     """Numbers of the zero points on a line, and the direction along which they are ordered."""
 
-    points: list[int] = field(default_factory=list)
     direction: Floats | None = None
 
 
@@ -48,8 +46,8 @@ class EdgePoints:
         self._recorded = GrowingArray(np.zeros(0, dtype=bool))
         self._crowded = GrowingArray(np.zeros(0, dtype=bool))
         # edges of the mesh; lines of cuts in faces by nodes and cut; edges in faces by their ends
-        self._on_edges: dict[int, _Line] = {}
-        self._in_faces: dict[tuple[int, ...], _Line] = {}
+        self._on_edges: defaultdict[int, _Line] = defaultdict(_Line)
+        self._in_faces: defaultdict[tuple[int, ...], _Line] = defaultdict(_Line)
         self._turned = False
 
     def add(self, numbers: Ints) -> None:
@@ -58,17 +56,17 @@ class EdgePoints:
         unheard = np.zeros(len(ends) - len(self._recorded), dtype=bool)
         self._recorded.append(unheard)
         self._crowded.append(unheard)
-        zero = distinct(numbers[numbers >= nodes]) - nodes
-        zero = zero[~self._recorded.rows[zero]]
-        self._recorded.rows[zero] = True
+        unheard = ~self._recorded.rows
+        self._recorded.rows[numbers[numbers >= nodes] - nodes] = True
+        zero = np.flatnonzero(unheard & self._recorded.rows)
         supports = self._points.supports[zero]
         on_edge = supports[:, 2] == NONE
         edges = supports[on_edge, :2]
         self._crossed[edges] = True
         keys = (edges[:, 0] << 32 | edges[:, 1]).tolist()
-        for key, number in zip(keys, zero[on_edge].tolist(), strict=True):
-            points = self._on_edges.setdefault(key, _Line()).points
-            points.append(nodes + number)
+        for key, number in zip(keys, (nodes + zero[on_edge]).tolist(), strict=True):
+            points = self._on_edges[key]
+            points.append(number)
             if len(points) > 1:
                 self._crowded.rows[np.array(points) - nodes] = True
         # in a face, where the edge on which it was found may be a diagonal; then on cuts
@@ -79,7 +77,7 @@ class EdgePoints:
             lines = [tuple(np.sort(ends[zero[k]]).tolist())]
             lines += [(*face, cut) for cut in cuts[cuts < NONE].tolist()]
             for line in lines:
-                self._in_faces.setdefault(line, _Line()).points.append(nodes + int(zero[k]))
+                self._in_faces[line].append(nodes + int(zero[k]))
 
     def bisect(self, facets: Ints, at: Floats) -> tuple[Ints, Floats, Ints]:
         """Bisect triangles at all recorded points on their edges; segments stay.
@@ -170,7 +168,7 @@ class EdgePoints:
         in the same order for every facet.
         """
         for key, line in self._lines(x, y):
-            others = [z for z in reversed(line.points) if z not in (x, y)]
+            others = [z for z in reversed(line) if z not in (x, y)]
             if not others:
                 continue
             direction = line.direction
@@ -225,7 +223,7 @@ class EdgePoints:
         of an edge of the mesh is the edge's, from x to y.
         """
         begin, known = self._place(x), line.direction
-        steps = np.array([self._place(z) for z in (y, *reversed(line.points))]) - begin
+        steps = np.array([self._place(z) for z in (y, *reversed(line))]) - begin
         lengths = (steps**2).sum(axis=1)
         far = int(lengths.argmax())
         if known is not None and known @ known >= _SHORT**2 * lengths[far]:

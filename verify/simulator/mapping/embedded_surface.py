@@ -112,7 +112,9 @@ class EmbeddedSurface:
         """Follow a cut."""
         if increment is None:
             return
-        near = distinct(of_lists(*self._near, increment.moved))
+        is_near = np.zeros(len(self.facets), dtype=bool)
+        is_near[of_lists(*self._near, increment.moved)] = True
+        near = np.flatnonzero(is_near)
         nodes = distinct(self.facets[near])
         numbers, values = self._values(nodes)
         # a facet on one side of all cuts, in cells that are as they were, stays as it is
@@ -154,11 +156,9 @@ class EmbeddedSurface:
         """Find cells for the corners (q, k, s) of parts of facets, a little inside of each part."""
         count, size, space = places.shape
         inside = (1.0 - _INWARDS) * places + _INWARDS * places.mean(axis=1, keepdims=True)
-        facet, (starts, _) = np.repeat(facets, size), self._around
-        near = np.concatenate([[0], np.cumsum(starts[facet + 1] - starts[facet])])
-        cell, at = self._places.cells_of(
-            inside.reshape(-1, space), (near, of_lists(*self._around, facet))
-        )
+        facet, (starts, near) = np.repeat(facets, size), self._around
+        bounds = np.stack([starts[facet], starts[facet + 1]], axis=1)
+        cell, at = self._places.cells_of(inside.reshape(-1, space), (bounds, near))
         weights = self._places.barycentric(cell, places.reshape(-1, space))
         weights[np.abs(weights) <= _SNAP] = 0.0
         weights /= weights.sum(axis=1, keepdims=True)

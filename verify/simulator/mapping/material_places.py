@@ -65,33 +65,34 @@ class MaterialPlaces:
     ) -> tuple[Ints, Floats]:
         """Cell (q,) of each place and the barycentric coordinates (q, d + 1) there.
 
-        `near` are the cells to try, if they are known: the first of each place, and all of them.
+        `near` are the cells to try, if they are known: the first of each place and one past its
+        last (q, 2), and all of them.
         """
-        starts, cells = self._near(places) if near is None else near
-        found, at, _ = _cells_of(places, starts, cells, self._elements, self.reach)
+        bounds, cells = self._near(places) if near is None else near
+        found, at, _ = _cells_of(places, bounds, cells, self._elements, self.reach)
         return found, at
 
     def holding(self, places: Floats) -> tuple[Ints, Ints]:
         """Place and cell of all pairs where the cell holds the place; on a face several do."""
-        starts, cells = self._near(places)
-        _, at, least = _cells_of(places, starts, cells, self._elements, self.reach)
-        place = np.repeat(np.arange(len(places)), np.diff(starts))
+        bounds, cells = self._near(places)
+        _, at, least = _cells_of(places, bounds, cells, self._elements, self.reach)
+        place = np.repeat(np.arange(len(places)), bounds[:, 1] - bounds[:, 0])
         holds = least >= np.minimum(at.min(axis=1), 0.0)[place] - _TIE
         return place[holds], cells[holds]
 
     def _near(self, places: Floats) -> tuple[Ints, Ints]:
-        """Cells to which each place may belong: the first of each, and all of them."""
+        """Cells to which each place may belong: bounds (q, 2) of each, and all of them."""
         reach = np.full((len(places), 1), self.reach)
         while True:
             starts, cells = self._tree.meeting(places - reach, places + reach)
             nowhere = starts[1:] == starts[:-1]
             if not nowhere.any():
-                return starts, cells
+                return np.stack([starts[:-1], starts[1:]], axis=1), cells
             reach[nowhere] *= _WIDER
 
 
 @njit(cache=True)
-def _cells_of(places, starts, near, elements, reach):
+def _cells_of(places, bounds, near, elements, reach):
     """Cell (q,), coordinates (q, d + 1) there, and the smallest one in each cell that is near."""
     cells, points, gradients, floor, ceiling = elements
     corners, space = cells.shape[1], places.shape[1]
@@ -99,14 +100,14 @@ def _cells_of(places, starts, near, elements, reach):
     smallest, trial = np.empty(len(near)), np.empty(corners)
     for q in range(len(places)):
         nearest = np.inf
-        for n in range(starts[q], starts[q + 1]):
+        for n in range(bounds[q, 0], bounds[q, 1]):
             gap = -np.inf
             for i in range(space):
                 gap = max(gap, floor[near[n], i] - places[q, i], places[q, i] - ceiling[near[n], i])
             smallest[n] = gap
             nearest = min(nearest, gap)
         limit, best = max(reach, 2.0 * nearest), -np.inf
-        for n in range(starts[q], starts[q + 1]):
+        for n in range(bounds[q, 0], bounds[q, 1]):
             least, cell = np.inf, near[n]
             if smallest[n] > limit:
                 smallest[n] = -np.inf

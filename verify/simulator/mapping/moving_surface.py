@@ -91,7 +91,9 @@ class MovingSurface:
             return
         # one vertex for a point and the nodes from which it moves
         pairs = point.ravel() << 32 | piece.ravel()
-        _, first, pair = np.unique(pairs, return_index=True, return_inverse=True)
+        distinct_pairs, pair = np.unique(pairs, return_inverse=True)
+        first = np.empty(len(distinct_pairs), dtype=np.int64)
+        first[pair[::-1]] = np.arange(len(pairs))[::-1]
         nodes = piece_cells[piece.ravel()[first]]
         moved = np.sort(np.where(counts(first), nodes, -1))
         vertex, new = self._keys.number(np.column_stack([point.ravel()[first], moved]))
@@ -103,7 +105,7 @@ class MovingSurface:
         self.facets.append(vertex[pair].reshape(point.shape))
         self.facet_piece.append(piece[:, 0])
         self.inner.append(inner)
-        change = np.flatnonzero(np.diff(owner, prepend=-1))
+        change = np.flatnonzero(np.append(True, owner[1:] != owner[:-1]))
         bounds[owner[change], 0] = begin + change
         bounds[owner[change], 1] = begin + np.append(change[1:], len(owner))
 
