@@ -5,7 +5,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
-_FLAT = 1e-6  # area over the square of the longest edge, at most, of a flat triangle
+# area over the square of the longest edge, at most, of a flat triangle: an angle that no mesh
+# generator aims at, and at which splitting its edges would leave none that is not flat
+_FLAT = 1e-6
 _ROUNDS = 8  # flat triangles that lie on flat ones are flipped from the outside in
 
 

@@ -1,4 +1,4 @@
-"""What the tree imports, pins and compiles: dependencies, locks, layers, sources."""
+"""Dependencies of the tree: imports, locks, layers, sources."""
 
 import ast
 import os

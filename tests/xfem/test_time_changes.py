@@ -1,4 +1,4 @@
-"""What changes during a motion: loads, supports, observers, the sign of time; faults of a step."""
+"""Changes during a motion: loads, supports, observers, the sign of time; faults of a step."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a study found: findings, a versioned JSON record, and the same numbers as CSV."""
+"""Record of a study: findings, versioned JSON, and the same numbers as CSV."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path

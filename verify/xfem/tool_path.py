@@ -148,10 +148,6 @@ class Sweep(FacetCut):
         """Its facets, as kernels take them."""
         return self.path.surface.arrays
 
-    def until(self, travel: float) -> "PartOfSweep":
-        """Keep the part that is swept when the blade has come so far."""
-        return PartOfSweep(self, travel)
-
     def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to what is swept, to its tangent plane past the rim."""
         return super().level_set(points) if self.path.sweeps else self.probed(points)[:, 0]
@@ -163,30 +159,6 @@ class Sweep(FacetCut):
         # nothing is swept: one side everywhere, and no point of the cut anywhere
         at = finite_array(points, "sweep: points", (None, self.path.blades.shape[2]))
         return np.tile([1.0, -np.inf, 0.0], (len(at), 1))
-
-
-@dataclass(frozen=True)
-class PartOfSweep:
-    """A sweep under way: the level set of the whole, ending where the blade is.
-
-    Attributes
-    ----------
-    sweep : Sweep
-    front : float
-        Travel of the blade so far, in metres.
-    """
-
-    sweep: Sweep
-    front: float
-
-    def level_set(self, points: Floats) -> Floats:
-        """`Sweep.level_set` of the whole path: what is cut does not move as the cut grows."""
-        return self.sweep.level_set(points)
-
-    def depth(self, points: Floats) -> Floats:
-        """Distance to the rim or, along the path, to the blade; negative past either."""
-        probed = self.sweep.probed(points)
-        return np.minimum(probed[:, 1], self.front - probed[:, 2])
 
 
 def _check(blades: Floats, times: Floats) -> None:
