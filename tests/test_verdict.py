@@ -1,12 +1,15 @@
 import sys
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).resolve().parent / "compare"))
 from cut_meshes import STRAIGHT, scene
 
+from verify.assess.intervals import error_interval
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict
 from verify.verdict import judge
 
@@ -44,6 +47,34 @@ def beside(ours, theirs, width=0.0, **size):
     """Errors of both solvers on levels that they have in common."""
     rows = [solve(i, e, width) for i, e in enumerate(ours)]
     return rows + [solve(i, e, width, "conforming", **size) for i, e in enumerate(theirs)]
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "width", "low", "high"),
+    [
+        (1.5, 1.0, 0.1, 4 / 11, 2 / 3),
+        (-1.5, -1.0, 0.1, 4 / 11, 2 / 3),
+        (0.5, 1.0, 0.1, 4 / 9, 6 / 11),
+        (1.05, 1.0, 0.1, 0.0, 1 / 6),
+        (-0.5, 1.0, 0.1, 16 / 11, 14 / 9),
+        (3.0, 1.0, 1.0, 0.5, inf),  # the truth may be 0
+        (3.0, 1.0, 1.5, 0.2, inf),
+    ],
+)
+def test_what_divides_an_error_is_uncertain_too(value, reference, width, low, high):
+    found = error_interval(Metric("work", value, "J", reference, width))
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-14, abs=1e-15)
+    true = reference + width * np.linspace(-1, 1, 2001)[1:-1]
+    errors = np.abs(value - true) / np.abs(true)
+    assert found.low * (1 - 1e-14) <= errors.min() <= found.low + 2e-3
+    assert errors.max() <= found.high * (1 + 1e-14)
+
+
+def test_a_verdict_counts_the_uncertainty_of_the_divisor():
+    # 1.045 over 1 ± 0.02: 0.045 ± 0.02 would pass 0.066; the truth reaches 0.0663
+    record = energy(1.045, 0.02)
+    assert verdicts({**ENERGY, "at_most": 0.066}, record)[0].verdict is UNDECIDED
+    assert verdicts({**ENERGY, "at_most": 0.0664}, record)[0].verdict is PASS
 
 
 JUDGED = {

@@ -7,6 +7,7 @@ or timed-out solve is a record like any other, with its reason.
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from math import inf
 from typing import Any
 
 from verify.reference_record import ReferenceRecord
@@ -79,6 +80,25 @@ class Metric:
     reference: float | None = None
     uncertainty: float = 0.0
     source: str = ""
+
+    def relative_distance(self) -> tuple[float, float, float]:
+        """Return |value/reference − 1| of a quantity, and its bounds for every true reference.
+
+        The true reference lies within `uncertainty` of the stated one, and is the divisor too: a
+        smaller one makes the distance larger twice. Unbounded where it may be 0.
+
+        Raises
+        ------
+        ValueError
+            If there is no reference, or it is 0.
+        """
+        if not self.reference:
+            raise ValueError(f"{self.name} has no reference, or one that is 0")
+        near, far = (abs(self.reference) + s * self.uncertainty for s in (-1.0, 1.0))
+        value = self.value if self.reference > 0.0 else -self.value
+        ends = abs(value - near) / near if near > 0.0 else inf, abs(value - far) / far
+        low = 0.0 if near <= value <= far else min(ends)
+        return abs(self.value - self.reference) / abs(self.reference), low, max(ends)
 
 
 @_closed

@@ -112,11 +112,18 @@ def _differences(
         )
         if rich == 0.0:
             continue
-        error = abs(poor - rich) / abs(rich)
-        found.append((asked.name, (error, (poor_width + width * (1 + error)) / abs(rich))))
+        found.append((asked.name, _relative(poor, poor_width, rich, width)))
     if not found:
         raise UnsupportedSceneError("no quantity of the case is known of both")
     return sorted(found, key=lambda row: -row[1][0])
+
+
+def _relative(poor: float, poor_width: float, rich: float, width: float) -> tuple[float, float]:
+    """Difference over the richer value, and how much larger it can be: that one divides too."""
+    error, least = abs(poor - rich) / abs(rich), abs(rich) - width
+    if least <= 0.0:
+        return error, np.inf
+    return error, (abs(poor - rich) + poor_width + width) / least - error
 
 
 def _share(error: float, width: float) -> str:

@@ -31,7 +31,8 @@ class NotMeasuredError(Exception):
 def error_interval(metric: Metric) -> Interval:
     """Relative error that a metric stands for, with the bounds of its true value.
 
-    For an error metric that is its value; for a quantity its distance from the reference.
+    For an error metric that is its value; for a quantity its relative distance from the reference,
+    whatever the true reference is within its uncertainty.
 
     Raises
     ------
@@ -39,14 +40,10 @@ def error_interval(metric: Metric) -> Interval:
         If the metric is a quantity without a reference, or with one that is 0.
     """
     if metric.name in ERROR_METRICS:
-        return _interval(metric.value, metric.uncertainty)
+        error, width = metric.value, metric.uncertainty
+        return Interval(error, max(0.0, error - width), error + width)
     if metric.reference is None:  # never take the quantity itself for an error
         raise NotMeasuredError(f"{metric.name} has no reference to be compared with")
     if metric.reference == 0.0:
         raise NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
-    scale = abs(metric.reference)
-    return _interval(abs(metric.value - metric.reference) / scale, metric.uncertainty / scale)
-
-
-def _interval(error: float, width: float) -> Interval:
-    return Interval(error, max(0.0, error - width), error + width)
+    return Interval(*metric.relative_distance())

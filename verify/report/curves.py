@@ -162,15 +162,22 @@ def _can_be_drawn(measured: Metric) -> bool:
     known = (
         measured.unit == "1" if measured.reference is None else math.isfinite(measured.reference)
     )
-    numbers = (measured.value, measured.uncertainty)
-    return known and all(math.isfinite(n) and abs(n) < _DRAWABLE[1] for n in numbers)
+    return known and all(
+        math.isfinite(n) and abs(n) < _DRAWABLE[1]
+        for n in (measured.value, measured.uncertainty, *_error_of(measured))
+    )
+
+
+def _error_of(measured: Metric) -> tuple[float, float]:
+    """Return the relative error that is drawn, and its half-width."""
+    if not measured.reference:
+        return abs(measured.value), measured.uncertainty
+    value, low, high = measured.relative_distance()
+    return value, max(value - low, high - value)
 
 
 def _point(solve: SolveRecord, measured: Metric) -> Point:
-    value, uncertainty = measured.value, measured.uncertainty
-    if measured.reference is not None:
-        scale = abs(measured.reference) or 1.0
-        value, uncertainty = abs(value - measured.reference) / scale, uncertainty / scale
+    value, uncertainty = _error_of(measured)
     drawn = value if value >= _DRAWABLE[0] else 0.0
     size = solve.size if solve.size and _DRAWABLE[0] < solve.size < _DRAWABLE[1] else None
     unknowns = solve.unknowns if solve.unknowns and solve.unknowns > 0 else None
