@@ -24,10 +24,10 @@ pytestmark = needs_fenicsx
 MIDDLE = polyline("middle", [-0.1, 0.5], [1.1, 0.5])
 
 
-def moving(cuts=(), kinematics="linear", duration=0.5, outputs=6, **changes):
+def moving(cuts=(), kinematics="linear", duration=0.5, outputs=6, time_step=0.01, **changes):
     """Give a free unit square of tissue."""
     analysis = {"kind": "dynamic", "kinematics": kinematics, "duration": duration,
-                "time_step": 0.01, "outputs": outputs}  # fmt: skip
+                "time_step": time_step, "outputs": outputs}  # fmt: skip
     tissue = {"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0}
     free = {"mesh": {"cells": [[4, 4]]}, "supports": [], "loads": []}
     return square(cuts, **{"material": tissue, "analysis": analysis, **free} | changes)

@@ -232,3 +232,10 @@ def test_overlap_is_the_shared_length_and_a_crossing_has_none():
 def test_a_fraction_of_the_length_is_found_across_kinks():
     kinked = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]])
     np.testing.assert_allclose(point_along(kinked, 0.5), [1.0, 1.0], atol=1e-15)
+
+
+def test_steps_are_counted_from_output_to_output(tmp_path):
+    """Outputs 0.2 s apart, of which ten gaps are the motion; a step longer than one is cut."""
+    analysis = load(tmp_path, MOVING).analysis
+    steps = [analysis.steps(largest) for largest in (5.0, 0.2, 0.1, 0.08)]
+    assert steps == [10, 10, 20, 30]

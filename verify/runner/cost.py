@@ -152,7 +152,6 @@ def _volume(scene: Scene) -> float:
 
 def _steps(scene: Scene, size: float, halved: int) -> float:
     """Time steps of a motion: those that are asked, or of a pressure wave across an element."""
-    assert scene.analysis.duration is not None
-    asked = scene.analysis.time_step
-    step = asked / 2**halved if asked else size / wave_speed(scene.material)
-    return max(1.0, scene.analysis.duration / step)
+    analysis = scene.analysis
+    largest = analysis.time_step or size * 2**halved / wave_speed(scene.material)
+    return analysis.steps(largest) * 2.0**halved

@@ -1,6 +1,7 @@
 """Supports, loads and the analysis of a scene. SI units."""
 
 from collections.abc import Sequence
+from math import ceil
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -350,3 +351,11 @@ class Analysis(Strict):
             return (0.0,)
         count = self.outputs or _OUTPUTS
         return tuple(self.duration * k / (count - 1) for k in range(count))
+
+    def steps(self, largest: float) -> int:
+        """Count the equal steps (s) from output to output over a whole motion, at most `largest`.
+
+        Outputs that are closer cut steps short. What opens or jumps between outputs is left out.
+        """
+        times = self.output_times
+        return (len(times) - 1) * max(1, ceil((times[1] - times[0]) / largest * (1 - 1e-9)))

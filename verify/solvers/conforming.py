@@ -142,8 +142,9 @@ class ReferenceSolver:
     have a pressure of their own from Poisson's ratio 0.45 on, so that they do not lock.
 
     A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
-    scheme, with the scene's time step on level 0; every level halves it with the elements, so
-    that what the levels say of their error is said of both.
+    scheme, with the scene's time step on level 0, or what outputs, openings and jumps leave of it;
+    every level halves each step with the elements, so that what the levels say of their error is
+    said of both.
 
     A reference is timed once, whatever `repetitions` says: it judges and does not compete.
     """
@@ -167,7 +168,7 @@ class ReferenceSolver:
 
         def marching(level: int, size: float) -> Marching:
             step = scene.analysis.time_step or natural_step(scene, size * 2**level)
-            return Marching(scheme, step / 2**level, _RADIUS, delay)
+            return Marching(scheme, step, _RADIUS, delay, level)
 
         degree = scene.reference.degree
         return _solve(

@@ -40,17 +40,27 @@ class Marching:
     name : str
         One of `SCHEMES`.
     largest : float
-        Largest time step, s.
+        Largest time step, s; a stop that is closer cuts it short.
     spectral_radius : float
         Of generalised-α at infinite frequency.
     delay : float
         By which facets on tool paths open late, s.
+    halvings : int
+        How often every step is halved that would be taken.
     """
 
     name: str
     largest: float
     spectral_radius: float = 0.8
     delay: float = 0.0
+    halvings: int = 0
+
+    def count(self, span: float) -> int:
+        """Count the equal steps over a time between two stops, s.
+
+        The steps are halved and not `largest`: where stops cut it short that would change nothing.
+        """
+        return max(1, int(np.ceil(span / self.largest * (1 - 1e-9)))) * 2**self.halvings
 
     def scheme(self) -> tuple[Scheme, bool]:
         """Give the scheme, and whether the internal force is the mean of a step."""
@@ -201,7 +211,8 @@ class _Mover:
             return False
         lasting = lasting_ties(self.facing, self.opening)
         ties = lasting.size // 2 * self.space.dimension
-        openings = len(np.unique(np.ceil(self.opening / self.marching.largest)))
+        step = self.marching.largest / 2**self.marching.halvings
+        openings = len(np.unique(np.ceil(self.opening / step)))
         if not 0 < ties <= min(_MOST_TIES, _SOLVES * openings):
             return False
         self.body.plan(lasting)
@@ -290,7 +301,7 @@ class _Mover:
     def _advance(self, state: State, end: float, begun: bool, most: int | None) -> None:
         """Step to a time by equal steps, and open on the way what was passed."""
         span = end - state.time
-        count = max(1, int(np.ceil(span / self.marching.largest * (1 - 1e-9))))
+        count = self.marching.count(span)
         size = float(f"{span / count:.14g}")  # the same up to round-off: one stepper
         if size not in self.steppers:
             scheme, averaged = self.marching.scheme()

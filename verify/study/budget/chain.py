@@ -218,7 +218,8 @@ class _Maker:
         assert analysis.duration is not None
         finest, steps = self._references.finest, self._references.steps
         if analysis.time_step is not None:
-            return analysis.time_step / (_FINER if finest is None else 2**finest)
+            finer = _FINER if finest is None else 2**finest
+            return analysis.duration / (analysis.steps(analysis.time_step) * finer)
         if finest is not None and steps:
             return analysis.duration / steps
         own = self._judged.iterations.get("steps", 0)
