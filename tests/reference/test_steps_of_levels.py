@@ -1,5 +1,7 @@
 """Time steps of the reference: halved with its elements, whatever cuts them short."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx, polyline
@@ -50,7 +52,7 @@ def test_every_level_of_the_reference_halves_every_step_of_the_one_before(
         taken.clear()
         solved(scene, "reference", level)
         begun.append(np.array([*taken, scene.analysis.duration]))
-    for coarse, fine in zip(begun, begun[1:], strict=False):
+    for coarse, fine in pairwise(begun):
         middles = 0.5 * (coarse[1:] + coarse[:-1])
         expected = np.sort(np.concatenate([coarse, middles]))
         assert fine == pytest.approx(expected, abs=1e-9)
