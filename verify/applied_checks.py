@@ -94,6 +94,8 @@ def limit_text(check: Any) -> str:
             return f"order ≥ {least:g}"
         case RateCheck():
             return f"order {check.equals:g} ± {check.within:g}"
+        case BoundCheck(metric="overlap_depth"):
+            return f"overlap ≤ {check.at_most:g} m"
         case BoundCheck():
             return f"relative error ≤ {check.at_most:g}"
         case RatioCheck(at_most=float(most)):

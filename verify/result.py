@@ -19,6 +19,8 @@ COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled
 CRITICAL_STEP = (
     "critical step"  #: of the notes of a solve in motion: of central differences, at rest
 )
+#: begins the note "comparison" of a solve that the comparison, not its solver, failed on
+COMPARISON_FAILED = "comparison failed"
 
 
 def _closed[Kind](kind: Kind) -> Kind:
@@ -47,7 +49,7 @@ class Verdict(StrEnum):
     PASS = "PASS"
     FAIL = "FAIL"
     UNDECIDED = "UNDECIDED"
-    ERROR = "ERROR"  # could not be judged because a solve did not finish
+    ERROR = "ERROR"  # could not be judged: a solve did not finish, or the comparison failed
 
 
 @_closed
@@ -168,6 +170,11 @@ class SolveRecord:
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""
         return next((metric for metric in self.metrics if metric.name == name), None)
+
+    @property
+    def not_compared(self) -> str:
+        """Why nothing was measured of a solve that gave an answer; empty if something was."""
+        return "" if self.metrics else self.notes.get("comparison", "")
 
 
 @_closed

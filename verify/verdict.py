@@ -2,7 +2,7 @@
 
 Everything measured is an interval. PASS if all of it satisfies the limit, FAIL if none of it
 does, UNDECIDED otherwise: the reference is too imprecise to tell. ERROR if a solve that the
-check needs is missing.
+check needs is missing, or its comparison failed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -195,7 +195,10 @@ def _ratio(
 def _judge_rate(
     check: RateCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
 ) -> VerdictRecord:
-    _levels(records, check.solver)
+    for record in _levels(records, check.solver):
+        if record.not_compared:  # a rate of the other levels would hide it
+            text = f"{record.solver} level {record.level}: {record.not_compared}"
+            raise NotMeasuredError(text)
     rate = next((r for r in rates if (r.solver, r.metric) == (check.solver, check.metric)), None)
     if rate is None:
         raise NotMeasuredError(f"no rate of {check.metric} for {check.solver}")

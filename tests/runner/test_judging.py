@@ -202,3 +202,76 @@ def test_a_scene_at_rest_has_no_critical_step(tmp_path):
     job = {"scene": scene_content(scene), "solver": "xfem", "level": 0, "repetitions": 1,
            "parameters": {}}  # fmt: skip
     assert CRITICAL_STEP not in solve_job(job, tmp_path, store=False)["notes"]
+
+
+DEPTH = 0.0137
+
+
+def text(case):
+    """A case as TOML."""
+    return "".join(f"{key} = {value(part)}\n" for key, part in case.items())
+
+
+def value(part):
+    if isinstance(part, dict):
+        return "{" + ", ".join(f"{key} = {value(one)}" for key, one in part.items()) + "}"
+    return f"[{', '.join(map(value, part))}]" if isinstance(part, list) else json.dumps(part)
+
+
+def pressed_case(dimension):
+    """Two halves of a unit square or cube, pressed rigidly into one another by `DEPTH`."""
+    d = dimension
+    normal = np.array([-0.31, 0.95] if d == 2 else [-0.27, 0.14, 0.95])
+    normal /= np.linalg.norm(normal)
+    middle = np.full(d, 0.47)
+    frame = np.linalg.svd(normal[None])[2][1:]  # along the cut
+    ends = [[-1], [1]] if d == 2 else [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    points = [(middle + 2 * np.array(end) @ frame).tolist() for end in ends]
+    if d == 2:
+        slope = -normal[0] / normal[1]
+        body = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+        side = {"slope": slope, "shift": [-DEPTH, 0.0], "strain": [0.0, 0.0]}
+        if (np.array(points[1]) - points[0])[0] < 0:
+            points.reverse()
+    else:
+        body = {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3}
+        shift = [[0.0, 0.0, -DEPTH], [0.0, 0.0, 0.0]]
+        side = {"normal": normal.tolist(), "shift": shift, "strain": [[0.0, 0.0]] * 2}
+    shared = {"metric": "overlap_depth", "solver": "xfem"}
+    return {
+        "title": "Pressed halves", "requirement": "Faces shall overlap by the depth given.",
+        "geometry": body, "mesh": {"cells": [[5, 4, 3][:d]]},
+        "material": {"young": 1.0, "poisson": 0.3, **({"plane": "strain"} if d == 2 else {})},
+        "supports": [{"where": "boundary", "displacement": "exact"}],
+        "cuts": [{"kind": "polyline" if d == 2 else "polygon", "points": points}],
+        "contact": {"expected": "overlap"},
+        "exact": {
+            "solution": "patch" if d == 2 else "solid_patch",
+            "parameters": {"point": middle.tolist(), **side},
+        },
+        "acceptance": [
+            {**shared, "check": "value", "equals": DEPTH, "relative_tolerance": 1e-6,
+             "source": "prescribed"},
+            {**shared, "check": "error", "at_most": 1.001 * DEPTH},
+            {**shared, "check": "error", "at_most": 0.999 * DEPTH},
+        ],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_depth_of_an_overlap_can_be_asked_and_is_judged(verify, dimension):
+    (verify.folder / "pressed.toml").write_text(text(pressed_case(dimension)))
+    done = verify("run", "pressed.toml", "--out", "out", "--json", "--solver", "xfem")
+    (case,) = json.loads(done.stdout)["cases"]
+    found = [(v["verdict"], v["observed"]) for v in case["verdicts"]]
+    assert [verdict for verdict, _ in found] == ["PASS", "PASS", "FAIL"]
+    assert found[0][1] == pytest.approx(DEPTH, rel=1e-9)
+
+
+def test_a_rate_of_an_overlap_is_refused_with_what_can_be_asked(verify):
+    case = pressed_case(2) | {"mesh": {"cells": [[4, 4], [8, 8], [16, 16]]}}
+    case["acceptance"] = [{"check": "rate", "metric": "overlap_depth", "at_least": 1.0}]
+    (verify.folder / "pressed.toml").write_text(text(case))
+    done = verify("check", "pressed.toml")
+    assert done.returncode == 2
+    assert "overlap_depth has no rate; expected a check 'error' (at most, m)" in done.stderr

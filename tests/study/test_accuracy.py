@@ -8,6 +8,7 @@ from judged_fields import Cubic, judged
 from verify.assess.accuracy import assess_accuracy
 from verify.result import SolveRecord, Status, Verdict
 from verify.result_files import read_result, write_result
+from verify.runner.ending import SOLVER_FAILED, exit_code
 from verify.verdict import with_verdicts
 
 
@@ -157,25 +158,74 @@ def test_a_solution_beside_the_body_is_not_measured_but_named():
     assert "1 of the volume of the solution lies outside the body" in result.verdicts[0].reason
 
 
-def test_a_solution_that_cannot_be_compared_costs_nobody_else_a_verdict(monkeypatch):
+@pytest.mark.parametrize("faulty", ["Measured", "error_history"])
+def test_a_fault_of_the_comparison_is_an_error_and_not_the_guests_failure(monkeypatch, faulty):
+    import verify.assess.accuracy as accuracy
+
+    real = getattr(accuracy, faulty)
+
+    def breaking(given, *rest):
+        if getattr(given, "solution", given).unknowns == 13:
+            raise FloatingPointError("overflow encountered in multiply")
+        return real(given, *rest)
+
+    monkeypatch.setattr(accuracy, faulty, breaking)
+    odd = replace(LEVELS[0], unknowns=13)
+    result = assess([{**BOUND, "at_most": 0.2}], {"guest": {0: odd}, "xfem": {0: LEVELS[0]}}, EXACT)
+    guest = next(solve for solve in result.solves if solve.solver == "guest")
+    assert guest.status is Status.SOLVED
+    assert not guest.metrics
+    verdicts = {verdict.solver: verdict for verdict in result.verdicts}
+    assert verdicts["xfem"].observed == pytest.approx(0.0986, rel=0.01)
+    assert verdicts["guest"].verdict is Verdict.ERROR
+    assert "comparison failed: FloatingPointError: overflow" in verdicts["guest"].reason
+    assert exit_code([result]) == SOLVER_FAILED
+    # nor is that hidden where no check is made of the guest
+    assert exit_code([replace(result, verdicts=[verdicts["xfem"]])]) == SOLVER_FAILED
+
+
+def test_a_rate_over_the_levels_that_could_be_compared_is_none(monkeypatch):
     import verify.assess.accuracy as accuracy
 
     real = accuracy.Measured
 
     def breaking(given, *rest):
-        if given.unknowns == 13:
-            raise FloatingPointError("overflow encountered in multiply")
+        if len(given.points) == len(LEVELS[1].points):
+            raise ZeroDivisionError
         return real(given, *rest)
 
     monkeypatch.setattr(accuracy, "Measured", breaking)
-    wild = replace(LEVELS[0], unknowns=13)
-    result = assess([BOUND], {"guest": {0: wild}, "xfem": {0: LEVELS[0]}}, EXACT)
+    four = dict(enumerate([*LEVELS.values(), interpolant(64)]))
+    rate = {"check": "rate", "metric": "energy_norm", "at_least": 0.9}
+    (found,) = assess(
+        [rate], {"xfem": four}, EXACT, mesh={"cells": [[n, n] for n in (8, 16, 32, 64)]}
+    ).verdicts
+    assert found.verdict is Verdict.ERROR
+    assert "xfem level 1: comparison failed: ZeroDivisionError" in found.reason
+
+
+def in_space(given):
+    tetrahedra = np.column_stack([np.tile([0, 1], (2, 1)), [[2, 3], [3, 2]]])
+    points = np.vstack([np.zeros(3), np.eye(3)])
+    return solution(points, tetrahedra, np.zeros((4, 3)))
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        (lambda s: replace(s, displacement=1e40 * s.displacement), "the body is 1.41 m large"),
+        (in_space, "space of dimension 3; expected cells of dimension 2 in space of dimension 2"),
+    ],
+)
+def test_an_answer_that_no_comparison_can_be_made_of_is_its_solvers_failure(wrong, said):
+    guests = {"guest": {0: wrong(LEVELS[0])}, "xfem": {0: LEVELS[0]}}
+    result = assess([BOUND], guests, EXACT)
     guest = next(solve for solve in result.solves if solve.solver == "guest")
     assert guest.status is Status.FAILED
-    assert guest.reason.startswith("its solution cannot be compared: FloatingPointError")
+    assert guest.reason.startswith("its solution cannot be compared: ")
+    assert said in guest.reason
     verdicts = {verdict.solver: verdict for verdict in result.verdicts}
     assert verdicts["xfem"].observed == pytest.approx(0.0986, rel=0.01)
-    assert verdicts["guest"].verdict is Verdict.ERROR
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 0.125, 1e6])

@@ -32,10 +32,11 @@ from verify.compare.errors import Rules
 from verify.compare.hooke import Law, law_of
 from verify.compare.integration import spread_of
 from verify.compare.locate import ROUND_OFF
+from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
 from verify.reference_record import ReferenceRecord
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
+from verify.result import COMPARISON_FAILED, CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
 from verify.solution import Solution
 
@@ -45,6 +46,8 @@ REFERENCE = "reference"
 _COVERED = 0.01
 _ON_SURFACE = 0.01  # of the size of a membrane: so far apart two triangulations of it may be
 _SAME_TIME = 1e-6  # of the duration
+# of the body's size: fourth powers of strains, of cells 1e-10 of the body, stay below 1e160
+_FARTHEST = 1e30
 
 
 def assess_accuracy(
@@ -82,7 +85,11 @@ def assess_accuracy(
     if scene.judged_by_exact and exact is None:
         raise InputError("the scene is judged by its exact solution, which was not given")
     law = law_of(scene)
-    reference, missing, body = _reference(scene, solutions, exact, law)
+    body, missing = _body(scene, exact)
+    reference = None
+    if body is not None:
+        records, solutions = _fit(scene, records, solutions, body)
+        reference, missing = _reference(scene, solutions, exact, body, law)
     measured: list[SolveRecord] = list(records)
     for level in sorted({record.level for record in records}):
         rows = [i for i, record in enumerate(records) if record.level == level]
@@ -99,8 +106,10 @@ def assess_accuracy(
                 try:
                     one = Measured(solution, body, law, scene)
                     measured[i] = _measure(records[i], one, judge_of, missing, rules, exact)
-                except Exception as problem:  # of this one: the others are measured all the same
-                    measured[i] = _incomparable(records[i], problem)
+                except Exception as problem:  # a fault of the comparison costs this solve alone
+                    traceback.print_exception(problem)  # for the log
+                    why = one_line(f"{type(problem).__name__}: {problem}")
+                    measured[i] = not_compared(scene, records[i], why)
     rates = _rates(scene, measured)
     record = reference.record if reference else ReferenceRecord("none", reason=missing)
     if record.kind == "conforming":
@@ -121,29 +130,51 @@ def assess_accuracy(
     )
 
 
+def _body(scene: Scene, exact: ExactField | None) -> tuple[AnyBody | None, str]:
+    """Return the body if it can be compared on, else why it cannot."""
+    try:
+        return body_of(scene, None if exact is None else np.asarray(exact.singular_points)), ""
+    except UnsupportedSceneError as problem:
+        return None, str(problem)
+
+
 def _reference(
     scene: Scene,
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None,
+    body: AnyBody,
     law: Law,
-) -> tuple[Reference | None, str, AnyBody | None]:
-    """Find the reference, or say why there is none, and the body if it can be compared on."""
-    try:
-        body = body_of(scene, None if exact is None else np.asarray(exact.singular_points))
-    except UnsupportedSceneError as problem:
-        return None, str(problem), None
+) -> tuple[Reference | None, str]:
+    """Find the reference, or say why there is none."""
     try:
         if scene.judged_by_exact:
             assert exact is not None
-            return exact_reference(scene, exact, body, law), "", body
+            return exact_reference(scene, exact, body, law), ""
         levels = solutions.get(REFERENCE, {})
         judged = [s for name, own in solutions.items() if name != REFERENCE for s in own.values()]
         sizes = (compared_size(s, body) for s in judged or levels.values())
         finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
-        return conforming_reference(scene, levels, body, law, finest, others), "", body
+        return conforming_reference(scene, levels, body, law, finest, others), ""
     except InputError as problem:
-        return None, str(problem), body
+        return None, str(problem)
+
+
+def _fit(
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    solutions: Mapping[str, Mapping[int, Solution]],
+    body: AnyBody,
+) -> tuple[list[SolveRecord], Mapping[str, Mapping[int, Solution]]]:
+    """Leave out solutions that no comparison can be made of; their solves are failed ones."""
+    kept, fit = list(records), {name: dict(own) for name, own in solutions.items()}
+    for i, record in enumerate(kept):
+        solution = _solved(record, solutions)
+        if solution is not None and (defect := _unfit(scene, solution, body)):
+            del fit[record.solver][record.level]
+            reason = f"its solution cannot be compared: {defect}"
+            kept[i] = replace(record, status=Status.FAILED, reason=reason)
+    return kept, {name: own for name, own in fit.items() if own}
 
 
 def _named(scene: Scene, reason: str) -> dict[str, str]:
@@ -152,11 +183,29 @@ def _named(scene: Scene, reason: str) -> dict[str, str]:
     return dict.fromkeys(["comparison", *asked], reason)
 
 
-def _incomparable(record: SolveRecord, problem: Exception) -> SolveRecord:
-    traceback.print_exception(problem)  # for the log
-    why = one_line(f"{type(problem).__name__}: {problem}")
-    reason = f"its solution cannot be compared: {why}"
-    return replace(record, status=Status.FAILED, reason=reason, metrics=[])
+def not_compared(scene: Scene, record: SolveRecord, why: str) -> SolveRecord:
+    """Return the record of a solve whose comparison failed: solved, and without any metric."""
+    return replace(_noted(record, _named(scene, f"{COMPARISON_FAILED}: {why}")), metrics=[])
+
+
+def _unfit(scene: Scene, solution: Solution, body: AnyBody) -> str:
+    """Say why no comparison can be made of a solution, or nothing: a fault of its solver."""
+    given, wanted = (
+        f"cells of dimension {one.cell_dimension} in space of dimension {one.dimension}"
+        for one in (solution, scene)
+    )
+    if given != wanted:
+        return f"{given}; expected {wanted}"
+    if simplices(solution.points, solution.cells).degenerate.all():
+        return "all its cells are without volume"
+    if (farthest := float(np.abs(solution.displacement).max())) > _FARTHEST * body.size:
+        return f"it moves by {farthest:.3g} m; the body is {body.size:.3g} m large"
+    if solution.order == 2:
+        try:
+            straight_or_raise(solution.points, solution.cells)
+        except InputError as problem:
+            return str(problem)
+    return ""
 
 
 def _solved(

@@ -8,7 +8,8 @@ solver and judged as such. That error counts up to a tenth of the largest jump o
 solver gives another answer, not the same one less exactly.
 """
 
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,8 +21,10 @@ from verify.compare.body import AnyBody, body_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch
 from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
 from verify.reference_record import ReferenceRecord
 from verify.result import (
+    COMPARISON_FAILED,
     CaseResult,
     Metric,
     Notice,
@@ -32,6 +35,7 @@ from verify.result import (
     Status,
 )
 from verify.scene import Scene
+from verify.scene.acceptance import OVERLAP
 from verify.solution import Solution
 
 REFERENCE = "reference"
@@ -58,6 +62,7 @@ def with_openings(
     scene: Scene,
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: Any = None,
+    announce: Callable[[SolveRecord], None] = lambda record: None,
 ) -> CaseResult:
     """Add overlaps, opening profiles and warnings to the result of a case.
 
@@ -69,6 +74,8 @@ def with_openings(
     solutions : mapping of solver to mapping of level to Solution
     exact : object with ``displacement`` and ``gradient``, optional
         The exact solution that the scene names.
+    announce : callable
+        Is told of each solve before its overlaps are looked for.
 
     Returns
     -------
@@ -89,11 +96,15 @@ def with_openings(
         if solution is None or record.status is not Status.SOLVED:
             solves.append(record)
             continue
+        announce(record)
         try:
             own = found[record.solver, record.level] = _deepest(solution)
         except (InputError, UnsupportedSceneError) as problem:
-            notes = {**record.notes, "overlap_depth": str(problem)}
-            solves.append(replace(record, notes=notes))
+            solves.append(_without(record, str(problem)))
+        except Exception as problem:  # a fault of the comparison costs this solve alone
+            traceback.print_exception(problem)  # for the log
+            why = one_line(f"{COMPARISON_FAILED}: {type(problem).__name__}: {problem}")
+            solves.append(_without(record, why))
         else:
             solves.append(_recorded(record, own, scene))
     result = replace(result, solves=solves)
@@ -128,7 +139,7 @@ def _recorded(record: SolveRecord, found: _Found, scene: Scene) -> SolveRecord:
     overlap = found.overlap
     metrics = [
         *record.metrics,
-        Metric("overlap_depth", overlap.depth, "m"),
+        Metric(OVERLAP, overlap.depth, "m"),
         Metric(name, overlap.measure, unit),
     ]
     said = [_place(found)] if overlap.depth > 0.0 else []
@@ -138,8 +149,12 @@ def _recorded(record: SolveRecord, found: _Found, scene: Scene) -> SolveRecord:
             f"{overlap.inside_out} facets of cuts left out, whose cells are inside out in the "
             "deformed body"
         )
-    notes = {**record.notes, "overlap_depth": "; ".join(said)} if said else record.notes
+    notes = {**record.notes, OVERLAP: "; ".join(said)} if said else record.notes
     return replace(record, metrics=metrics, notes=notes)
+
+
+def _without(record: SolveRecord, why: str) -> SolveRecord:
+    return replace(record, notes={**record.notes, OVERLAP: why})
 
 
 def _with_overlap(reference: ReferenceRecord, found: _Found) -> ReferenceRecord:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.error_history import ERROR_NAMES
 from verify.result import Metric
+from verify.scene.acceptance import OVERLAP
 
 # metrics that are relative errors themselves; all others are quantities with a reference
 ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
@@ -31,15 +32,16 @@ class NotMeasuredError(Exception):
 def error_interval(metric: Metric) -> Interval:
     """Relative error that a metric stands for, with the bounds of its true value.
 
-    For an error metric that is its value; for a quantity its relative distance from the reference,
-    whatever the true reference is within its uncertainty.
+    For an error metric that is its value, for the depth of an overlap the depth in m; for a
+    quantity its relative distance from the reference, whatever the true reference is within its
+    uncertainty.
 
     Raises
     ------
     NotMeasuredError
         If the metric is a quantity without a reference, or with one that is 0.
     """
-    if metric.name in ERROR_METRICS:
+    if metric.name in ERROR_METRICS or metric.name == OVERLAP:
         error, width = metric.value, metric.uncertainty
         return Interval(error, max(0.0, error - width), error + width)
     if metric.reference is None:  # never take the quantity itself for an error

@@ -11,6 +11,7 @@ _METRICS = {
     "energy_norm": "relative energy-norm error",
     "jump_l2": "relative L² error of the jump across the cut",
     "strain_energy": "strain energy",
+    "overlap_depth": "depth of the overlap of faces, m",
     "displacement_max": "largest relative error of the displacement",
     "opening_l2": "relative L² error of the opening profile",
     "opening_max": "largest relative error of the opening profile",

@@ -78,7 +78,7 @@ def _without_wild(
     least = min((length for length in moved if length > 0.0), default=0.0)
     kept = []
     for (solve, solution), length in zip(shown, moved, strict=True):
-        defect = solve.notes.get("comparison", "") if not solve.metrics else ""
+        defect = solve.not_compared
         if length > _WILD * least:
             defect = f"it moves by up to {number_text(length)} m, the others by far less"
         if not defect:

@@ -7,14 +7,14 @@ was compared.
 
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from verify.assess.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy, not_compared
 from verify.assess.adequacy import adequacy_notice
 from verify.assess.closing import with_openings
 from verify.compare.body import body_of
@@ -49,15 +49,20 @@ def main(question_file: Path) -> None:
     def announce(record: SolveRecord) -> None:
         write_whole(folder / JUDGING, at.get((record.solver, record.level), ""))
 
-    records, solutions, at = _stored(root, question["folders"], question["unfit"], folder / JUDGING)
+    unfit, where = question["unfit"], folder / JUDGING
+    records, solutions, at = _stored(root, question["folders"], unfit, where)
+    records = [
+        not_compared(scene, record, unfit[name]) if name in unfit else record
+        for record, name in zip(records, question["folders"], strict=True)
+    ]
     exact = exact_of(scene)
     measured = assess_accuracy(scene, records, solutions, exact, announce)
-    result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
+    solutions = _comparable(measured, solutions)
+    measured = _with_openings(measured, scene, solutions, exact, announce)
     (folder / JUDGING).unlink(missing_ok=True)
+    result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
     notices = _adequacy(root, question["models"], scene, result)
     result = replace(result, notices=[*result.notices, *notices])
-    solutions = _comparable(result, solutions)
-    result = _with_openings(result, scene, solutions, exact)
     result = replace(result, provenance=question["provenance"])
     try:
         drawn = _error_pictures(scene, solutions, exact, folder)
@@ -83,10 +88,8 @@ def _stored(
     for name in folders:
         write_whole(at, name)
         record = load_record(root / name)
-        if record.status is Status.SOLVED:
+        if record.status is Status.SOLVED and name not in unfit:
             try:
-                if name in unfit:
-                    raise InputError(unfit[name])
                 check_files(root / name)
                 solution = read_solution(root / name / "solution")
             except InputError as error:
@@ -121,13 +124,17 @@ def _adequacy(
 
 
 def _with_openings(
-    result: CaseResult, scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any
+    result: CaseResult,
+    scene: Scene,
+    solutions: dict[str, dict[int, Solution]],
+    exact: Any,
+    announce: Callable[[SolveRecord], None],
 ) -> CaseResult:
     """Add openings and overlaps; those of a guest may not cost the others theirs."""
     own = {name: one for name, one in solutions.items() if is_built_in(name)}
     for given in (solutions, own):
         try:
-            return with_openings(result, scene, given, exact)
+            return with_openings(result, scene, given, exact, announce)
         except Exception as error:
             traceback.print_exc()
             text = f"cannot be had: {words_of(error)}"
@@ -143,7 +150,7 @@ def _comparable(
     fit = {
         (s.solver, s.level)
         for s in result.solves
-        if s.status is Status.SOLVED and (s.metrics or "comparison" not in s.notes)
+        if s.status is Status.SOLVED and not s.not_compared
     }
     kept = {
         name: {k: s for k, s in own.items() if (name, k) in fit and not _is_wild(s)}

@@ -1,7 +1,7 @@
 """The comparison of a finished case, under way in a process of its own.
 
 It says which solve it is at. If it dies there, that solve is taken out, with the reason, and the
-others are compared again: a solution that cannot be compared costs nobody else a verdict.
+others are compared again: a fault of the comparison costs one solve its verdicts, and no other.
 """
 
 import os
@@ -11,7 +11,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import CaseResult
+from verify.result import COMPARISON_FAILED, CaseResult
 from verify.result_files import read_result
 from verify.runner.child import Child, Ending
 from verify.runner.childhood import JUDGING
@@ -102,10 +102,10 @@ class Comparison:
         except (OSError, UnicodeDecodeError):
             at = ""
         if at in self._question["folders"] and at not in self._unfit:
-            self._unfit[at] = f"its solution cannot be compared: {why}"
+            self._unfit[at] = why
             self._child = self._started()
             return None
-        reason, origin = f"comparison failed: {why}", self._question["provenance"]
+        reason, origin = f"{COMPARISON_FAILED}: {why}", self._question["provenance"]
         judged = self._question["judge_only"]
         result = unjudged_result(self.scene, self._folders, reason, origin, judged)
         write_json(result.content(), self._folder / "result.json")

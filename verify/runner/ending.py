@@ -8,7 +8,7 @@ machine. A FAIL that its case lists as a known finding does not count.
 
 from collections.abc import Sequence
 
-from verify.result import CaseResult, Status, Verdict
+from verify.result import COMPARISON_FAILED, CaseResult, Status, Verdict
 
 ALL_PASS = 0
 VERDICT_FAILED = 1
@@ -34,7 +34,12 @@ def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
     statuses = [solve.status for result in results for solve in result.solves]
     if any(record.counts_as_failed for record in judged):
         return VERDICT_FAILED
-    if Verdict.ERROR in verdicts or any(status in _BROKEN for status in statuses):
+    uncompared = [solve.not_compared for result in results for solve in result.solves]
+    if (
+        Verdict.ERROR in verdicts
+        or any(status in _BROKEN for status in statuses)
+        or any(why.startswith(COMPARISON_FAILED) for why in uncompared)
+    ):
         return SOLVER_FAILED
     if Status.SOLVED not in statuses:
         return NOTHING_RAN

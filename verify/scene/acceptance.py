@@ -7,7 +7,8 @@ from pydantic import Field, field_validator, model_validator
 from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict, Vector
 
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
-OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean")
+OVERLAP = "overlap_depth"  # m, largest over time: of itself the error of faces that must not meet
+OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean", OVERLAP)
 # max and mean: over time; the last nine need no reference
 OF_MOTION = (
     "displacement_l2_max", "displacement_l2_mean", "energy_norm_max", "energy_norm_mean",
@@ -20,7 +21,7 @@ OF_MOTION = (
 METRICS = tuple(dict.fromkeys((
     "displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_l2", "opening_max",
     "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
-    *OF_MOTION,
+    OVERLAP, *OF_MOTION,
 )))  # fmt: skip
 
 
@@ -159,7 +160,7 @@ class _Check(Strict):
     )
     metric: str = Field(
         description="displacement_l2, energy_norm, jump_l2 (relative errors), strain_energy, "
-        "or the name of a quantity"
+        "overlap_depth (m), or the name of a quantity"
     )
 
     @field_validator("solver", "to", mode="after", check_fields=False)
@@ -191,7 +192,7 @@ class RateCheck(_Check):
 
 
 class BoundCheck(_Check):
-    """The relative error on the finest mesh."""
+    """The relative error on the finest mesh; of overlap_depth the depth itself, m."""
 
     check: Literal["error"]
     at_most: Positive

@@ -9,6 +9,7 @@ from verify.scene.acceptance import (
     METRICS,
     OF_CUTS,
     OF_MOTION,
+    OVERLAP,
     PartQuantity,
     StressIntensityQuantity,
 )  # fmt: skip
@@ -339,6 +340,9 @@ def _check_acceptance(scene: SceneTables) -> None:
             raise ValueError(f"{place}: no '{check.metric}'{asked}")
         if check.metric in OF_CUTS and not scene.cuts:
             raise ValueError(f"{place}: {check.metric} needs a cut")
+        if check.metric == OVERLAP and check.check in ("rate", "ratio"):
+            expected = "expected a check 'error' (at most, m) or 'value'"
+            raise ValueError(f"{place}: {OVERLAP} has no {check.check}; {expected}")
         if check.metric in OF_MOTION and scene.analysis.duration is None:
             raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
         if check.check == "rate" and scene.mesh.count < 3:
