@@ -10,6 +10,11 @@ def count(text: str) -> int:
     return int(text)
 
 
+def seed(text: str) -> int:
+    """Read a whole number from 0 on."""
+    return 0 if text == "0" else count(text)
+
+
 def positive(text: str) -> float:
     """Read a positive number."""
     try:

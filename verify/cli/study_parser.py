@@ -4,7 +4,7 @@ import argparse
 import os
 from collections.abc import Callable
 
-from verify.cli.argument_types import count, positive
+from verify.cli.argument_types import count, positive, seed
 from verify.cli.shared_arguments import (
     Add,
     add_action,
@@ -54,6 +54,10 @@ def add_study_command(add: Add) -> None:
                 "-j", "--jobs", metavar="N", type=count, default=cores, dest="processes",
                 help="processes side by side (default: all cores; nothing measured is a time)",
             )  # fmt: skip
+        if name == "calibration":
+            kind.add_argument(
+                "--seed", metavar="N", type=seed, default=27, help="of the scenes (default: 27)"
+            )
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")
         add_out(kind)
         add_json(kind, "print the findings as JSON")

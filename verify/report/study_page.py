@@ -149,7 +149,7 @@ def _scatters(trials: Sequence[Mapping[str, Any]]) -> list[tuple[int, Drawing | 
         shown = [t for t in own if t["stated"] > 0.0 and t["true"] > 0.0]
         marks = [(t["family"], t["true"], t["stated"], t["quantity"] in _NORMS) for t in shown]
         missed = sum(not t["covered"] for t in shown)
-        title = f"P{degree}: stated uncertainty, relative"
+        title = f"{f'P{degree}' if degree else 'series'}: stated uncertainty, relative"
         said = f"{title}, over the true error: {len(shown)} marks, {missed} not covered."
         found.append((degree, scatter(title, "true error, relative", marks, (1.0, 10.0), palette,
                                       said) if shown else None))  # fmt: skip

@@ -1,12 +1,13 @@
 """Families of random scenes with an exact solution, on which the reference judges itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from verify.scene import Scene
+from verify.study.calibration.motion_scenes import bar, sudden_crack
 from verify.study.calibration.plane_scenes import (
     airy,
     arc_through,
@@ -31,7 +32,8 @@ class Family:
     ----------
     name : str
     make : callable
-        Makes the content of a scene, without a reference, from a random generator.
+        Makes the content of a scene, without a reference, from a random generator; of a motion
+        with the true ``values`` of its quantities.
     cells : (float, float)
         Elements of the coarsest level along the side of the body, least and most, by degree.
     scenes : int
@@ -48,10 +50,14 @@ class Family:
     levels: int = 3
     degrees: tuple[int, ...] = (1, 2)
 
-    def scene(self, index: int, seed: int = 0) -> Scene:
-        """Return a scene, judged by conforming levels as if there were no exact solution."""
+    def scene(self, index: int, seed: int) -> tuple[Scene, Mapping[str, float]]:
+        """Return a scene, judged by conforming levels as if there were no exact solution.
+
+        Beside it the true values of its quantities, where it is without an exact field.
+        """
         random = np.random.default_rng([seed, index, *self.name.encode()])
         content = self.make(random)
+        values = content.pop("values", {})
         low, high = (np.array(content["geometry"][end]) for end in ("lower", "upper"))
         reference = {
             "kind": "conforming",
@@ -59,7 +65,7 @@ class Family:
             "levels": self.levels,
             "degree": self.degrees[index % len(self.degrees)],
         }
-        return Scene.model_validate({**content, "reference": reference})
+        return Scene.model_validate({**content, "reference": reference}), values
 
 
 def families(quick: bool) -> list[Family]:
@@ -73,6 +79,8 @@ def families(quick: bool) -> list[Family]:
         Family("ring and disc", ring_and_disc, (3, 7), n),
         Family("arc through", arc_through, (3, 7), n),
         Family("arc crack", curved_crack, (3, 5), n),
+        Family("bar in motion", bar, (8, 12), n, degrees=(2,)),
+        Family("sudden crack", sudden_crack, (7, 9), n, degrees=(2,)),
     ]
     if quick:
         return found

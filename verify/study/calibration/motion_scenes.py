@@ -1,0 +1,163 @@
+"""Random scenes in motion whose numbers are known: waves in bars, cracks that open suddenly."""
+
+from math import cos, radians, sin, sqrt
+
+import numpy as np
+
+from verify.study.calibration.plane_scenes import Content, Random
+
+_YOUNG, _DENSITY, _LENGTH = 1.0, 1.0, 1.0
+
+
+def wave(distance: float, length: float, run: float) -> float:
+    """Displacement per strain of a bar whose free end is loaded suddenly, m.
+
+    d'Alembert's sum over reflections; the stress at the end corresponds to the strain.
+
+    Parameters
+    ----------
+    distance : float
+        From the loaded end, m; the other end is held.
+    length : float
+        Of the bar, m.
+    run : float
+        Way that a wave has run since, c t, m.
+    """
+    found, sign, way = 0.0, 1.0, 0.0
+    while way < run:
+        out, back = way + distance, way + 2 * length - distance
+        found += sign * (max(run - out, 0.0) - max(run - back, 0.0))
+        sign, way = -sign, way + 2 * length
+    return found
+
+
+def stretched(length: float, run: float) -> float:
+    """Integral of the squared strain, per squared strain of the load, of a bar as in `wave`, m."""
+    turn = (run / length) % 4.0
+    behind = min(turn, 4.0 - turn)  # one front runs; behind it the strain is 1, reflected 2
+    return length * (behind if behind <= 1.0 else 3.0 * behind - 2.0)
+
+
+def released(length: float, run: float) -> float:
+    """As `stretched`, of a bar of strain 1 whose end is let go suddenly: 1, 0, −1, 0 … m."""
+    return length * abs((run / length) % 2.0 - 1.0)
+
+
+def bar(random: Random) -> Content:
+    """Return a bar in uniaxial strain: prestrained and cut, or loaded suddenly at its end."""
+    dimension, cut = int(random.choice([2, 2, 3])), bool(random.integers(2))
+    poisson = float(random.uniform(0.0, 0.4))
+    modulus = _YOUNG * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
+    speed = sqrt(modulus / _DENSITY)
+    upper = [_LENGTH, *random.uniform(0.06, 0.1, dimension - 1).tolist()]
+    at, strain = float(random.uniform(0.3, 0.7)), float(random.uniform(0.005, 0.02))
+    run = float(random.uniform(0.7, 2.4)) * (min(at, 1 - at) if cut else _LENGTH)
+    points = [float(random.uniform(*span)) for span in ((0.05, at - 0.05), (at + 0.05, 0.95))]
+    shares = random.uniform(0.3, 1.0, 4).tolist()
+    sides = ["bottom", "top", *(["front", "back"] if dimension == 3 else [])]
+    across = {"bottom": "yz"[dimension - 2], "top": "yz"[dimension - 2], "front": "y", "back": "y"}
+    area = float(np.prod(upper[1:]))
+    content: Content = {
+        "title": "bar",
+        "requirement": "The stated uncertainty of the reference shall cover its true error.",
+        "geometry": {"kind": "rectangle" if dimension == 2 else "box",
+                     "lower": [0.0] * dimension, "upper": upper},
+        "mesh": {"cells": [[8, *[1] * (dimension - 1)]]},
+        "material": {"young": _YOUNG, "poisson": poisson, "density": _DENSITY,
+                     **({"plane": "strain"} if dimension == 2 else {})},
+        "analysis": {"kind": "dynamic", "duration": run / speed, "outputs": 4},
+        "supports": [
+            {"where": "left", "components": ["x"], "displacement": [0.0]},
+            *({"where": s, "components": [across[s]], "displacement": [0.0]} for s in sides),
+        ],
+        "quantities": [{"kind": "strain_energy"}],
+    }  # fmt: skip
+    middle = [0.47 * w for w in upper[1:]]
+    values: dict[str, float] = {}
+    for k, (x, share) in enumerate(zip(points if cut else points * 2, shares, strict=False)):
+        name, time = f"u {k}", share * run
+        content["quantities"].append(
+            {"kind": "displacement", "name": name, "point": [x, *middle], "component": "x",
+             "time": time / speed}
+        )  # fmt: skip
+        if not cut:
+            values[name] = strain * wave(_LENGTH - x, _LENGTH, time)
+        elif x < at:
+            values[name] = strain * (x - wave(at - x, at, time))
+        else:
+            values[name] = strain * (x + wave(x - at, _LENGTH - at, time))
+    if cut:
+        content["initial"] = {"kind": "equilibrium"}
+        pulled = {"where": "right", "components": ["x"], "displacement": [strain * _LENGTH]}
+        content["supports"].append(pulled)
+        content["cuts"] = [_across(at, upper)]
+        place = {"at": 0.45} if dimension == 2 else {"point": [at, *middle]}
+        for k, share in enumerate(shares[2:]):
+            name, time = f"opening {k}", share * run
+            asked = {"kind": "opening", "name": name, "time": time / speed}
+            content["quantities"].append(asked | place)
+            values[name] = strain * (wave(0.0, at, time) + wave(0.0, _LENGTH - at, time))
+        energy = released(at, run) + released(_LENGTH - at, run)
+    else:
+        pull = [modulus * strain, *[0.0] * (dimension - 1)]
+        content["loads"] = [{"kind": "traction", "where": "right", "traction": pull}]
+        energy = stretched(_LENGTH, run)
+    values["strain_energy"] = 0.5 * modulus * strain**2 * area * energy
+    return {**content, "values": values}
+
+
+def _across(at: float, upper: list[float]) -> Content:
+    """Return a cut across a bar."""
+    if len(upper) == 2:
+        return {"kind": "polyline", "points": [[at, -0.1], [at, upper[1] + 0.1]]}
+    y, z = (w + 0.1 for w in upper[1:])
+    corners = [[at, -0.1, -0.1], [at, y, -0.1], [at, y, z], [at, -0.1, z]]
+    return {"kind": "polygon", "points": corners}
+
+
+def sudden_factor(pressure: float, poisson: float, time: float) -> float:
+    """K_I of a half-infinite crack a time (s) after a pressure begins to act on its faces, Pa √m.
+
+    L. B. Freund, Dynamic Fracture Mechanics (1990), section 2.5; plane strain, E = ρ = 1.
+    """
+    speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
+    return 2 * pressure * sqrt((1 - 2 * poisson) * speed * time / np.pi) / (1 - poisson)
+
+
+def sudden_crack(random: Random) -> Content:
+    """Return a crack of length 1 that opens suddenly in a plate under tension, at any angle.
+
+    Each end is that of a half-infinite crack until a pressure wave has come from the other one;
+    the boundary is farther.
+    """
+    poisson, angle = float(random.uniform(0.0, 0.4)), float(random.uniform(-45.0, 45.0))
+    speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
+    middle = np.array([1.5, 1.2]) + random.uniform(-0.1, 0.1, 2)
+    ahead = 0.5 * np.array([cos(radians(angle)), sin(radians(angle))])
+    duration = float(random.uniform(0.6, 0.95)) / speed
+    pressure = cos(radians(angle)) ** 2
+    quantities, values = [], {}
+    for end in ("start", "end"):
+        for k, share in enumerate((float(random.uniform(0.4, 0.8)), 1.0)):
+            name, time = f"K_I {k} at the {end}", share * duration
+            quantities.append({"kind": "stress_intensity", "name": name, "end": end, "mode": "I",
+                               "time": time})  # fmt: skip
+            values[name] = sudden_factor(pressure, poisson, time)
+    return {
+        "title": "sudden crack",
+        "requirement": "The stated uncertainty of the reference shall cover its true error.",
+        "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [3.0, 2.4]},
+        "mesh": {"cells": [[10, 8]]},
+        "material": {"young": _YOUNG, "poisson": poisson, "density": _DENSITY, "plane": "strain"},
+        "analysis": {"kind": "dynamic", "duration": duration, "outputs": 3},
+        "initial": {"kind": "equilibrium"},
+        "supports": [
+            {"where": "bottom", "components": ["y"], "displacement": [0.0]},
+            {"where": "left", "components": ["x"], "displacement": [0.0]},
+        ],
+        "loads": [{"kind": "traction", "where": "top", "traction": [0.0, 1.0]}],
+        "cuts": [{"kind": "polyline", "points": [(middle - ahead).tolist(),
+                                                 (middle + ahead).tolist()]}],
+        "quantities": quantities,
+        "values": values,
+    }  # fmt: skip
