@@ -72,7 +72,7 @@ def trials(family: Family, index: int, seed: int) -> list[Trial]:
     solver = find_solver("reference")
     solutions = {k: solver.solve(scene, k, 0) for k in range(solver.levels(scene))}
     law, exact = law_of(scene), exact_of(scene)
-    body = body_of(scene, [] if exact is None else exact.singular_points)
+    body = body_of(scene, None if exact is None else exact.singular_points)
     truth = {name: (value, 0.0) for name, value in values.items()}
     if exact is not None:
         truth = exact_reference(scene, exact, body, law).quantities
