@@ -163,19 +163,22 @@ def number_nodes(
     node_of = np.full(groups, -1)
     node_of[joined.group[alive]] = nodes[alive]
 
-    # the material in which a node lies keeps the node's number
-    home = np.ones(nodes.shape, dtype=bool)
-    sign = np.where(partition.points.values[nodes[:pieces]] >= 0.0, 1, -1)
+    # The material in which a node lies keeps the node's number. On cuts through the node that is
+    # the one above most of them: there may be none above all, as where a cut runs along a wall.
+    rank = np.zeros(nodes.shape, dtype=np.int64)
+    level = partition.points.values[nodes[:pieces]]
     label = partition.label[:, None, :]
-    home[:pieces] = ((label == 0) | (label == sign)).all(axis=2)
-    is_home = np.zeros(groups, dtype=bool)
-    is_home[joined.group[home & alive[:, None]]] = True
+    beyond = (label * level < 0.0).any(axis=2)
+    below = ((label < 0) & (level == 0.0)).sum(axis=2)
+    rank[:pieces] = np.where(beyond, 1 + label.shape[2], below)
+    group_rank = np.full(groups, np.iinfo(np.int64).max)
+    np.minimum.at(group_rank, joined.group[alive], rank[alive])
 
     inner = np.zeros(len(mesh.points), dtype=bool)
     inner[mesh.cells[partition.parent]] = True
     used = np.flatnonzero(node_of >= 0)
     used = used[inner[node_of[used]]]
-    used = used[np.lexsort([used, ~is_home[used], node_of[used]])]
+    used = used[np.lexsort([used, group_rank[used], node_of[used]])]
     first = np.diff(node_of[used], prepend=-1) != 0
     number = np.full(groups, -1)
     number[used[first]] = node_of[used[first]]
@@ -223,7 +226,7 @@ def node_sides(
     level_sets : (n, cuts) float array
         At the nodes of the mesh, in metres.
     node_parent : (N,) int array
-        Node of each unknown; the first n are those of the nodes' own material.
+        Node of each unknown.
     cells : (p, d + 1) int array
         Dof nodes of each piece.
     label : (p, cuts) int8 array
@@ -232,7 +235,9 @@ def node_sides(
         Of the pieces that are not just their whole cells.
     """
     side = np.empty((len(node_parent), label.shape[1]), dtype=np.int8)
-    own = np.arange(len(node_parent)) < len(level_sets)
+    # where a node's own material has no volume, its number is of an unknown beyond a cut
+    own = np.zeros(len(node_parent), dtype=bool)
+    own[cells[(label[:, None] * level_sets[node_parent[cells]] >= 0.0).all(axis=2)]] = True
     nodes = cells[pieces.rows].ravel()
     for cut in range(label.shape[1]):
         above, below = np.zeros((2, len(node_parent)), dtype=bool)
