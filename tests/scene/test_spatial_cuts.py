@@ -106,7 +106,7 @@ def test_the_area_in_a_box_is_that_of_clipping():
 def test_the_distance_to_a_cut_is_that_to_its_nearest_point():
     surface = PolygonCut(**SQUARE).surface()
     for point, distance in (((0.5, 0.4, 0.9), 0.4), ((0.9, 0.5, 0.5), 0.1), ((1.1, 1.2, 0.5), 0.5)):
-        assert distance_to_triangles(np.array(point), surface) == pytest.approx(distance)
+        assert distance_to_triangles(np.array([point]), surface) == pytest.approx([distance])
 
 
 @pytest.mark.parametrize(

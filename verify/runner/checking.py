@@ -1,5 +1,7 @@
 """Checks of a case that take more than the case file: its exact solution, mesh, solvers."""
 
+from typing import Any
+
 from verify.errors import InputError
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
@@ -22,13 +24,9 @@ def check_scene(scene: Scene) -> None:
             raise
         except ValueError as error:
             raise InputError(str(error), where) from None
-    if scene.exact is not None:
-        from reference.exact import exact_of
-
-        try:
-            exact_of(scene)
-        except InputError as error:
-            raise InputError(f"exact: {error}", where) from None
+    exact = _exact_of(scene, where)
+    if scene.played_only is None:
+        _check_mechanics(scene, exact)
     for i, asked in enumerate(scene.quantities):
         if isinstance(asked, StressIntensityQuantity) and (reason := _missing(scene, asked)):
             raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
@@ -36,6 +34,30 @@ def check_scene(scene: Scene) -> None:
         for name in (check.solver, check.compared):
             if name is not None:
                 check_solver_name(name, f"{where}: acceptance[{i}]")
+
+
+def _check_mechanics(scene: Scene, exact: Any) -> None:
+    """Refuse what has no solution, or another one than the exact solution."""
+    # they cut meshes: commands that check nothing shall not load what that takes
+    from verify.runner.exact_fit import check_exact_fits
+    from verify.runner.held_pieces import check_pieces_are_held
+    from verify.solvers.body_of_scene import background_mesh
+
+    check_pieces_are_held(scene, exact)
+    if exact is not None and scene.judged_by_exact:
+        check_exact_fits(scene, exact, background_mesh(scene, 0)[0])
+
+
+def _exact_of(scene: Scene, where: str) -> Any:
+    """Return the exact solution of a scene, or None if it names none."""
+    if scene.exact is None:
+        return None
+    from reference.exact import exact_of
+
+    try:
+        return exact_of(scene)
+    except InputError as error:
+        raise InputError(f"exact: {error}", where) from None
 
 
 def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:

@@ -69,7 +69,7 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
     count = scene.reference.levels if reference else scene.mesh.count
     rows = []
     for level in range(count):
-        found = _reference_mesh(scene, level) if reference else _mesh(scene, level)
+        found = _reference_mesh(scene, level) if reference else mesh_of_level(scene, level)
         if found is None:
             return []
         nodes, size = found
@@ -93,7 +93,7 @@ def case_cost(scene: Scene, solvers: Sequence[str], repetitions: int = 3) -> lis
     return [row for name in solvers for row in solver_costs(scene, name, repetitions)]
 
 
-def _mesh(scene: Scene, level: int) -> tuple[float, float] | None:
+def mesh_of_level(scene: Scene, level: int) -> tuple[float, float] | None:
     """Return nodes and element size of a level of the scene's own mesh."""
     body = scene.geometry
     if isinstance(body, MeshFile):
@@ -120,7 +120,7 @@ def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
     """Return nodes and element size, far from what is singular, of a level of the reference."""
     body, degree = scene.geometry, scene.reference.degree
     if isinstance(body, MeshFile):
-        coarse = _mesh(scene, 0)
+        coarse = mesh_of_level(scene, 0)
         assert coarse is not None
         nodes, size = coarse[0] * 2.0 ** (scene.cell_dimension * level), coarse[1] / 2**level
     elif isinstance(body, Rectangle | Box | Polygon):

@@ -174,7 +174,7 @@ def _cut_distances(scene: SceneTables, point: Array) -> dict[str, float]:
     found = {}
     for cut in _known(scene):
         if isinstance(cut, SpatialCut):
-            found[cut.name] = distance_to_triangles(point, cut.surface())
+            found[cut.name] = float(distance_to_triangles(point[None], cut.surface())[0])
         elif cut.dimension == 2:
             plane: Any = cut
             found[cut.name] = float(distance_to_polyline(point[None], plane.vertices())[0])

@@ -7,6 +7,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _TOLERANCE = 1e-9  # of the body's size
+_AT_ONCE = 100_000  # pairs of a point and a triangle: 20 MB
 
 
 def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
@@ -102,23 +103,27 @@ def rim_edges(surface: tuple[Array, Ints]) -> Array:
     return points[distinct[count == 1]]
 
 
-def distance_to_triangles(point: Array, surface: tuple[Array, Ints]) -> float:
-    """Distance of a point (3,) to a triangulated surface, m."""
-    points, triangles = surface
-    corners = points[triangles]
-    best = np.inf
-    for k in range(3):
-        start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        share = np.clip(((point - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
-        off = point - start - share[:, None] * along
-        best = min(best, float(np.linalg.norm(off, axis=1).min()))
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inside = np.ones(len(corners), dtype=bool)
-    for k in range(3):
-        edge = corners[:, (k + 1) % 3] - corners[:, k]
-        inside &= (np.cross(edge, point - corners[:, k]) * normals).sum(axis=1) >= 0.0
-    height = np.abs(((point - corners[:, 0]) * normals).sum(1)) / np.linalg.norm(normals, axis=1)
-    return min(best, float(height[inside].min(initial=np.inf)))
+def distance_to_triangles(points: Array, surface: tuple[Array, Ints]) -> Array:
+    """Distance (n,) of points (n, 3) to a triangulated surface, m."""
+    corners = surface[0][surface[1]]
+    size = max(1, _AT_ONCE // len(corners))
+    blocks = [points[i : i + size] for i in range(0, len(points), size)]
+    return np.concatenate([np.zeros(0), *(_to_triangles(block, corners) for block in blocks)])
+
+
+def _to_triangles(points: Array, corners: Array) -> Array:
+    """Distance (n,) of points (n, 3) to the nearest of triangles (m, 3, 3)."""
+    away = points[:, None, None] - corners
+    along = np.roll(corners, -1, axis=1) - corners
+    share = np.einsum("nmkc,mkc->nmk", away, along) / (along**2).sum(axis=2)
+    off = away - np.clip(share, 0.0, 1.0)[..., None] * along
+    best: Array = np.linalg.norm(off, axis=3).min(axis=(1, 2))
+    normals = np.cross(along[:, 0], along[:, 1])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    inwards = np.cross(normals[:, None], along)
+    inside = (np.einsum("nmkc,mkc->nmk", away, inwards) >= 0.0).all(axis=2)
+    height = np.abs(np.einsum("nmc,mc->nm", away[:, :, 0], normals))
+    return np.minimum(best, np.where(inside, height, np.inf).min(axis=1))
 
 
 def overlap_area(one: tuple[Array, Ints], other: tuple[Array, Ints]) -> float:

@@ -1,0 +1,328 @@
+"""Contradictions between an exact solution and the scene that names it, found before a run.
+
+An exact field is a reference without a half-width, so that whatever of the scene it does not
+fulfil is counted as an error of the solver. It is held against supports, loads, faces of cuts,
+equilibrium and the initial state at points drawn with a fixed seed, and must be continuous
+wherever no cut is.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.runner import exact_samples as samples
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, ToolPathCut, Traction
+from verify.scene.cuts import whole_cut
+from verify.scene.history import factor_at
+from verify.scene.initial import AtRest, InitialField, Moving
+from verify.scene.parts import lie_on_part
+from verify.scene.prescribed import PrescribedMotion
+from verify.solvers.loads_of_scene import ForceDensity
+from verify.xfem.mesh import SimplexMesh
+
+Array = NDArray[np.float64]
+
+# Of the largest displacement, velocity or stress: what a case file states in seven digits passes,
+# and a difference below it is far below any error of discretisation.
+_SAME = 1e-6
+# Of the stress beside an end of a cut, which grows without bounds: an end that the file states in
+# nine digits is off the line of the field by 1e-4 of the least of the distances below.
+_SAME_AT_ENDS = 1e-3
+# Of the terms of an equation of equilibrium, taken by differences of fourth order over steps of
+# _STEP of the body, at least 1/_STEPS_OFF steps from cuts: truncation 1e-7, round-off 1e-10.
+_BALANCED, _STEP, _STEPS_OFF = 1e-4, 1e-3, 0.05
+_DISTANCES = np.geomspace(1e-5, 0.1, 12)  # from cuts and their ends, of the body
+_FOURTH_ORDER = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+
+def check_exact_fits(scene: Scene, exact: Any, mesh: SimplexMesh) -> None:
+    """Raise `InputError` where the exact solution of a scene contradicts what else it says.
+
+    Parameters
+    ----------
+    scene : Scene
+    exact : reference.exact.ExactSolution
+    mesh : SimplexMesh
+        Any mesh of the body.
+    """
+    fit = _Fit(scene, exact, mesh)
+    for finding in fit.findings():
+        raise InputError(f"exact: {finding}", str(scene.file or scene.name))
+
+
+class _Fit:
+    """An exact field beside the scene that names it; `mesh` is any mesh of the body."""
+
+    def __init__(self, scene: Scene, exact: Any, mesh: SimplexMesh) -> None:
+        self._scene, self._exact, self._mesh = scene, exact, mesh
+        self._rng = np.random.default_rng(5)
+        self._size = mesh.extent
+        self._cuts = [whole_cut(cut) for cut in scene.cuts]
+        self._times = [0.0]
+        if scene.analysis.duration is not None:
+            outputs = scene.analysis.output_times
+            self._times = [0.0, outputs[len(outputs) // 2], outputs[-1]]
+        self._boundary = samples.on_boundary(mesh, self._rng)
+        self._pairs = samples.in_body(mesh, self._rng)
+
+    def findings(self) -> Iterator[str]:
+        """Say each contradiction; the first of a kind."""
+        yield from self._jumps()
+        for time in self._times:
+            at = f" at {time:.4g} s" if self._scene.analysis.duration is not None else ""
+            for text in (*self._supports(time), *self._tractions(time), *self._balance(time)):
+                yield text + at
+        yield from self._faces()
+        yield from self._initial_state()
+
+    def _supports(self, time: float) -> Iterator[str]:
+        """Prescribed displacements; where two hold a component, the later one counts."""
+        scene, field = self._scene, self._exact.at(time)
+        points, near = self._support_points()
+        true = field.displacement(points, near)
+        given, by = np.full_like(true, np.nan), np.zeros(true.shape, dtype=np.int64)
+        for i, support in enumerate(scene.supports):
+            on = np.flatnonzero(lie_on_part(scene, support.where, points, self._size))
+            place = np.ix_(on, support.held(scene.dimension))
+            given[place], by[place] = self._prescribed(support, points[on], near[on], time), i
+        largest = max(np.abs(true).max(initial=0.0), np.nanmax(np.abs(given), initial=0.0))
+        off = np.nan_to_num(np.abs(given - true), nan=0.0)
+        if off.max(initial=0.0) > _SAME * largest:
+            k, c = np.unravel_index(int(off.argmax()), off.shape)
+            yield (
+                f"contradicts supports[{by[k, c]}] at {_place(points[k])}: u_{'xyz'[c]} is "
+                f"prescribed as {given[k, c]:.6g} m and is {true[k, c]:.6g} m in the exact "
+                f"solution; expected equal within {_SAME:g} of {largest:.3g} m: let the support "
+                "have displacement = 'exact', or judge by [reference] kind = 'conforming'"
+            )
+
+    def _support_points(self) -> tuple[Array, Array]:
+        """Points inside facets, and nodes for supports that hold no facet."""
+        points, near, _ = self._boundary
+        nodes, beside = samples.boundary_nodes(self._mesh)
+        for support in self._scene.supports:
+            if not lie_on_part(self._scene, support.where, points, self._size).any():
+                on = lie_on_part(self._scene, support.where, nodes, self._size)
+                points, near = np.vstack([points, nodes[on]]), np.vstack([near, beside[on]])
+        return points, near
+
+    def _prescribed(self, support: Support, points: Array, near: Array, time: float) -> Array:
+        exact = self._exact if support.displacement == "exact" else None
+        motion = PrescribedMotion(support, points, near, exact)
+        return motion.values(factor_at(support.history, time), time)
+
+    def _tractions(self, time: float) -> Iterator[str]:
+        """Tractions of loads, or none, in the components that no support holds."""
+        scene, (points, near, normals) = self._scene, self._boundary
+        field = self._exact.at(time)
+        stress = self._stress(field, points, near)
+        true = np.einsum("nij,nj->ni", stress, normals)
+        given, held = np.zeros_like(true), np.zeros(true.shape, dtype=bool)
+        by = np.full(len(points), -1)
+        for i, load in enumerate(scene.loads):
+            if isinstance(load, Traction):
+                on = np.flatnonzero(lie_on_part(scene, load.where, points, self._size))
+                density = ForceDensity(scene, load, field, time)
+                value = density.at(points[on], near[on], normals[on])
+                given[on] += factor_at(load.history, time) * value
+                by[on] = i
+        for support in scene.supports:
+            on = np.flatnonzero(lie_on_part(scene, support.where, points, self._size))
+            held[np.ix_(on, support.held(scene.dimension))] = True
+        largest = max(np.abs(stress).max(initial=0.0), np.abs(given).max(initial=0.0))
+        off = np.where(held, 0.0, np.abs(given - true))
+        if off.max(initial=0.0) > _SAME * largest:
+            k, c = np.unravel_index(int(off.argmax()), off.shape)
+            part = f"loads[{by[k]}]" if by[k] >= 0 else "a part of the boundary without a load"
+            yield (
+                f"contradicts {part} at {_place(points[k])}: the {'xyz'[c]} component of the "
+                f"traction is {given[k, c]:.6g} Pa in the scene and {true[k, c]:.6g} Pa in the "
+                f"exact solution; expected equal within {_SAME:g} of {largest:.3g} Pa: give the "
+                "part a support or a traction that is 'exact', or judge by [reference] kind = "
+                "'conforming'"
+            )
+
+    def _faces(self) -> Iterator[str]:
+        """Tractions on both faces of each cut, where and when all of it is open."""
+        scene, time = self._scene, self._times[-1]
+        field, steps = self._exact.at(time), self._size * _DISTANCES
+        level = np.abs(self._stress(field, self._boundary.points, self._boundary.near)).max()
+        for cut, asked in zip(self._cuts, scene.cuts, strict=True):
+            if (asked.ends_at if isinstance(asked, ToolPathCut) else asked.opens_at) > time:
+                continue
+            points, normals, to_end = samples.on_cut(cut, steps, self._rng)
+            inside = samples.holds(self._mesh, points)
+            points, normals, to_end = points[inside], normals[inside], to_end[inside]
+            loads = [
+                load for load in scene.loads if isinstance(load, CutFaces) and load.cut == cut.name
+            ]
+            for side in (1.0, -1.0):
+                outward = -side * normals
+                stress = self._stress(field, points, points + side * 1e-6 * self._size * normals)
+                true = np.einsum("nij,nj->ni", stress, outward)
+                given = np.zeros_like(true)
+                for load in loads:
+                    factor = factor_at(load.history, time)
+                    given += factor * load.values(points, outward, normals, time)
+                local = np.abs(stress).max(axis=(1, 2), initial=0.0)
+                close = np.where(to_end < 0.1 * self._size, _SAME_AT_ENDS * local, 0.0)
+                bound = _SAME * max(level, np.abs(given).max(initial=0.0)) + close
+                off = np.abs(given - true).max(axis=1, initial=0.0) - bound
+                if off.max(initial=0.0) > 0.0:
+                    k = int(off.argmax())
+                    yield (
+                        f"contradicts cut '{cut.name}' at {_place(points[k])}: its face bears a "
+                        f"traction of {_place(given[k])} Pa in the scene and {_place(true[k])} Pa "
+                        f"in the exact solution; expected equal within {bound[k]:.2g} Pa: let "
+                        "the cut lie where the field jumps, and end where that ends"
+                    )
+                    return
+
+    def _jumps(self) -> Iterator[str]:
+        """Differences of displacement across the body that no gradient and no cut explains."""
+        field = self._exact.at(self._times[-1])
+        a, b = self._segments()
+        middle, half = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
+        free = samples.distances(self._cuts, middle) > half
+        free &= self._one_material(middle, np.stack([a, b]))
+        a, b = a[free], b[free]
+        free = samples.holds(self._mesh, a) & samples.holds(self._mesh, b)
+        a, b = a[free], b[free]
+        along = np.zeros_like(a)
+        for node, weight in zip(0.5 * (_GAUSS + 1.0), 0.5 * _WEIGHTS, strict=True):
+            gradient = field.gradient(a + node * (b - a))
+            along += weight * np.einsum("nij,nj->ni", gradient, b - a)
+        start, end = field.displacement(a), field.displacement(b)
+        largest = max(np.abs(start).max(initial=0.0), np.abs(end).max(initial=0.0))
+        off = np.abs(end - start - along).max(axis=1, initial=0.0)
+        if off.max(initial=0.0) > _SAME * largest:
+            k = int(off.argmax())
+            yield (
+                f"jumps by {off[k]:.3g} m between {_place(a[k])} and {_place(b[k])}, where no cut "
+                f"is; expected a continuous displacement within {_SAME:g} of {largest:.3g} m: let "
+                "the cut lie where the field jumps, and end where that ends"
+            )
+
+    def _segments(self) -> tuple[Array, Array]:
+        """Return the ends of segments in cells, away from faces of cuts, and across their ends.
+
+        Those in cells must be off the ends of cuts by their length, so that the quadrature is
+        exact to round-off.
+        """
+        steps = self._size * _DISTANCES
+        ends = [samples.end_points(cut) for cut in self._cuts]
+        long = np.linalg.norm(self._pairs[:, 1] - self._pairs[:, 0], axis=1)
+        middle = self._pairs.mean(axis=1)
+        far = samples.distances(self._cuts, middle) > 2.0 * long
+        start, end = [self._pairs[far, 0]], [self._pairs[far, 1]]
+        for cut, (places, outward, normals) in zip(self._cuts, ends, strict=True):
+            points, across, _ = samples.on_cut(cut, steps, self._rng)
+            for side in (1.0, -1.0):
+                away = points[:, None] + side * steps[:, None] * across[:, None]
+                start.append(away[:, :-1].reshape(-1, points.shape[1]))
+                end.append(away[:, 1:].reshape(-1, points.shape[1]))
+            beyond = places[:, None] + steps[:, None] * outward[:, None]
+            reach = 0.3 * steps[:, None] * normals[:, None]
+            start.append((beyond - reach).reshape(-1, points.shape[1]))
+            end.append((beyond + reach).reshape(-1, points.shape[1]))
+        return np.concatenate(start), np.concatenate(end)
+
+    def _balance(self, time: float) -> Iterator[str]:
+        """Balance of stress, forces per volume and inertia inside the body."""
+        scene, field, h = self._scene, self._exact.at(time), _STEP * self._size
+        points = self._pairs[:, 0]
+        far = samples.distances(self._cuts, points) > _STEP / _STEPS_OFF * self._size
+        d = scene.dimension
+        around = 2 * h * np.vstack([np.eye(d), -np.eye(d)])
+        points = points[far & self._one_material(points, points + around[:, None])]
+        if not len(points):
+            return
+        terms = np.zeros((len(points), d, d + 2))
+        for j, step in enumerate(h * np.eye(d)):
+            for k, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
+                terms[:, :, j] += (
+                    weight / (12 * h) * self._stress(field, points + k * step)[:, :, j]
+                )
+        for load in scene.loads:
+            if isinstance(load, Gravity):
+                terms[:, :, d] += np.asarray(ForceDensity(scene, load).uniform(points))
+            elif isinstance(load, BodyForce):
+                force = ForceDensity(scene, load, field, time).at(points)
+                terms[:, :, d] += factor_at(load.history, time) * force
+        if self._exact.moves:
+            terms[:, :, d + 1] = self._inertia(points, time)
+        level = np.abs(self._stress(field, points)).max() / self._size
+        bound = _BALANCED * np.maximum(np.abs(terms).max(axis=(1, 2)), level)
+        off = np.abs(terms.sum(axis=2)).max(axis=1)
+        k = int((off - bound).argmax())
+        if off[k] > bound[k]:
+            left = _place(terms[k, :, :d].sum(axis=1))
+            said = _place(terms[k, :, d:].sum(axis=1))
+            yield (
+                f"is in no equilibrium at {_place(points[k])}: div σ of the field is {left} N/m³, "
+                f"the forces of the scene and inertia are {said} N/m³; expected a sum of zero "
+                f"within {bound[k]:.2g} N/m³: give a body_force that is 'exact', or leave out "
+                "loads that the field does not bear"
+            )
+
+    def _inertia(self, points: Array, time: float) -> Array:
+        """−ρ times the acceleration (n, d), by differences of the velocity, N/m³."""
+        step = _STEP * self._times[-1]
+        rate = np.zeros_like(points)
+        for k, weight in _FOURTH_ORDER:
+            rate += weight / step * self._exact.at(time + k * step).velocity(points)
+        return -float(self._scene.material.density or 0.0) * rate
+
+    def _one_material(self, points: Array, others: Array) -> NDArray[np.bool_]:
+        """Whether `others` (k, n, d) beside points (n, d) are all of the material there."""
+        material = self._scene.material
+        if material.is_uniform:
+            return np.ones(len(points), dtype=bool)
+        own = material.number_at(points)
+        return np.all([material.number_at(one) == own for one in others], axis=0)
+
+    def _initial_state(self) -> Iterator[str]:
+        """Displacement and velocity at the time 0 of a motion; an equilibrium is found by it."""
+        scene, initial = self._scene, self._scene.initial
+        if scene.analysis.duration is None:
+            return
+        field, points = self._exact.at(0.0), self._pairs[:, 0]
+        given: dict[str, Array] = {}
+        if isinstance(initial, InitialField):
+            place, speed = initial.state(points, points, field)
+            given = {"displacement": place, "velocity": speed}
+        elif isinstance(initial, AtRest | Moving):
+            speed = initial.velocities(points) if isinstance(initial, Moving) else 0.0 * points
+            given = {"displacement": 0.0 * points, "velocity": speed}
+        for what, value in given.items():
+            true = getattr(field, what)(points)
+            largest = max(np.abs(true).max(), np.abs(value).max())
+            off = np.abs(value - true).max(axis=1)
+            k = int(off.argmax())
+            if off[k] > _SAME * largest:
+                yield (
+                    f"contradicts initial at {_place(points[k])}: the {what} is "
+                    f"{_place(value[k])} in the scene and {_place(true[k])} in the exact "
+                    f"solution; expected equal within {_SAME:g}: kind = 'field', {what} = 'exact'"
+                )
+
+    def _stress(self, field: Any, points: Array, near: Array | None = None) -> Array:
+        """First Piola-Kirchhoff stress (n, d, d), Pa: of the linear or the corotated energy."""
+        if self._scene.analysis.kinematics == "linear" or not self._scene.material.is_uniform:
+            return np.asarray(field.stress(points, near))
+        law, d = field.law, self._scene.dimension
+        left, stretch, right = np.linalg.svd(field.gradient(points, near) + np.eye(d))
+        turned = np.sign(np.linalg.det(left @ right))
+        stretch[:, -1] *= turned
+        left[:, :, -1] *= turned[:, None]
+        strain = stretch - 1.0
+        principal = 2 * law.shear * strain + law.lame * strain.sum(axis=1)[:, None]
+        return np.asarray(np.einsum("nik,nk,nkj->nij", left, principal, right))
+
+
+def _place(point: Array) -> str:
+    return f"({', '.join(f'{x:.6g}' for x in point)})"

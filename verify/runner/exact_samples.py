@@ -1,0 +1,209 @@
+"""Points of a scene at which its exact solution is held against supports, loads and cuts."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from verify.scene import ArcCut, CylinderCut, DiscCut, SphereCut
+from verify.scene.planar import distance_to_polyline
+from verify.scene.spatial import distance_to_triangles, rim_edges
+from verify.solvers.boundary_of_scene import Boundary
+from verify.xfem.mesh import SimplexMesh
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_FACETS, _CELLS, _FACES = 400, 400, 40  # most samples of the boundary, the body, a cut
+_BESIDE = 1e-6  # of an element or of the body: on the side meant, and nowhere else
+
+
+class OnBoundary(NamedTuple):
+    """Points (n, d) on the boundary, points beside them in the body, and outward normals."""
+
+    points: Array
+    near: Array
+    normals: Array
+
+
+class OnCut(NamedTuple):
+    """Points (n, d) of a cut, unit normals to its positive side, distances (n,) to its ends."""
+
+    points: Array
+    normals: Array
+    to_end: Array
+
+
+def on_boundary(mesh: SimplexMesh, rng: np.random.Generator) -> OnBoundary:
+    """Draw a point inside each facet of the boundary, of some of them if they are many."""
+    boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
+    chosen = _some(len(boundary.facets), _FACETS, rng)
+    points = _inside(mesh.points[boundary.corners[chosen]], rng)
+    middle = mesh.points[mesh.cells[boundary.facets[chosen, 0]]].mean(axis=1)
+    near = points + _BESIDE * (middle - points)
+    return OnBoundary(points, near, boundary.outward_normals(chosen))
+
+
+def boundary_nodes(mesh: SimplexMesh) -> tuple[Array, Array]:
+    """Nodes (n, d) of the boundary, and a point of the body beside each."""
+    boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
+    cell = np.zeros(len(mesh.points), dtype=np.int64)
+    cell[boundary.corners.ravel()] = np.repeat(boundary.facets[:, 0], boundary.corners.shape[1])
+    points = mesh.points[boundary.nodes]
+    middle = mesh.points[mesh.cells[cell[boundary.nodes]]].mean(axis=1)
+    return points, points + _BESIDE * (middle - points)
+
+
+def in_body(mesh: SimplexMesh, rng: np.random.Generator) -> Array:
+    """Draw two points (n, 2, d) in each cell, in some of them if they are many."""
+    corners = mesh.points[mesh.cells[_some(len(mesh.cells), _CELLS, rng)]]
+    return np.stack([_inside(corners, rng), _inside(corners, rng)], axis=1)
+
+
+def holds(mesh: SimplexMesh, points: Array) -> Bools:
+    """Whether each of the points (n, d) lies in the body."""
+    corners = mesh.points[mesh.cells]
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max()
+    found = np.zeros(len(points), dtype=bool)
+    for i, cells in enumerate(cKDTree(middle).query_ball_point(points, reach)):
+        edges = (corners[cells, 1:] - corners[cells, :1]).transpose(0, 2, 1)
+        share = np.linalg.solve(edges, (points[i] - corners[cells, 0])[:, :, None])[:, :, 0]
+        found[i] = bool(((share >= 0.0).all(axis=1) & (share.sum(axis=1) <= 1.0)).any())
+    return found
+
+
+def on_cut(cut: Any, steps: Array, rng: np.random.Generator) -> OnCut:
+    """Draw points on a cut: all over it, and at the distances `steps` (k,), m, from its ends."""
+    points, normals = _faces(cut, rng)
+    ends, outward, of_ends = end_points(cut)
+    if len(ends):
+        inner = ends[:, None] - steps[:, None] * outward[:, None]
+        if not isinstance(cut, ArcCut):  # whose tangent leaves it
+            points = np.concatenate([points, inner.reshape(-1, points.shape[1])])
+            normals = np.concatenate([normals, np.repeat(of_ends, len(steps), axis=0)])
+    far = np.full(len(points), np.inf)
+    for end in ends:
+        far = np.minimum(far, np.linalg.norm(points - end, axis=1))
+    return OnCut(points, normals, far)
+
+
+def end_points(cut: Any) -> tuple[Array, Array, Array]:
+    """Return the ends (k, d) of a cut, the directions in which it would go on, and its normals.
+
+    In space the middles of the edges of a plane patch, and points of the rim of a disc; none of
+    surfaces that are curved or kinked.
+    """
+    match cut:
+        case DiscCut():
+            plane, (a, b) = cut.axes(), cut.semi_axes
+            angle = np.linspace(0.3, 0.3 + 2 * np.pi, 8, endpoint=False)
+            ring = np.column_stack([np.cos(angle), np.sin(angle)])
+            outward = ring / [a, b] @ plane[:2]
+            outward /= np.linalg.norm(outward, axis=1)[:, None]
+            return (
+                np.asarray(cut.centre) + ring * [a, b] @ plane[:2],
+                outward,
+                np.tile(plane[2], (len(ring), 1)),
+            )
+        case ArcCut():
+            if cut.sweep == 360.0:
+                return (np.zeros((0, 2)),) * 3
+            angle = np.deg2rad([cut.start, cut.start + cut.sweep])
+            away = np.column_stack([np.cos(angle), np.sin(angle)])
+            along = np.column_stack([-away[:, 1], away[:, 0]]) * [[-1.0], [1.0]]
+            return np.asarray(cut.centre) + cut.radius * away, along, -away
+        case _ if cut.dimension == 2:
+            line = cut.vertices()
+            if np.array_equal(line[0], line[-1]):
+                return (np.zeros((0, 2)),) * 3
+            along = np.array([line[0] - line[1], line[-1] - line[-2]])
+            along /= np.linalg.norm(along, axis=1)[:, None]
+            left = np.column_stack([-along[:, 1], along[:, 0]]) * [[-1.0], [1.0]]
+            return line[[0, -1]], along, left
+    points, triangles = cut.surface()
+    normals = _normals(points[triangles])
+    if isinstance(cut, CylinderCut | SphereCut) or np.ptp(normals, axis=0).max() > 1e-9:
+        return (np.zeros((0, 3)),) * 3
+    rim, centre = rim_edges((points, triangles)), points[triangles].mean(axis=(0, 1))
+    outward = np.cross(normals[:1], rim[:, 1] - rim[:, 0])
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    middle = rim.mean(axis=1)
+    outward *= np.sign(np.einsum("kc,kc->k", outward, middle - centre))[:, None]
+    return middle, outward, np.tile(normals[0], (len(rim), 1))
+
+
+def distances(cuts: Sequence[Any], points: Array) -> Array:
+    """Distance (n,) to the nearest cut; of curved ones at most that."""
+    best = np.full(len(points), np.inf)
+    for cut in cuts:
+        best = np.minimum(best, _distance(cut, points))
+    return best
+
+
+def _distance(cut: Any, points: Array) -> Array:
+    match cut:
+        case DiscCut():
+            away = (points - np.asarray(cut.centre)) @ cut.axes().T
+            over = np.linalg.norm(away[:, :2], axis=1) - max(cut.semi_axes)
+            return np.asarray(np.hypot(np.maximum(over, 0.0), away[:, 2]))
+        case ArcCut() | SphereCut():
+            away = np.linalg.norm(points - np.asarray(cut.centre), axis=1)
+            return np.asarray(np.abs(away - cut.radius))
+        case CylinderCut():
+            away = np.linalg.norm((points - np.asarray(cut.base)) @ cut.axes()[:2].T, axis=1)
+            return np.asarray(np.abs(away - cut.radius))
+        case _ if cut.dimension == 2:
+            return distance_to_polyline(points, cut.vertices())
+    return distance_to_triangles(points, cut.surface())
+
+
+def _faces(cut: Any, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Points (n, d) all over a cut, and unit normals there, to its positive side."""
+    match cut:
+        case ArcCut():
+            angle = np.deg2rad(cut.start + cut.sweep * rng.uniform(0.02, 0.98, _FACES))
+            away = np.column_stack([np.cos(angle), np.sin(angle)])
+            return np.asarray(cut.centre) + cut.radius * away, -away
+        case SphereCut():
+            points = cut.surface()[0]
+            points = points[_some(len(points), _FACES, rng)]
+            return points, (np.asarray(cut.centre) - points) / cut.radius
+        case CylinderCut():
+            points, axes = cut.surface()[0], cut.axes()
+            points = points[_some(len(points), _FACES, rng)]
+            return points, -((points - np.asarray(cut.base)) @ axes[:2].T @ axes[:2]) / cut.radius
+        case _ if cut.dimension == 2:
+            line = cut.vertices()
+            corners = np.stack([line[:-1], line[1:]], axis=1)
+            along = corners[:, 1] - corners[:, 0]
+            normals = np.column_stack([-along[:, 1], along[:, 0]])
+            normals /= np.linalg.norm(along, axis=1)[:, None]
+            sizes = np.linalg.norm(along, axis=1)
+        case _:
+            points, triangles = cut.surface()
+            corners = points[triangles]
+            normals = _normals(corners)
+            sizes = np.linalg.norm(
+                np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+            )
+    part = rng.choice(len(corners), _FACES, p=sizes / sizes.sum())
+    return _inside(corners[part], rng), normals[part]
+
+
+def _normals(corners: Array) -> Array:
+    """Return the unit normals (m, 3) of triangles (m, 3, 3)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+
+def _inside(corners: Array, rng: np.random.Generator) -> Array:
+    """Draw a point (n, d) inside each simplex (n, k, d)."""
+    share = rng.dirichlet(np.ones(corners.shape[1]), len(corners))
+    return np.einsum("nk,nkd->nd", share, corners)
+
+
+def _some(count: int, most: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    return np.arange(count) if count <= most else np.sort(rng.choice(count, most, replace=False))
