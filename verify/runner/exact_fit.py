@@ -32,8 +32,8 @@ _SAME = 1e-6
 # nine digits is off the line of the field by 1e-4 of the least of the distances below.
 _SAME_AT_ENDS = 1e-3
 # Of the terms of an equation of equilibrium, taken by differences of fourth order over steps of
-# _STEP of the body, at least 1/_STEPS_OFF steps from cuts: truncation 1e-7, round-off 1e-10.
-_BALANCED, _STEP, _STEPS_OFF = 1e-4, 1e-3, 0.05
+# _STEP of the body, _OFF of it from cuts: beside a tip truncation is some 100 (_STEP/_OFF)^4.
+_BALANCED, _STEP, _OFF = 1e-4, 3e-4, 0.02
 _DISTANCES = np.geomspace(1e-5, 0.1, 12)  # from cuts and their ends, of the body
 _FOURTH_ORDER = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -235,7 +235,7 @@ class _Fit:
         """Balance of stress, forces per volume and inertia inside the body."""
         scene, field, h = self._scene, self._exact.at(time), _STEP * self._size
         points = self._pairs[:, 0]
-        far = samples.distances(self._cuts, points) > _STEP / _STEPS_OFF * self._size
+        far = samples.distances(self._cuts, points) > _OFF * self._size
         d = scene.dimension
         around = 2 * h * np.vstack([np.eye(d), -np.eye(d)])
         points = points[far & self._one_material(points, points + around[:, None])]

@@ -1,0 +1,179 @@
+"""An exact field that the scene contradicts is refused; one that it does not is silent.
+
+Scenes in general position, by a fixed seed: the field fits by construction, then one thing is
+changed by a thousandth to a few per cent. Whether that contradicts the field is known by hand.
+"""
+
+import numpy as np
+import pytest
+
+from tests.scenes import box, scene, soft
+from verify.errors import InputError
+from verify.runner.checking import check_scene
+
+_TRIALS = 2
+_HELD = [{"where": "boundary", "displacement": "exact"}]
+
+
+def _refusal(**content):
+    try:
+        check_scene(scene(**content))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _griffith(rng):
+    """An inclined crack inside a rectangle, under a remote stress and a pressure on its faces."""
+    angle, a, centre = rng.uniform(-80, 80), rng.uniform(0.3, 0.6), rng.uniform(-0.2, 0.2, 2)
+    pressure = rng.uniform(0.2, 1.0)
+    reach = a * np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    ends = [(centre - reach).tolist(), (centre + reach).tolist()]
+    exact = {"centre": centre.tolist(), "a": a, "angle": angle, "pressure": pressure}
+    return {
+        "geometry": box([1.0, 1.1], [-1.2, -1.0]),
+        "mesh": {"cells": [[9, 8]]},
+        "supports": _HELD,
+        "loads": [{"kind": "cut_faces", "pressure": pressure}],
+        "exact": {
+            "solution": "griffith",
+            "parameters": exact | {"stress": rng.uniform(0, 1, 3).tolist()},
+        },
+        "cuts": [
+            {"kind": "polyline", "points": [(centre - reach).tolist(), (centre + reach).tolist()]}
+        ],
+    }
+
+
+def _halves(rng):
+    """Another uniform strain on each side of an inclined cut; one face bears its traction."""
+    slope, middle = rng.uniform(-0.3, 0.3), rng.uniform(0.4, 0.6)
+    side = ["left", "right", "bottom", "top"][rng.integers(4)]
+    rest = [one for one in ("left", "right", "bottom", "top") if one != side]
+    exact = {
+        "point": [0.5, middle],
+        "slope": slope,
+        "strain": rng.uniform(0.05, 0.1, 2).tolist(),
+        "shift": [0.0, -0.02],
+    }
+    return {
+        "mesh": {"sizes": [0.15], "pattern": "unstructured"},
+        "supports": [{"where": one, "displacement": "exact"} for one in rest],
+        "loads": [{"kind": "traction", "where": side, "traction": "exact"}],
+        "exact": {"solution": "patch", "parameters": exact},
+        "cuts": [
+            {
+                "kind": "polyline",
+                "points": [[-0.2, middle - 0.7 * slope], [1.2, middle + 0.7 * slope]],
+            }
+        ],
+    }
+
+
+def _penny(rng):
+    """A tilted disc in a cube under a remote tension."""
+    normal = rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    centre, radius = rng.uniform(-0.1, 0.1, 3).tolist(), rng.uniform(0.4, 0.6)
+    spatial = {"centre": centre, "normal": normal.tolist()}
+    return {
+        "geometry": box([1.0] * 3, [-1.0] * 3),
+        "mesh": {"cells": [[4, 5, 4]]},
+        "material": soft(3),
+        "supports": _HELD,
+        "exact": {"solution": "penny", "parameters": spatial | {"a": radius, "tension": 1.0}},
+        "cuts": [{"kind": "disc", **spatial, "radius": radius}],
+    }
+
+
+def _smooth(rng):
+    """Sinusoids with a body force on each side of an inclined cut."""
+    angle = rng.uniform(-25, 25)
+    slope = np.tan(np.deg2rad(angle))
+    rows = {
+        side: [[rng.uniform(0.05, 0.2), rng.uniform(1, 3), rng.uniform(0, 1)] for _ in range(2)]
+        for side in ("above", "below")
+    }
+    return {
+        "supports": _HELD,
+        "loads": [{"kind": "body_force", "force": "exact"}],
+        "exact": {
+            "solution": "smooth",
+            "parameters": {"point": [0.5, 0.5], "angle": angle, **rows},
+        },
+        "cuts": [
+            {"kind": "polyline", "points": [[-0.2, 0.5 - 0.7 * slope], [1.2, 0.5 + 0.7 * slope]]}
+        ],
+    }
+
+
+def _support_off(content, rng):
+    where = [0.01, -0.01][rng.integers(2)]
+    return {
+        "supports": [*content["supports"], _part(content, [f"1e-3 + {where} * x", 0.0])]
+    }, "supports["
+
+
+def _part(content, displacement):
+    d = len(content["geometry"]["upper"]) if "geometry" in content else 2
+    return {"where": "right", "displacement": displacement + [0.0] * (d - 2)}
+
+
+def _free_face(content, rng):
+    rest = ["left", "bottom", "top"] + (["front", "back"] if content.get("material") else [])
+    return {
+        "supports": [{"where": one, "displacement": "exact"} for one in rest],
+        "loads": [one for one in content.get("loads", []) if one["kind"] != "traction"],
+    }, "traction"
+
+
+def _cut_moved(content, rng):
+    cut, off = dict(content["cuts"][0]), rng.uniform(1e-3, 3e-2) * rng.choice([-1.0, 1.0])
+    if cut["kind"] == "disc":
+        cut["centre"] = (np.array(cut["centre"]) + off * np.array(cut["normal"])).tolist()
+    else:
+        cut["points"] = [[x, y + off] for x, y in cut["points"]]
+    return {"cuts": [cut]}, "cut"
+
+
+def _cut_of_other_size(content, rng):
+    cut, factor = dict(content["cuts"][0]), 1.0 + rng.uniform(0.003, 0.05) * rng.choice([-1.0, 1.0])
+    if cut["kind"] == "disc":
+        cut["radius"] *= factor
+    else:
+        points = np.array(cut["points"])
+        cut["points"] = (points.mean(axis=0) + factor * (points - points.mean(axis=0))).tolist()
+    return {"cuts": [cut]}, "cut"
+
+
+def _no_load(content, rng):
+    return {"loads": []}, "contradicts cut" if "griffith" in str(content) else "equilibrium"
+
+
+def _weight(content, rng):
+    material = content.get("material", soft()) | {"density": 1.0}
+    gravity = {
+        "kind": "gravity",
+        "acceleration": [0.0, -0.02] + [0.0] * (not material.get("plane")),
+    }
+    return {"material": material, "loads": [*content.get("loads", []), gravity]}, "equilibrium"
+
+
+_CHANGES = {
+    _griffith: (_support_off, _free_face, _cut_moved, _cut_of_other_size, _no_load, _weight),
+    _halves: (_support_off, _free_face, _cut_moved, _weight),
+    _penny: (_support_off, _free_face, _cut_moved, _cut_of_other_size, _weight),
+    _smooth: (_support_off, _free_face, _cut_moved, _no_load),
+}
+
+
+@pytest.mark.parametrize("make", _CHANGES, ids=lambda make: make.__name__)
+def test_what_contradicts_the_exact_field_is_refused_and_nothing_else(make):
+    rng = np.random.default_rng(27)
+    for _ in range(_TRIALS):
+        content = make(rng)
+        d = _dimension(content)
+        assert _refusal(d=d, **content) == ""
+        for change in _CHANGES[make]:
+            changed, said = change(content, rng)
+            assert said in _refusal(d=d, **(content | changed)), (change.__name__, content, changed)
