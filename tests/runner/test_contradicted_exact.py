@@ -108,15 +108,13 @@ def _smooth(rng):
 
 
 def _support_off(content, rng):
-    where = [0.01, -0.01][rng.integers(2)]
-    return {
-        "supports": [*content["supports"], _part(content, [f"1e-3 + {where} * x", 0.0])]
-    }, "supports["
+    d, slope = _dimension(content), rng.choice([-0.01, 0.01])
+    other = {"where": "right", "displacement": [f"1e-3 + {slope} * x", *[0.0] * (d - 1)]}
+    return {"supports": [*content["supports"], other]}, "supports["
 
 
-def _part(content, displacement):
-    d = len(content["geometry"]["upper"]) if "geometry" in content else 2
-    return {"where": "right", "displacement": displacement + [0.0] * (d - 2)}
+def _dimension(content):
+    return len(content["geometry"]["upper"]) if "geometry" in content else 2
 
 
 def _free_face(content, rng):
