@@ -39,9 +39,7 @@ def _griffith(rng):
             "solution": "griffith",
             "parameters": exact | {"stress": rng.uniform(0, 1, 3).tolist()},
         },
-        "cuts": [
-            {"kind": "polyline", "points": [(centre - reach).tolist(), (centre + reach).tolist()]}
-        ],
+        "cuts": [{"kind": "polyline", "points": ends}],
     }
 
 
