@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.declared_mass import check_mass, plain_mass, restored_mass
 from verify.errors import InputError
 from verify.handed_over import check_accounts, check_cells, check_field, check_vectors
 from verify.json_files import read_json
@@ -43,7 +44,7 @@ _CELL_TYPES = {
 _MANDATORY = ("schema", "files", "dimension", "order")
 _OPTIONAL = (
     "cell_dimension", "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings",
-    "iterations", "regularisations", "notes",
+    "iterations", "regularisations", "notes", "mass",
 )  # fmt: skip
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
 
@@ -78,6 +79,10 @@ class Solution:
     acceleration : (t, n, d) float array, optional
         Nodal acceleration in m/s² that balances the forces of the field at that time. Without
         it there are no stress-intensity factors of a motion.
+    mass : "consistent", (n,) array or (n, n) sparse array, optional
+        Mass with which the solver moved, in kg (per metre of thickness in 2D): ∫ρ N_i N_j of the
+        field, one mass per node, or a symmetric matrix on the nodes; with all cuts open. Gravity
+        pulls at its row sums. Without it the kinetic energy is known within what lumping may do.
     ledger : dict of str to (t,) float array
         Energies by name (``"strain"``, ``"kinetic"``, …) at each output time, in joules (per
         metre of thickness in 2D), as the solver itself adds them up.
@@ -116,6 +121,7 @@ class Solution:
     iterations: dict[str, int] = field(default_factory=dict)
     regularisations: list[Regularisation] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)
+    mass: Any = None
 
     def __post_init__(self) -> None:
         """Refuse what is no solution, so that a wrong solver fails where it hands over, not later.
@@ -144,6 +150,7 @@ class Solution:
         check_vectors("cut_facets", self.cut_facets, [(self.cell_dimension, d)])
         if self.cell_sides is not None:
             check_field("cell_sides", self.cell_sides, (len(self.cells),))
+        check_mass(self.mass, n)
         for name, column in self.ledger.items():
             check_field(f"ledger '{name}'", np.asarray(column), (t,))
         check_accounts(
@@ -233,6 +240,7 @@ def write_solution(solution: Solution, path: Path) -> None:
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
         "notes": solution.notes,
+        "mass": plain_mass(solution.mass),
     }
     write_whole(path.with_suffix(".json"), json.dumps(record, indent=1))
 
@@ -294,6 +302,7 @@ def read_solution(path: Path) -> Solution:
             iterations={n: int(v) for n, v in record.get("iterations", {}).items()},
             regularisations=[Regularisation(**e) for e in record.get("regularisations", [])],
             notes={n: str(v) for n, v in record.get("notes", {}).items()},
+            mass=restored_mass(record.get("mass"), len(first.points)),
         )
     except InputError as error:
         raise error if error.where else InputError(error.what, str(source)) from None

@@ -9,7 +9,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from verify.assess.energy_account import ACCOUNT, account_metrics
+from verify.assess.energy_account import ACCOUNT, account_metrics, ledger_notices
 from verify.assess.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.assess.intervals import error_interval
 from verify.assess.motion_account import motion_account
@@ -125,7 +125,7 @@ def assess_accuracy(
         solves=measured,
         rates=rates,
         verdicts=[],
-        notices=unavailable_quantities(scene, measured),
+        notices=[*unavailable_quantities(scene, measured), *ledger_notices(measured)],
         row=asdict(scene.row) if scene.row else None,
     )
 

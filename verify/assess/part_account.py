@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from verify.assess.motion_account import NO_VELOCITIES, MotionAccount, uniform_force
 from verify.compare.kinetic import Kinetic
-from verify.compare.ledger import total_energy
+from verify.compare.ledger import SCHEME, total_energy
 from verify.compare.separated import boundary_nodes
 from verify.result import Metric, PartRecord
 from verify.scene import BodyForce, Gravity, Scene, Traction
@@ -103,15 +103,16 @@ def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
 def motion_history(account: MotionAccount) -> dict[str, list[float]]:
     """Return what moves, by name, with ``time`` (s).
 
-    Energies keep the names of their ledger (J, in 2D per metre); ``total`` is the sum that
-    physics keeps constant. ``linear_momentum_x`` … (N s) and ``angular_momentum_z`` (in space
-    also x, y; N m s, about the origin) are integrated from the velocities, if there are any.
-    Empty for a single output time.
+    Energies are those measured (J, in 2D per metre), with what the solver states of its scheme;
+    ``total`` is the sum that physics keeps constant. ``linear_momentum_x`` … (N s) and
+    ``angular_momentum_z`` (in space also x, y; N m s, about the origin) are integrated from the
+    velocities, if there are any. Empty for a single output time.
     """
     if len(account.times) < 2:
         return {}
-    rows = {"time": account.times, **account.ledger}
-    total = total_energy(account.ledger)
+    own = {name: row for name, row in account.stated.items() if name in SCHEME}
+    rows = {"time": account.times, **own, **account.energies.parts}
+    total = total_energy(account.energies.parts)
     if total is not None:
         rows["total"] = total
     found = {name: [float(value) for value in row] for name, row in rows.items()}

@@ -15,6 +15,7 @@ from verify.compare.body import body_of
 from verify.compare.hooke import Law
 from verify.compare.integration import cut_rules
 from verify.compare.kinetic import density_of
+from verify.compare.ledger import total_energy
 from verify.compare.motion import field_at
 from verify.compare.strain_energy import difference_energy, short_wave_energy
 from verify.errors import InputError, UnsupportedSceneError
@@ -35,12 +36,12 @@ def released_metrics(
 ) -> tuple[list[Metric], dict[str, str]]:
     """Measure where the energy went that the blades of a scene release, J per m² of their way.
 
-    ``released``: G, if the exact solution states it; ``released_to_scheme`` and ``_damping``: what
-    the solution's ledger says of both; ``_kinetic`` and ``_strain``: energy of the difference
-    from the exact field since the start, kinetic energy by the solver's own mass (a lumped one
-    holds more of short waves than their field); ``_short_waves``: without an exact field, kinetic
-    energy of motions of periods below 4h/c. ``released_mismatch``: the share of G by which scheme,
-    damping and difference miss it.
+    ``released``: G, if the exact solution states it; ``released_to_scheme``: what is missing in the
+    measured balance of energies; ``_damping``: what the rate of damping takes; ``_kinetic`` and
+    ``_strain``: energy of the difference from the exact field since the start, kinetic energy by
+    the solver's own mass (a lumped one holds more of short waves than their field);
+    ``_short_waves``: without an exact field, kinetic energy of motions of periods below 4h/c.
+    ``released_mismatch``: the share of G by which scheme, damping and difference miss it.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def released_metrics(
             found["released_to_kinetic"] += _in_the_mass(account)
     values, notes = values | found, notes | why
     values = {name: value / area for name, value in values.items()}
-    metrics = [Metric(name, value, _UNIT, source="ledger and fields of the solution")
+    metrics = [Metric(name, value, _UNIT, source="fields of the solution")
                for name, value in values.items()]  # fmt: skip
     rate = getattr(exact, "energy_release_rate", None)
     if rate is not None:
@@ -126,14 +127,15 @@ def _between(cut: ToolPathCut, start: float, end: float) -> ToolPathCut | None:
 
 def _dissipated(account: MotionAccount) -> tuple[dict[str, float], dict[str, str]]:
     """Find what the scheme and the dampers took, J."""
-    ledger = account.ledger if account.is_own_ledger else {}
-    values, notes = {}, {}
-    for name, column in (("scheme", "algorithmic"), ("damping", "damping")):
-        if column in ledger:
-            values[f"released_to_{name}"] = float(ledger[column][-1] - ledger[column][0])
-        else:
-            notes[f"released_to_{name}"] = "the solution has no ledger that says it"
-    return values, notes
+    parts = account.energies.parts
+    total = total_energy(parts)
+    if total is None:
+        names = ("released_to_scheme", "released_to_damping")
+        return {}, dict.fromkeys(names, account.energies.lacking)
+    values = {"released_to_scheme": float(total[0] - total[-1])}
+    if "damping" in parts:
+        values["released_to_damping"] = float(parts["damping"][-1])
+    return values, {}
 
 
 def _difference(
@@ -158,9 +160,9 @@ def _in_the_mass(account: MotionAccount) -> float:
 
     It is that of the difference from the exact field: for smooth fields any mass is consistent.
     """
-    if not account.is_own_ledger or account.whole is None:
+    if not account.energies.parts or account.whole is None:
         return 0.0
-    beyond = account.ledger["kinetic"] - account.whole.energy
+    beyond = account.energies.parts["kinetic"] - account.whole.energy
     return float(beyond[-1] - beyond[0])
 
 

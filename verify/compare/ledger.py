@@ -10,12 +10,12 @@ Array = NDArray[np.float64]
 
 # Parts of a ledger and the sign with which they enter what stays constant: what is stored and
 # what dampers take count, what loads and supports have put in is taken off.
-_SIGNS = {
+SIGNS = {
     "kinetic": 1.0, "strain": 1.0, "gravity": 1.0, "damping": 1.0, "work_of_loads": -1.0,
     "work_of_supports": -1.0,
 }  # fmt: skip
 # what the time scheme itself takes, and material that is removed: only where it is asked about
-_SCHEME = {"algorithmic": 1.0, "removed_energy": 1.0}
+SCHEME = {"algorithmic": 1.0, "removed_energy": 1.0}
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class Balance:
         Largest distance from trend and jumps: what stays bounded if the slope is zero.
     jumps : (c,) array
         Step at each cut beside the trend.
+    off : Balance or None
+        By how much each of these may be off, of a total that is not known to round-off.
     """
 
     drift: float
@@ -41,6 +43,7 @@ class Balance:
     slope_error: float
     oscillation: float
     jumps: Array
+    off: "Balance | None" = None
 
 
 def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | None:
@@ -50,7 +53,7 @@ def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | N
     was removed is added: then it is an identity of the solver's steps, and its changes are errors
     of account.
     """
-    signs = {**_SIGNS, **(_SCHEME if scheme else {})}
+    signs = {**SIGNS, **(SCHEME if scheme else {})}
     parts = [sign * np.asarray(ledger[name]) for name, sign in signs.items() if name in ledger]
     return np.sum(parts, axis=0) if parts else None
 
@@ -61,11 +64,13 @@ def energy_scale(ledger: Mapping[str, Array]) -> float:
     The largest kinetic or strain energy, or change of any other part: a potential has no zero.
     """
     stored = [np.abs(ledger[name]).max() for name in ("kinetic", "strain") if name in ledger]
-    moved = [np.ptp(ledger[name]) for name in _SIGNS if name in ledger]
+    moved = [np.ptp(ledger[name]) for name in SIGNS if name in ledger]
     return float(max([*stored, *moved], default=0.0))
 
 
-def balance(times: Array, total: Array, cuts: Sequence[float] = ()) -> Balance:
+def balance(
+    times: Array, total: Array, cuts: Sequence[float] = (), width: Array | None = None
+) -> Balance:
     """Separate trend, jumps and oscillation of a total.
 
     Parameters
@@ -76,6 +81,8 @@ def balance(times: Array, total: Array, cuts: Sequence[float] = ()) -> Balance:
     cuts : sequence of float
         Times at which something was cut; those not inside the range of `times` count not. A
         value at the time of a cut is taken as before it.
+    width : (t,) array, optional
+        Half-widths of the intervals of `total`.
     """
     inner = sorted({cut for cut in cuts if times[0] <= cut < times[-1]})
     steps = [(times > cut).astype(float) for cut in inner]
@@ -92,4 +99,14 @@ def balance(times: Array, total: Array, cuts: Sequence[float] = ()) -> Balance:
     return Balance(
         float(np.abs(start).max()), float(solved[1] / span), error / span,
         float(np.abs(rest).max()), np.asarray(solved[2:]),
+        None if width is None else _off(columns, width, span),
     )  # fmt: skip
+
+
+def _off(columns: Array, width: Array, span: float) -> Balance:
+    """Largest change of a balance by changes of its total up to `width`."""
+    fit = np.linalg.pinv(columns)
+    solved = np.abs(fit) @ width
+    rest = np.abs(np.eye(len(width)) - columns @ fit) @ width
+    drift = float((width[1:] + width[0]).max(initial=0.0))
+    return Balance(drift, float(solved[1] / span), 0.0, float(rest.max()), solved[2:])

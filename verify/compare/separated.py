@@ -79,20 +79,28 @@ def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
 
 
 def boundary_nodes(solution: Solution) -> NDArray[np.bool_]:
-    """Whether nodes (n,) are corners of a facet of the outer boundary, not of faces of cuts.
+    """Whether nodes (n,) are corners of a facet of the outer boundary, not of faces of cuts."""
+    cell, opposite = boundary_facets(solution)
+    corners = solution.cells[cell, : solution.cell_dimension + 1]
+    found = np.zeros(len(solution.points), dtype=bool)
+    found[corners[np.arange(corners.shape[1]) != opposite[:, None]]] = True
+    return found
+
+
+def boundary_facets(solution: Solution) -> tuple[Ints, Ints]:
+    """Cell (b,) and opposite corner (b,) of the facets of the outer boundary, not of faces of cuts.
 
     On the faces of a cut two facets have the same place; on the outer boundary each is alone.
     """
     corners = solution.cells[:, : solution.cell_dimension + 1]
-    facets, _ = _facets(corners)
-    distinct, times = np.unique(facets, axis=0, return_counts=True)
-    alone = distinct[times == 1]
-    middle = solution.points[alone].mean(axis=1)
+    facets, cell = _facets(corners)
+    distinct, first, times = np.unique(facets, axis=0, return_index=True, return_counts=True)
+    alone = times == 1
+    middle = solution.points[distinct[alone]].mean(axis=1)
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     near = cKDTree(middle).query(middle, k=2, distance_upper_bound=10 * ROUND_OFF * size)[0]
-    found = np.zeros(len(solution.points), dtype=bool)
-    found[alone[~np.isfinite(near[:, 1])]] = True
-    return found
+    chosen = first[alone][~np.isfinite(near[:, 1])]
+    return cell[chosen], chosen % corners.shape[1]
 
 
 def _facets(corners: Ints) -> tuple[Ints, Ints]:

@@ -1,5 +1,6 @@
 """Energies: of a solution, of a field, of a difference from an exact field, above a frequency."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from verify.compare.slabs import Rule
 from verify.errors import InputError
 from verify.solution import Solution
 
+Array = NDArray[np.float64]
+Density = float | Array
 # points per direction where the density is no polynomial of the gradient
 _FINE = 4
 
@@ -34,6 +37,30 @@ def nodal_strain_energy(field: SolutionField, law: Law) -> float:
 
 def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
     """Energy (m,) of each cell of a solution's field, J (2D: per metre)."""
+    return _integrated(field, lambda at, gradient: law.at(at).energy_density(gradient(field)), law)
+
+
+def cell_dissipation(
+    velocity: SolutionField, displacement: SolutionField, law: Law
+) -> NDArray[np.float64]:
+    """v·Kv (m,) of each cell, J/s² (2D: per metre), K the stiffness that turns with the body.
+
+    Twice the linear energy of the velocity gradient in the frame of the displacement: what damping
+    proportional to the stiffness takes, over its factor.
+    """
+
+    def density(at: Array, gradient: Callable[[SolutionField], Array]) -> Array:
+        return 2.0 * law.at(at).error_density(gradient(velocity), gradient(displacement))
+
+    return _integrated(velocity, density, law)
+
+
+def _integrated(
+    field: SolutionField,
+    density: Callable[[Array, Callable[[SolutionField], Array]], Array],
+    law: Law,
+) -> NDArray[np.float64]:
+    """Integrate over each cell a density of points and of gradients of fields there."""
     solution, shape = field.solution, field.shape
     order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
     every = np.arange(len(solution.cells))
@@ -42,10 +69,12 @@ def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
     frames = triangle_frames(shape.corners) if membrane else None
     for weights, share in zip(*simplex_rule(solution.cell_dimension, order), strict=True):
         points = np.einsum("k,mka->ma", weights, shape.corners)
-        gradient = field.in_cells(points, every)[1]
-        if frames is not None:
-            gradient = in_frames(gradient, frames)
-        found += share * shape.volume * law.at(points).energy_density(gradient)
+
+        def gradient(of: SolutionField, points: Array = points) -> Array:
+            value = of.in_cells(points, every)[1]
+            return value if frames is None else in_frames(value, frames)
+
+        found += share * shape.volume * density(points, gradient)
     return found
 
 
@@ -54,8 +83,6 @@ def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
     return float(rule.weights @ law.at(rule.points).energy_density(rule.gradient(field)))
 
 
-Array = NDArray[np.float64]
-Density = float | Array
 _ORDER = 3  # points per direction: the exact field may be singular in a cell
 
 

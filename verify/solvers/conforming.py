@@ -18,6 +18,7 @@ from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
+from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
@@ -314,6 +315,7 @@ def _solution(
         cell_sides=mesh.pieces,
         regularisations=_specks(mesh),
         ledger=result.ledger,
+        mass=None if result.velocity is None else CONSISTENT,
         unknowns=result.displacement[0].size,
         size=size,
         timings=timings,

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.initial import starts_open
@@ -24,7 +26,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.mass import Mass
+from verify.xfem.mass import AggregatedMass, Mass
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]
@@ -267,7 +269,15 @@ class Motion:
             self._notes(),
             phantom.node_points.size,
             self.opening.regularisations(),
+            mass=self._mass(phantom),
         )
+
+    def _mass(self, phantom: PhantomMesh) -> str | csr_array:
+        """Mass of the corners of the body with all its cuts."""
+        if self.opening.mass == CONSISTENT:
+            return CONSISTENT
+        _, mass = self.opening.inertia(phantom)
+        return mass.of_corners.matrix if isinstance(mass, AggregatedMass) else mass.matrix
 
     def _notes(self) -> dict[str, str]:
         sizes = sorted(self.step_sizes)

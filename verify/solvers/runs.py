@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
@@ -17,14 +18,17 @@ from verify.solvers.body_of_scene import background_mesh
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.subdivision import Subdivision
+from verify.xfem.subdivision import Subdivision, extrapolation
 
 _Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times."""
+    """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times.
+
+    `mass` is that of a motion: a word, or the matrix (N, N) with which it ended.
+    """
 
     phantom: PhantomMesh
     times: _Floats
@@ -37,6 +41,7 @@ class Answer:
     notes: dict[str, str]
     unknowns: int
     further: list[Regularisation]
+    mass: str | csr_array | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,10 @@ def solution_on(
     def at_points(values: _Floats) -> _Floats:
         return np.stack([shown.interpolation @ one for one in values])
 
+    mass = answer.mass
+    if not (mass is None or isinstance(mass, str)):
+        back = extrapolation(answer.phantom, shown)
+        mass = csr_array(back.T @ mass @ back)
     return Solution(
         points=shown.points,
         cells=shown.cells,
@@ -135,6 +144,7 @@ def solution_on(
         times=answer.times,
         velocity=None if answer.velocity is None else at_points(answer.velocity),
         acceleration=None if answer.acceleration is None else at_points(answer.acceleration),
+        mass=mass,
         cut_facets=shown.cut_facets,
         cell_sides=cell_sides,
         ledger=answer.ledger,

@@ -93,6 +93,40 @@ def subdivide(phantom: PhantomMesh) -> Subdivision:
     )
 
 
+def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
+    """(N, k) sparse map of a displacement at the points back to the dof nodes.
+
+    It is exact for what `body.interpolation` has put on the points. A dof node that is no point,
+    because it lies beyond the cut, follows from the largest cell of one of its pieces.
+    """
+    interpolation = csr_array(body.interpolation)
+    alone = np.flatnonzero(np.diff(interpolation.indptr) == 1)
+    alone = alone[interpolation.data[interpolation.indptr[alone]] == 1.0]
+    known, first = np.unique(interpolation.indices[interpolation.indptr[alone]], return_index=True)
+    point = alone[first]
+    unknown = np.ones(phantom.node_count, dtype=bool)
+    unknown[known] = False
+
+    own = phantom.cells[body.cell_piece]
+    beyond = np.flatnonzero(unknown[own].any(axis=1))
+    nodes, dofs = body.cells[beyond], own[beyond]
+    shape = (*dofs.shape, dofs.shape[1])
+    rows = np.broadcast_to(nodes[:, :, None], shape).ravel()
+    columns = np.broadcast_to(dofs[:, None, :], shape).ravel()
+    shares = np.asarray(interpolation[rows, columns]).reshape(shape)
+    cell, local = np.nonzero(unknown[dofs])
+    order = np.argsort(np.abs(np.linalg.det(shares))[cell], kind="stable")
+    largest = np.full(phantom.node_count, -1)
+    largest[dofs[cell, local][order]] = order  # of several the last: that of the largest cell
+    chosen = largest[largest >= 0]
+    cell, local = cell[chosen], local[chosen]
+    back = np.linalg.inv(shares[cell])[np.arange(len(cell)), local]
+    entries = np.concatenate([np.ones(len(known)), back.ravel()])
+    rows = np.concatenate([known, np.repeat(dofs[cell, local], shape[1])])
+    columns = np.concatenate([point, nodes[cell].ravel()])
+    return csr_array((entries, (rows, columns)), shape=interpolation.shape[::-1])
+
+
 def _conforming(phantom: PhantomMesh) -> Simplices:
     """Solid simplices, bisected where a neighbour has a point that they do not have."""
     sub, mesh = phantom.sub_cells, phantom.mesh

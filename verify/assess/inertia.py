@@ -1,0 +1,131 @@
+"""Kinetic energy of a solution with the mass that its solver declares, once that is checked.
+
+Not with the consistent mass of its field: a body that moves with a lumped mass keeps the energy of
+that mass, which for short waves is up to `verify.compare.kinetic.lumping_range` times as large.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, issparse
+
+from verify.compare.kinetic import Kinetic, lumping_range, nodal_weights
+from verify.compare.separated import Part
+from verify.compare.simplices import simplices
+from verify.declared_mass import CONSISTENT
+from verify.solution import Solution
+
+Array = NDArray[np.float64]
+
+_WRONG = 0.01  # of the body's mass: beyond, a declared mass is that of another body
+_NOTHING = 1e-9  # of the largest kinetic energy of a motion
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Kinetic energy over the output times, and at what gravity pulls.
+
+    Parameters
+    ----------
+    kinetic : (t,) array
+        J (2D: per metre, as all that follows).
+    width : (t,) array
+        Half-width of its interval, J.
+    weights : (n,) array
+        Mass at the nodes, kg.
+    off : float
+        Share by which total and first moments of a declared mass are off those of the body.
+    note : str
+        Which mass it is.
+    """
+
+    kinetic: Array
+    width: Array
+    weights: Array
+    off: float
+    note: str
+
+
+def inertia_of(
+    solution: Solution, density: float | Array, whole: Kinetic, parts: Sequence[Part]
+) -> Inertia:
+    """Take the mass of a solution as declared, or that of its field if none is or it cannot be.
+
+    A declared mass is accepted if its total, its first moments and its share of each separated
+    part are those of the body, and the kinetic energy at all output times is within what lumping
+    may do to that of the field. Cells that are cut may have less: the mass of a part of one acts
+    at the centre of the whole cell. So the lower end gives way by the size of a cell.
+
+    Parameters
+    ----------
+    solution : Solution
+        With velocities.
+    density : float or (m,) array
+        kg/m³, of each cell.
+    whole : Kinetic
+        Of the field of the solution.
+    parts : sequence of Part
+        All separated parts.
+    """
+    weights = nodal_weights(solution, density)
+    if isinstance(solution.mass, str):
+        assert solution.mass == CONSISTENT
+        none = np.zeros_like(whole.energy)
+        return Inertia(whole.energy, none, weights, 0.0, "the consistent mass, as declared")
+    lumping = np.abs(whole.lumped - whole.energy)
+    if solution.mass is None:
+        note = "no mass is declared: that of the field, give or take its lumping"
+        return Inertia(whole.energy, lumping, weights, 0.0, note)
+    matrix = _matrix(solution.mass)
+    own = np.asarray(matrix.sum(axis=1)).ravel()
+    energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in _velocities(solution)])
+    off = _off(solution, own, weights, parts)
+    wrong = _outside(solution, energy, whole)
+    if off > _WRONG:
+        wrong = f"its total, first moments or parts are off by {off:.2g} of the body's mass"
+    if wrong:
+        note = f"the declared mass is not taken: {wrong}; that of the field, give or take lumping"
+        return Inertia(whole.energy, lumping, weights, 0.0, note)
+    return Inertia(energy, off * energy, own, off, "the declared mass")
+
+
+def _velocities(solution: Solution) -> Array:
+    assert solution.velocity is not None
+    return solution.velocity
+
+
+def _matrix(mass: Any) -> csr_array:
+    return csr_array(mass if issparse(mass) else diags_array(np.asarray(mass, dtype=float)))
+
+
+def _off(solution: Solution, own: Array, weights: Array, parts: Sequence[Part]) -> float:
+    """Largest difference of nodal masses in total, moments and parts, over that of the body."""
+    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+    more = own - weights
+    off = [abs(more.sum()), float(np.abs(more @ solution.points).max()) / size]
+    belongs = [np.unique(solution.cells[part.cells]) for part in parts]
+    shared = np.bincount(np.concatenate(belongs), minlength=len(own)) > 1  # by a corner alone
+    off += [abs(more[nodes].sum()) for nodes in belongs if not shared[nodes].any()]
+    return max(off) / float(weights.sum())
+
+
+def _outside(solution: Solution, energy: Array, whole: Kinetic) -> str:
+    """Why kinetic energies are not those of any lumping, if they are not."""
+    corners = simplices(solution.points, solution.cells).corners
+    largest = float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).max())
+    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+    low, high = lumping_range(solution.cell_dimension, solution.order)
+    nothing = _NOTHING * float(np.max([energy, whole.energy]))
+    below = energy < low * (1 - largest / size) * whole.energy - nothing
+    above = energy > high * whole.energy + nothing
+    if not (below | above).any():
+        return ""
+    at = int(np.flatnonzero(below | above)[0])
+    ratio = energy[at] / max(whole.energy[at], 1e-300)
+    return (
+        f"its kinetic energy at {solution.times[at]:.4g} s is {ratio:.3g} times that of the field, "
+        f"and lumping makes {low:.3g} to {high:.3g} of it"
+    )
