@@ -113,7 +113,9 @@ def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
     shape = (*dofs.shape, dofs.shape[1])
     rows = np.broadcast_to(nodes[:, :, None], shape).ravel()
     columns = np.broadcast_to(dofs[:, None, :], shape).ravel()
-    shares = np.asarray(interpolation[rows, columns]).reshape(shape)
+    shares = np.zeros(shape)
+    if len(beyond):  # of no entries SciPy returns a matrix
+        shares[:] = interpolation[rows, columns].reshape(shape)
     cell, local = np.nonzero(unknown[dofs])
     order = np.argsort(np.abs(np.linalg.det(shares))[cell], kind="stable")
     largest = np.full(phantom.node_count, -1)
