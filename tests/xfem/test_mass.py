@@ -7,6 +7,9 @@ from cut_bodies import DENSITY, cut_body, cut_membrane
 from verify.methods.mass_variants import shifted_mass
 from verify.xfem.cuts import Plane
 from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
+from verify.xfem.phantom import cut_mesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import extrapolation, subdivide
 
 LUMPINGS = ("enrichment", "row sum", "weighted diagonal")
 
@@ -91,3 +94,29 @@ def test_enrichment_lumping_is_diagonal_in_the_shifted_unknowns():
                 square = above * psi[1] ** 2 + (1.0 - above) * psi[-1] ** 2
                 expected[position[node]] += share * square
     assert np.abs(M - np.diag(expected)).max() < 1e-12 * expected.max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_mass_on_the_points_of_the_subdivision_moves_as_that_on_dof_nodes(dim):
+    """Phantom nodes are no points: what they do follows from those of their pieces.
+
+    Up to three planes anywhere, so parts without a node of their own and small parts too; energies
+    of random velocities are sums of squares, so round-off of the smallest cell remains small.
+    """
+    generator = np.random.default_rng(2701 + dim)
+    mesh = rectangle_mesh((4, 3)) if dim == 2 else box_mesh((2, 2, 2))
+    for _ in range(10):
+        count = generator.integers(1, 4)
+        planes = [Plane(generator.uniform(0.2, 0.8, dim), generator.normal(size=dim))
+                  for _ in range(count)]  # fmt: skip
+        v = cut_mesh(mesh, planes)
+        body = subdivide(v)
+        back = extrapolation(v, body)
+        velocity = generator.normal(size=(v.node_count, dim))
+        shown = body.interpolation @ velocity
+        for mass in (side_wise_mass(v, DENSITY), consistent_mass(v, DENSITY)):
+            on_points = back.T @ mass.matrix @ back
+            energy = np.sum(velocity * mass.apply(velocity))
+            assert np.sum(shown * (on_points @ shown)) == pytest.approx(energy, rel=1e-9)
+            weights = np.asarray(on_points.sum(axis=1)).ravel()
+            assert weights @ shown == pytest.approx(mass.weights @ velocity, rel=1e-9, abs=1e-9)

@@ -75,10 +75,9 @@ def inertia_of(
         assert solution.mass == CONSISTENT
         none = np.zeros_like(whole.energy)
         return Inertia(whole.energy, none, weights, 0.0, "the consistent mass, as declared")
-    lumping = np.abs(whole.lumped - whole.energy)
     if solution.mass is None:
         note = "no mass is declared: that of the field, give or take its lumping"
-        return Inertia(whole.energy, lumping, weights, 0.0, note)
+        return Inertia(whole.energy, whole.lumping, weights, 0.0, note)
     matrix = _matrix(solution.mass)
     own = np.asarray(matrix.sum(axis=1)).ravel()
     energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in _velocities(solution)])
@@ -88,7 +87,7 @@ def inertia_of(
         wrong = f"its total, first moments or parts are off by {off:.2g} of the body's mass"
     if wrong:
         note = f"the declared mass is not taken: {wrong}; that of the field, give or take lumping"
-        return Inertia(whole.energy, lumping, weights, 0.0, note)
+        return Inertia(whole.energy, whole.lumping, weights, 0.0, note)
     return Inertia(energy, off * energy, own, off, "the declared mass")
 
 

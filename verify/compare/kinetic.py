@@ -27,8 +27,8 @@ class Kinetic:
         Current centre of mass, m.
     energy : (t,) array
         ½ ∫ ρ v², J.
-    lumped : (t,) array
-        The same with the mass of each cell lumped at its nodes, J: never less for linear cells.
+    lumping : (t,) array
+        By how much it may be another one if the mass is lumped at nodes, J.
     linear : (t, d) array
         ∫ ρ v, N s.
     angular : (t, 1 or 3) array
@@ -43,7 +43,7 @@ class Kinetic:
     mass: float
     centre: Array
     energy: Array
-    lumped: Array
+    lumping: Array
     linear: Array
     angular: Array
     spin: Array
@@ -92,7 +92,8 @@ def kinetic(
     own = density if cells is None or np.ndim(density) == 0 else np.asarray(density)[cells]
     mass = ((own * shape.volume)[:, None] * share).ravel()
     at_nodes = (own * shape.volume)[:, None] * lumped_shares(k, solution.order)
-    names = ("centre", "energy", "lumped", "linear", "angular", "spin", "scales")
+    larger = _larger_beside(nodes[:, : k + 1], shape.corners)
+    names = ("centre", "energy", "lumping", "linear", "angular", "spin", "scales")
     rows: dict[str, list[Array]] = {name: [] for name in names}
     for u, v in zip(solution.displacement, solution.velocity, strict=True):
         x, speed = (
@@ -103,8 +104,10 @@ def kinetic(
         centre = mass @ x / max(mass.sum(), 1e-300)
         rows["centre"].append(centre)
         arm = np.linalg.norm(x - centre, axis=1)
-        rows["energy"].append(0.5 * mass @ size**2)
-        rows["lumped"].append(0.5 * np.sum(at_nodes * np.sum(v[nodes] ** 2, axis=2)))
+        of_cells = 0.5 * (mass * size**2).reshape(len(nodes), -1).sum(axis=1)
+        lumped = 0.5 * np.sum(at_nodes * np.sum(v[nodes] ** 2, axis=2), axis=1)
+        rows["energy"].append(of_cells.sum())
+        rows["lumping"].append(np.abs(lumped - of_cells) @ larger**2)
         rows["linear"].append(mass @ speed)
         rows["angular"].append(mass @ _cross(x, speed))
         rows["spin"].append(mass @ _cross(x - centre, speed))
@@ -115,6 +118,21 @@ def kinetic(
         *(np.array(rows[name]) for name in names[:-1]),
         float(scales[0]), float(scales[1]),
     )  # fmt: skip
+
+
+def _larger_beside(nodes: NDArray[np.int64], corners: Array) -> Array:
+    """Diameter (m,) of the largest cell that shares a node with each, over its own.
+
+    The pieces of a cut cell are small, and a mass may be lumped at the nodes of the whole: what
+    lumping changes goes with the square of the size.
+    """
+    edges = corners[:, :, None] - corners[:, None, :]
+    size = np.linalg.norm(edges, axis=3).max(axis=(1, 2))
+    largest = np.zeros(nodes.max() + 1)
+    np.maximum.at(largest, nodes, size[:, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Array = largest[nodes].max(axis=1) / size
+    return np.where(size > 0.0, found, 1.0)
 
 
 def nodal_weights(solution: Solution, density: float | Array) -> Array:

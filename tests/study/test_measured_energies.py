@@ -1,0 +1,148 @@
+"""Energies are measured: whoever lies about them is found out, and an honest lumped mass is not."""
+
+from dataclasses import replace
+from itertools import product
+from math import factorial, prod
+
+import numpy as np
+import pytest
+from cut_meshes import grid, quadratic
+from judged_fields import judged
+from lying_solvers import PARTS, faster, hidden
+from scipy.linalg import eigvalsh
+from solid_meshes import cube_grid
+
+from verify.assess.energy_account import account_metrics
+from verify.assess.motion_account import motion_account
+from verify.compare.hooke import law_of
+from verify.compare.kinetic import lumped_shares, lumping_range, nodal_weights
+from verify.compare.simplices import simplices
+from verify.result import Verdict
+from verify.scene import Scene
+from verify.scene.loading import load_scene
+from verify.solution import Solution
+from verify.solvers.xfem import XfemSolver
+
+DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
+
+
+@pytest.fixture(scope="module")
+def plate():
+    """A plate that is cut while it vibrates, and an honest lumped answer."""
+    case = load_scene("dynamics/plate_cut_vibrating")
+    return case, XfemSolver().solve(case, 0, 0)
+
+
+def verdict_of(case, solution, check=DRIFT):
+    """Of a copy of the case with that one check."""
+    asked = case.model_dump(mode="json", by_alias=True) | {"acceptance": [check]}
+    (found,) = judged(Scene.model_validate(asked), {"xfem": {0: solution}}).verdicts
+    return found.verdict
+
+
+def energies_of(case, solution):
+    metrics, notes = account_metrics(case, motion_account(case, solution, law_of(case)))
+    return {metric.name: metric for metric in metrics}, notes
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("d", [2, 3])
+def test_lumping_changes_the_kinetic_energy_by_a_factor_in_the_range_of_a_cell(d, order):
+    """[1, d + 2] of linear simplices, however their nodes lie: of a whole mesh, by eigenvalues.
+
+    Quadratic ones may lose energy too. Cells of a cut cell are cells: the mass of a part that is
+    lumped at the corners of the whole cell is not that of any of them, and has no such bound.
+    """
+    points, cells = grid(3, 2) if d == 2 else cube_grid(1, 2, 1)
+    points = points + 0.06 * np.random.default_rng(5).normal(size=points.shape)
+    if order == 2:
+        points, cells = quadratic(points, cells)
+    still = np.zeros((1, *points.shape))
+    volume = simplices(points, cells).volume
+    low, high = lumping_range(d, order)
+    if order == 1:
+        assert (low, high) == pytest.approx((1.0, d + 2.0), rel=1e-12)
+    lumped, consistent = np.zeros((2, len(points), len(points)))
+    for nodes, size in zip(cells, volume, strict=True):
+        lumped[nodes, nodes] += size * lumped_shares(d, order)
+        consistent[np.ix_(nodes, nodes)] += size * cell_mass(d, order)
+    ratios = eigvalsh(lumped, consistent)
+    assert ratios.min() >= low - 1e-12
+    assert ratios.max() <= high + 1e-12
+    one = Solution(points, cells, still, order=order)
+    assert nodal_weights(one, 1.0) == pytest.approx(consistent.sum(axis=1), abs=1e-15)
+
+
+def cell_mass(d, order):
+    """Consistent mass of a cell of mass 1: integrals of monomials λ^a are a! d!/(|a| + d)!."""
+    unit = np.eye(d + 1, dtype=int)
+    hats = [[(1.0, one)] for one in unit]
+    if order == 2:
+        corners = [[(2.0, 2 * one), (-1.0, one)] for one in unit]
+        ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: d * (d + 1) // 2]
+        hats = [*corners, *([(4.0, unit[a] + unit[b])] for a, b in ends)]
+
+    def integral(powers):
+        return prod(map(factorial, powers)) * factorial(d) / factorial(sum(powers) + d)
+
+    return np.array([
+        [sum(c * e * integral(a + b) for (c, a), (e, b) in product(one, other)) for other in hats]
+        for one in hats
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("part", [*PARTS, None])
+def test_a_gain_that_is_hidden_in_any_part_of_a_ledger_is_found(plate, part):
+    """Velocities of five times the kinetic energy at the end, and a ledger that closes.
+
+    Without a ledger, and without a declared mass, it is found as well: lumping is no such factor.
+    A ledger that says that the scheme gained it is right, and the energy is not kept.
+    """
+    case, honest = plate
+    assert verdict_of(case, honest) is Verdict.PASS
+    liar = faster(honest, 5.0) if part is None else hidden(honest, 5.0, part)
+    liar = replace(liar, ledger={}) if part is None else liar
+    for one in (liar, replace(liar, mass=None)):
+        assert verdict_of(case, one) is Verdict.FAIL
+    if part in (None, "algorithmic"):
+        return
+    found, notes = energies_of(case, liar)
+    mismatch = found["ledger_mismatch"]
+    assert mismatch.value - mismatch.uncertainty > 0.5
+    assert part.replace("_", " ") in notes["ledger"]
+
+
+@pytest.mark.parametrize("mass, said", [
+    (lambda one: 0.2 * one.mass, "total, first moments or parts are off by 0.8"),
+    (lambda one: np.full(len(one.points), one.mass.sum() / len(one.points)), "off by"),
+    (lambda one: np.roll(np.asarray(one.mass.sum(axis=1)).ravel(), 1), "off by"),
+])  # fmt: skip
+def test_a_mass_that_is_not_of_the_body_is_not_taken(plate, mass, said):
+    case, honest = plate
+    _, notes = energies_of(case, replace(honest, mass=mass(honest)))
+    assert notes["mass"].startswith("the declared mass is not taken")
+    assert said in notes["mass"]
+
+
+def test_a_mass_with_more_energy_than_any_lumping_is_not_taken(plate):
+    """Total and moments are right: what is added is nothing for a motion that is affine."""
+    case, honest = plate
+    points = np.column_stack([np.ones(len(honest.points)), honest.points])
+    basis = np.linalg.qr(points)[0]
+    more = np.eye(len(points)) - basis @ basis.T
+    heavy = honest.mass + type(honest.mass)(20.0 * honest.mass.max() * more)
+    _, notes = energies_of(case, replace(honest, mass=heavy))
+    assert "lumping makes 1 to 4 of it" in notes["mass"]
+
+
+def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
+    """With the consistent mass of its field an honest lumped answer drifts; not surely so."""
+    case, honest = plate
+    found, notes = energies_of(case, replace(honest, mass=None))
+    drift = found["energy_drift"]
+    assert notes["mass"].startswith("no mass is declared")
+    assert 1e-6 < drift.value <= drift.uncertainty
+    assert verdict_of(case, replace(honest, mass=None), {**DRIFT, "at_most": 1e-6}) is (
+        Verdict.UNDECIDED
+    )
+    assert verdict_of(case, honest, {**DRIFT, "at_most": 1e-6}) is Verdict.PASS
