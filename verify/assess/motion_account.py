@@ -69,10 +69,10 @@ def motion_account(scene: Scene, solution: Solution, law: Law) -> MotionAccount:
     heaviest = sorted(part.mass for part in every)[-_MOST:]
     parts = [part for part in every if part.mass >= heaviest[0]][:_MOST]
     field = SolutionField(solution)
-    energies = (
+    of_cells = (
         cell_strain_energies(field.with_nodal(u), law) for u in solution.displacement
     )  # one output time after the other: all at once are too many numbers
-    sums = [(one.sum(), [one[part.cells].sum() for part in parts]) for one in energies]
+    sums = [(one.sum(), [one[part.cells].sum() for part in parts]) for one in of_cells]
     total, strain = (np.array(column) for column in zip(*sums, strict=True))
     whole, motions = None, []
     if solution.velocity is not None and scene.material.density is not None:

@@ -114,9 +114,9 @@ def kinetic(
         rows["scales"].append(np.array([mass @ size, mass @ (arm * size)]))
     scales = np.max(rows["scales"], axis=0)
     return Kinetic(
-        float(mass.sum()),
-        *(np.array(rows[name]) for name in names[:-1]),
-        float(scales[0]), float(scales[1]),
+        float(mass.sum()), np.array(rows["centre"]), np.array(rows["energy"]),
+        np.array(rows["lumping"]), np.array(rows["linear"]), np.array(rows["angular"]),
+        np.array(rows["spin"]), float(scales[0]), float(scales[1]),
     )  # fmt: skip
 
 
