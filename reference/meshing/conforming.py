@@ -78,7 +78,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     if scene.final_cuts and not len(facets):
         raise InputError("cuts: none of them lies inside the body", where)
     points, cells = points * scale + origin, flip_flat_cells(points, cells, facets)
-    if grading.smallest < grading.meshed:
+    if grading.smallest < grading.meshed(scale):
         points, cells, facets = shrink_to_points(
             points, cells, facets, grading.points, grading.smallest
         )
@@ -170,7 +170,7 @@ def _set_sizes(
 ) -> None:
     """Set the sizes around all features, and along those that a blade makes on its way."""
     size, radius, smallest = (
-        value / scale for value in (grading.size, grading.radius, grading.meshed)
+        value / scale for value in (grading.size, grading.radius, grading.meshed(scale))
     )
     field = gmsh.model.mesh.field
     terms = []
@@ -182,7 +182,7 @@ def _set_sizes(
         terms.append(tag)
     for point, start in grading.close_points():
         tag = field.add("MathEval")
-        at_point = grading.smallest_at(start)
+        at_point = grading.smallest_at(start, scale)
         field.setString(tag, "F", _close(grading, (point - origin) / scale, start, at_point, scale))
         terms.append(tag)
         smallest = min(smallest, at_point / scale)

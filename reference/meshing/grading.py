@@ -16,7 +16,9 @@ from verify.scene.cuts import Cut
 from verify.scene.planar import distance_to_outline, inside_polygon
 
 Array = NDArray[np.float64]
-_MESHED = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
+# of the body's longest side, which gmsh meshes as 1: below it runs out of digits, and loses facets
+# of a cut at its tip (seen from 9e-10 down)
+_MESHED = 2e-9
 _SMALLEST = 1e-12  # of the grading radius: nearer, coordinates do
 _SAME = 1e-9  # of the body: points that close are one
 _DOMAIN = 0.4  # of the way from a tip to what is next: the smallest domain of an integral
@@ -75,10 +77,9 @@ class Grading:
         ratio = min(self.size / self.radius, 1.0)
         return float(self.radius * max(ratio ** (1 / (1 - self.exponent)), _SMALLEST))
 
-    @property
-    def meshed(self) -> float:
-        """Element size that gmsh is asked for at a singular point, m; rings do the rest."""
-        return max(self.smallest, self.radius * _MESHED)
+    def meshed(self, extent: float) -> float:
+        """Size that gmsh is asked for at a singular point of a body that long, m; rings go on."""
+        return max(self.smallest, extent * _MESHED)
 
     def halved(self, level: int) -> "Grading":
         """Divide all sizes by 2^level."""
@@ -103,9 +104,9 @@ class Grading:
                 found.append((point, at))
         return found
 
-    def smallest_at(self, clear: float) -> float:
+    def smallest_at(self, clear: float, extent: float) -> float:
         """Element size that gmsh is asked for at a point that is graded to from `clear` on, m."""
-        return max(clear * self.share ** (1 / (1 - self.exponent)), self.radius * _MESHED)
+        return max(clear * self.share ** (1 / (1 - self.exponent)), extent * _MESHED)
 
 
 def singular_points(scene: Scene) -> Array:

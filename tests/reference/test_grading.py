@@ -177,7 +177,7 @@ class TestNearerThanTheMeshGeneratorCanGo:
         scene = square([polyline("a", (0.3, 0.43), (0.7, 0.61))])
         # few cells, but as small at the tips as those of level 5
         grading = Grading(0.1, singular_points(scene), 4.0, 0.86)
-        assert 5e-12 < grading.smallest < 0.1 * grading.meshed
+        assert 5e-12 < grading.smallest < 0.1 * grading.meshed(1.0)
         mesh = conforming_mesh(scene, grading)
         for tip in ([0.3, 0.43], [0.7, 0.61]):
             away = np.sort(np.linalg.norm(mesh.points - tip, axis=1))
@@ -188,6 +188,24 @@ class TestNearerThanTheMeshGeneratorCanGo:
         assert area.sum() == pytest.approx(1.0, rel=1e-12)
         # and the tips stay closed: a cut of F facets between two tips doubles F − 1 nodes
         assert len(mesh.parent) - len(np.unique(mesh.parent)) == len(mesh.cut_facets) - 1
+
+    # long double cantilevers; gmsh meshes a body of length one, so that its digits end sooner in
+    # terms of the height
+    @pytest.mark.parametrize(
+        "length, mouth, tip",
+        [(21.1, 0.224, (19.23, -0.178)), (29.7, -0.067, (24.66, 0.113)), (20.3, 0.236, (4.3, 0))],
+    )
+    def test_no_facet_is_lost_at_the_tip_in_a_slender_body(self, length, mouth, tip):
+        scene = square(
+            [polyline("a", (-0.1, mouth), tip)],
+            geometry=scenes.box([length, 0.5], [0.0, -0.5]),
+        )
+        radius = 0.5 * np.sqrt(length)
+        grading = Grading(0.11 * radius, singular_points(scene), radius, 0.9)
+        assert grading.smallest < 2e-10 * length
+        mesh = conforming_mesh(scene, grading)
+        assert len(mesh.parent) - len(np.unique(mesh.parent)) == len(mesh.cut_facets)
+        assert areas(mesh).sum() == pytest.approx(length, rel=1e-12)
 
 
 WIDE = {"geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [2000, 2000]}}
