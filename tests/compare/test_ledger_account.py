@@ -21,6 +21,13 @@ def test_a_linear_drift_is_a_slope_without_oscillation():
     assert found.slope_error < 1e-14
 
 
+def test_an_energy_at_round_off_is_no_scale():
+    noise = 1e-14 * np.sin(np.arange(len(TIMES)))
+    still = {"gravity": 50.0 + noise, "kinetic": noise**2, "strain": np.abs(noise)}
+    assert energy_scale(still) == 0.0
+    assert energy_scale({"gravity": 50.0 + noise, "strain": 1e-6 + noise}) == pytest.approx(1e-6)
+
+
 def test_a_bounded_oscillation_is_no_slope():
     wave = 1e-3 * np.cos(40 * np.pi * TIMES)  # whole periods
     found = balance(TIMES, 5.0 + wave)

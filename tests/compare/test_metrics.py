@@ -4,7 +4,7 @@ from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
 
 from verify.compare.body import body_of
 from verify.compare.cut_line import cut_rule
-from verify.compare.error_norm import displacement_error, jump_error
+from verify.compare.error_norm import displacement_error, energy_error, jump_error
 from verify.compare.hooke import hooke
 from verify.compare.locate import SolutionField
 from verify.compare.opening import opening
@@ -61,6 +61,38 @@ def test_an_error_against_a_reference_of_zero_is_not_finite():
     rule = area_rule(body_of(scene([STRAIGHT])), 0.2)
     assert displacement_error(field, still, rule).relative == np.inf
     assert displacement_error(still, still, rule).relative == 0.0
+
+
+def _noisy(move, noise):
+    """Halves moved alike, each node by some noise."""
+    points, cells, _ = layered(5, (line,))
+    rng = np.random.default_rng(3)
+    moved = points @ np.array(move[0]).T + np.array(move[1])
+    return SolutionField(solution(points, cells, moved + noise * rng.uniform(-1, 1, points.shape)))
+
+
+@pytest.mark.parametrize(
+    "move", [([[0, 0], [0, 0]], [0.3, -0.1]), ([[0, -0.2], [0.2, 0]], [0.0, 7.0])],
+    ids=["shifted", "turned"],
+)  # fmt: skip
+def test_round_off_is_not_divided_by_round_off(move):
+    """A rigid motion has neither strain nor openings: noise of 1e-15 of it is no error."""
+    body = body_of(scene([STRAIGHT]))
+    area, cut = area_rule(body, 0.2), cut_rule(body, 0.1)
+    largest = np.abs(_noisy(move, 0.0).displacement(area.points, area.points)).max()
+    still = _noisy(move, 1e-15 * largest)
+    field = _noisy(move, 0.0)
+    norms = [energy_error(field, still, area, LAW), jump_error(field, still, cut)]
+    assert [norm.relative for norm in norms] == [0.0, 0.0]
+    # a noise of 1e-6 is an error, and has nothing to be relative to
+    moved = _noisy(move, 1e-6 * largest)
+    norms = [energy_error(moved, still, area, LAW), jump_error(moved, still, cut)]
+    assert [norm.relative for norm in norms] == [np.inf, np.inf]
+    # a strain of 1e-7 is one: noise is held against it
+    strained = ([[1e-7, move[0][0][1]], [move[0][1][0], 0.0]], move[1])
+    assert energy_error(field, _noisy(strained, 0.0), area, LAW).relative == pytest.approx(
+        1, abs=1e-3
+    )
 
 
 def test_the_energy_of_a_quadratic_field_is_exact():

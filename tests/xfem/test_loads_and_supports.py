@@ -108,3 +108,6 @@ def test_a_body_held_in_one_node_can_still_turn_and_is_refused():
         solve_static(phantom, STRAIN, one)
     two = one.prescribe(phantom, [3], components=(1,))
     assert solve_static(phantom, STRAIN, two, body_force(phantom, [0, -1])).residual < 1e-12
+    # moved rigidly, all forces are round-off: of the products K u
+    shifted = Supports(two.fixed, np.where(two.fixed, [3.0, -7.0], 0.0))
+    assert solve_static(phantom, STRAIN, shifted).residual < 1e-12

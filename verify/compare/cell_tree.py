@@ -100,6 +100,8 @@ def _morton(centres: NDArray[np.float64], in_cubes: bool = False) -> NDArray[np.
     """Interleave the bits of the coordinates, so that near cells get near numbers."""
     d = centres.shape[1]
     bits = 31 if d == 2 else 20
+    if not len(centres):
+        return np.zeros(0, dtype=np.int64)
     extent = np.maximum(np.ptp(centres, axis=0), 1e-300)
     if in_cubes:
         extent[:] = extent.max()

@@ -13,8 +13,11 @@ from verify.compare.slabs import Rule
 
 Array = NDArray[np.float64]
 
-# Strain over gradient below which a reference is a rigid motion, solved to round-off.
-_NO_STRAIN = 1e-10
+# Of what cancels (a gradient, a displacement over the size of the body, a displacement on both
+# sides of a cut) below which a strain or a jump is none: round-off of 1e-16, times the 1e6 that a
+# solve, and elements of a thousandth of the body, may amplify it by. Nothing is divided by it.
+_NOTHING = 1e-10
+_LOOKED_AT = 200  # points at which the displacement of a body is looked at
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,18 @@ class Squares:
             float(np.sqrt(weights @ self.difference)), float(np.sqrt(of_scale @ self.expected))
         )
 
+    def above(self, share: float, whole: float, weights: Array) -> "Squares":
+        """Set to zero what is round-off: the reference, and then a difference as small.
+
+        Each is where its norm, with the weights (n,), is at most a share of the root of `whole`.
+        """
+        bound = share**2 * whole
+        if weights @ self.expected > bound:
+            return self
+        nothing = np.zeros_like(self.expected)
+        small = weights @ self.difference <= bound
+        return Squares(nothing if small else self.difference, nothing)
+
     def largest(self) -> ErrorNorm:
         """Largest values at the points.
 
@@ -82,7 +97,7 @@ def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorN
     """Square roots of ∫(σ−σ_ref):(ε−ε_ref) and ∫σ_ref:ε_ref over the body, in √J.
 
     With the corotated energy: of twice its `error_density`, and twice the reference's energy.
-    A reference that moves rigidly but for round-off has the norm 0.
+    A reference that moves rigidly but for round-off has the norm 0, and errors as small are none.
     """
     return energy_squares(field, reference, rule, law).norm(rule.weights)
 
@@ -105,16 +120,18 @@ def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squa
     law = law.at(rule.points)
     expected = rule.gradient(reference)
     difference = rule.gradient(field) - expected
-    scale = 2 * law.energy_density(expected)
-    square = law.shear * np.einsum("nij,nij->n", expected, expected)
-    if np.sqrt(rule.weights @ scale) <= _NO_STRAIN * np.sqrt(2 * rule.weights @ square):
-        scale = np.zeros_like(scale)
-    return Squares(2 * law.error_density(difference, expected), scale)
+    squares = Squares(2 * law.error_density(difference, expected), 2 * law.energy_density(expected))
+    some = rule.points[:: 1 + len(rule.points) // _LOOKED_AT]
+    moved = np.abs(reference.displacement(some, some)).max(initial=0.0)
+    slope = moved / np.ptp(rule.points, axis=0).max() if len(rule.points) else 0.0
+    cancels = 2 * law.shear * (np.einsum("nij,nij->n", expected, expected) + slope**2)
+    return squares.above(_NOTHING, rule.weights @ cancels, rule.weights)
 
 
 def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None = None) -> Squares:
     """|[u] − [u_ref]|² and |[u_ref]|² at the points of a rule of the cuts as asked, m²."""
-    return _squares(displacement_jump(field, rule), displacement_jump(reference, rule))
+    found, expected = displacement_jump(field, rule), displacement_jump(reference, rule)
+    return _of_jumps(found, expected, reference, rule)
 
 
 def opening_squares(
@@ -125,13 +142,19 @@ def opening_squares(
         np.einsum("ni,ni->n", displacement_jump(one, rule), rule.normals)[:, None]
         for one in (field, reference)
     )
-    return _squares(found, expected)
+    return _of_jumps(found, expected, reference, rule)
 
 
 def displacement_jump(field: Field, rule: CutRule) -> Array:
     """Displacement (n, d) of the positive side minus that of the negative side, m."""
     above = field.displacement(rule.points, rule.positive)
     return above - field.displacement(rule.points, rule.negative)
+
+
+def _of_jumps(found: Array, expected: Array, reference: Field, rule: CutRule) -> Squares:
+    beside = reference.displacement(rule.points, rule.positive)
+    cancels = rule.weights @ np.einsum("ni,ni->n", beside, beside)
+    return _squares(found, expected).above(_NOTHING, cancels, rule.weights)
 
 
 def _squares(found: Array, expected: Array) -> Squares:

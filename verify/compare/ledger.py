@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_ROUND_OFF = 1e-12  # of the largest energy: a sum of energies is not known better
 # Parts of a ledger and the sign with which they enter what stays constant: what is stored and
 # what dampers take count, what loads and supports have put in is taken off.
 SIGNS = {
@@ -62,10 +63,13 @@ def energy_scale(ledger: Mapping[str, Array]) -> float:
     """Energy that drifts are measured against, J: the largest that moved from part to part.
 
     The largest kinetic or strain energy, or change of any other part: a potential has no zero.
+    It is 0 if that is round-off of the largest part.
     """
     stored = [np.abs(ledger[name]).max() for name in ("kinetic", "strain") if name in ledger]
     moved = [np.ptp(ledger[name]) for name in SIGNS if name in ledger]
-    return float(max([*stored, *moved], default=0.0))
+    largest = max((np.abs(ledger[name]).max() for name in SIGNS if name in ledger), default=0.0)
+    scale = float(max([*stored, *moved], default=0.0))
+    return scale if scale > _ROUND_OFF * largest else 0.0
 
 
 def balance(

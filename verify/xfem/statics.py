@@ -38,7 +38,8 @@ class StaticSolution:
     reaction : (N, d) float array
         Forces of the supports, in newtons; zero where not supported.
     residual : float
-        Largest unbalanced force over the largest force in the body.
+        Largest unbalanced force over the largest force in the body, or the largest entry of K times
+        the largest of u if that is larger.
     timings : dict of str to float
         Wall seconds of ``analysis`` (sparsity and symbolic factorisation), ``assembly``,
         ``factorisation`` and ``solve``.
@@ -107,6 +108,7 @@ def solve_static(
     clock.append(perf_counter())
     blocks = stiffness.stiffness(pattern)
     right = np.where(supports.fixed, 0.0, force - stiffness.evaluate(supports.values)[0])
+    stiffest = float(np.abs(blocks).max())
     constrain(pattern, supports.fixed, blocks)
     clock.append(perf_counter())
     inverse.factorize(blocks)
@@ -115,7 +117,9 @@ def solve_static(
     clock.append(perf_counter())
     internal, energy = stiffness.evaluate(displacement)
     unbalanced = internal - force
-    scale = max(np.abs(internal).max(), np.abs(force).max(), np.finfo(float).tiny)
+    # in a rigid motion all forces are round-off of the products that they are sums of
+    products = stiffest * np.abs(displacement).max()
+    scale = max(np.abs(internal).max(), np.abs(force).max(), products, np.finfo(float).tiny)
     return StaticSolution(
         displacement=displacement,
         strain_energy=energy - stiffness.penalty_energy,
