@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
+from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
 
 RNG = np.random.default_rng(1)
@@ -81,3 +82,9 @@ def test_gradients_in_sliver_cells_lose_no_more_than_round_off_over_height(thin,
     u, gradient = field.evaluate(x)
     assert np.abs(gradient - slope).max() < 4 * np.finfo(float).eps / thin
     assert np.abs(u - x @ slope.T - 1).max() < 1e-15
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_body_pressed_to_nothing_has_a_tree_without_cells(d):
+    tree = build_cell_tree(*np.full((2, 5, d), np.nan))
+    assert (tree.cells < 0).all()

@@ -39,12 +39,6 @@ def test_a_half_that_is_pressed_in_overlaps_by_that_much(d, order, gap):
     assert abs((found.material - 0.5) @ normal(d)) < 1e-9  # on the cut
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_halves_pressed_to_nothing_overlap_nowhere(d):
-    moves = [(np.zeros((d, d)), normal(d))] * 2
-    assert OverlapSearch(pressed(d, 4, moves)).at().depth == 0.0
-
-
 # The depth of a turned face is largest at its end, from which the other's outside is left sooner
 # than its face of the cut: it is found at most one facet, 0.3 long, away, where sin 20° times
 # that is missing. At the place that is named it is the distance from the other's face.
