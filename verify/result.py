@@ -10,6 +10,7 @@ from enum import StrEnum
 from math import inf
 from typing import Any
 
+from verify.cut_record import CutRecord
 from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 
@@ -19,6 +20,7 @@ COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled
 CRITICAL_STEP = (
     "critical step"  #: of the notes of a solve in motion: of central differences, at rest
 )
+CUT = "cut"  #: of the notes of a solve: where its realised cut is not as asked
 #: begins the note "comparison" of a solve that the comparison, not its solver, failed on
 COMPARISON_FAILED = "comparison failed"
 
@@ -30,6 +32,7 @@ def _closed[Kind](kind: Kind) -> Kind:
 
 
 _closed(Regularisation)
+_closed(CutRecord)
 _closed(ReferenceRecord)
 
 
@@ -166,6 +169,13 @@ class SolveRecord:
     account: dict[str, list[float]] = field(default_factory=dict)
     # separated parts, from the top down; empty for a static scene
     parts: list[PartRecord] = field(default_factory=list)
+    # where the realised cut is; None of a body without cuts, or in older results
+    cut: CutRecord | None = None
+
+    @property
+    def continued(self) -> bool:
+        """Whether its field is continued across its realised cut where it is judged."""
+        return self.cut is None or self.cut.continued
 
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""

@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
+from verify.assess.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
 from verify.assess.energy_account import ACCOUNT, account_metrics, ledger_notices
 from verify.assess.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.assess.intervals import error_interval
@@ -99,12 +100,12 @@ def assess_accuracy(
         elif own:
             # the same points for all solvers of a level: their errors are compared
             finest = min(compared_size(s, body) for s in own.values())
-            rules = Rules(body, finest) if reference else None
+            rules = Rules(body, finest, 3 if reference else 1)
             judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
             for i, solution in own.items():
                 announce(records[i])
                 try:
-                    one = Measured(solution, body, law, scene)
+                    one = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
                     measured[i] = _measure(records[i], one, judge_of, missing, rules, exact)
                 except Exception as problem:  # a fault of the comparison costs this solve alone
                     traceback.print_exception(problem)  # for the log
@@ -225,7 +226,7 @@ def _measure(
     one: Measured,
     reference: Reference | None,
     missing: str,
-    rules: Rules | None,
+    rules: Rules,
     exact: ExactField | None,
 ) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
@@ -238,6 +239,7 @@ def _measure(
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
     if (off := one.motion.off_surface) > ROUND_OFF * one.body.size:
         record = _noted(record, {"surface": f"up to {off:.3g} m off the surface of the scene"})
+    record = with_cut(record, one, rules)
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)
@@ -259,7 +261,6 @@ def _measure(
         without = _named(scene, missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
     elif not own:
-        assert rules is not None
         errors, why, record = _errors(one, reference, rules, record)
         metrics, notes = errors + metrics, notes | why
     return _noted(replace(record, metrics=metrics), notes)
@@ -322,6 +323,7 @@ def _errors(
         # the scale is as uncertain as the reference: (1 + value), to first order
         width = known * (1 + value) + found.integration_error
         metrics.append(Metric(name, value, "1", None, width, reference.source))
+    record = with_other_errors(record, one, reference, times, rules)
     return metrics, notes, replace(record, series=history.series())
 
 
@@ -337,6 +339,7 @@ def _time_note(history: History, reference: Reference) -> dict[str, str]:
 
 def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
     """Rates of every error, and of every quantity that is not exact on some level."""
+    fields = {q.name for q in scene.quantities if q.kind in ("displacement", "opening")}
     names = [*ERROR_NAMES, *(q.name for q in scene.quantities)]
     rates = []
     for solver in dict.fromkeys(record.solver for record in records):
@@ -352,5 +355,7 @@ def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
             if rows:
                 sizes, errors = zip(*rows, strict=True)
                 values, widths = [e.value for e in errors], [e.high - e.value for e in errors]
-                rates.append(observed_rate(solver, name, sizes, values, widths))
+                rate = observed_rate(solver, name, sizes, values, widths)
+                mixed = name in {*ERROR_NAMES, *fields} and are_mixed(own)
+                rates.append(replace(rate, order=None, reason=MIXED) if mixed else rate)
     return rates

@@ -184,12 +184,13 @@ def _contestants(
         sizes = [size_of(levels[level]) for level in names]
         order = levels[names[-1]].order
         shown.append(Contestant(REFERENCE, names[-1], motions[-1], motions[:-1], sizes, order))
-    good = {(s.solver, s.level) for s in result.solves if s.metrics}
+    good = {(s.solver, s.level): s.continued for s in result.solves if s.metrics}
     for name, own in solutions.items():
         usable = [level for level in own if (name, level) in good]
         if name != REFERENCE and usable:
             finest = max(usable)
-            shown.append(Contestant(name, finest, SolutionMotion(own[finest], body)))
+            motion = SolutionMotion(own[finest], body, continued=good[name, finest])
+            shown.append(Contestant(name, finest, motion))
     return shown
 
 

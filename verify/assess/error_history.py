@@ -86,13 +86,14 @@ def compared_times(scene: Scene, solution: Solution) -> list[float | None]:
 
 
 def error_history(
-    field: Motion, reference: Motion, times: Iterable[float | None], rules: Rules, law: Law
-) -> History:
-    """Measure all errors of a field at all times."""
+    field: Motion, reference: Motion, times: Iterable[float | None], rules: Rules, law: Law,
+    count: int | None = None,
+) -> History:  # fmt: skip
+    """Measure all errors of a field at all times, by all rules or the `count` finest."""
     times = list(times)
     norms: dict[str, list[list[ErrorNorm]]] = {name: [] for name in rules.measured()}
     for time in times:
         one, other = field.at(time), reference.at(time)
-        for name, row in rules.norms(norms, one, other, law).items():
+        for name, row in rules.norms(norms, one, other, law, count).items():
             norms[name].append(row)
     return History(times, norms)

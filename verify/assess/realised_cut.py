@@ -4,9 +4,8 @@ from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+
+from verify.compare.cut_deviation import welded
 
 Array = NDArray[np.float64]
 
@@ -64,14 +63,7 @@ def triangles_of(facets: Array) -> Array:
 def _welded(facets: Array, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
     """Corners (c, d), those within `tolerance` of the cut's size made one, and (f, k) numbers."""
     points = facets.reshape(-1, facets.shape[-1])
-    if not len(points):
-        return points, np.zeros(facets.shape[:2], dtype=np.int64)
-    reach = tolerance * float(np.ptp(points, axis=0).max())
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, number = connected_components(link.tocsr(), directed=False)
-    _, first, number = np.unique(number, return_index=True, return_inverse=True)
-    return points[first], number.reshape(facets.shape[:2]).astype(np.int64)
+    return welded(facets, tolerance * float(np.ptp(points, axis=0).max()) if len(points) else 0.0)
 
 
 def _without_straight(line: Array) -> Array:

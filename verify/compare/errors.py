@@ -138,10 +138,15 @@ class Rules:
         """Names of the errors that mean something on this body."""
         return [name for name, metric in ERRORS.items() if metric.where in self._weights]
 
+    def finest(self, place: Literal["body", "cut"]) -> Any:
+        """Finest rule of the body, or on its cuts; None if it has none."""
+        return next(iter(self._rules[place]), None)
+
     def norms(
-        self, names: Iterable[str], field: Field, reference: Field, law: Law
-    ) -> dict[str, list[ErrorNorm]]:
-        """Error norms by name and by rule of the family.
+        self, names: Iterable[str], field: Field, reference: Field, law: Law,
+        count: int | None = None,
+    ) -> dict[str, list[ErrorNorm]]:  # fmt: skip
+        """Error norms by name and by rule of the family, or by the `count` finest of it.
 
         What is measured near a tip or far from it is held against the norm of the reference
         over the whole body: the squares of both add up to the square of the whole. All three
@@ -151,7 +156,7 @@ class Rules:
         for measure in dict.fromkeys(ERRORS[name].measure for name in found):
             alike = [name for name in found if ERRORS[name].measure is measure]
             place = "cut" if ERRORS[alike[0]].where == "cut" else "body"
-            for k, rule in enumerate(self._rules[place]):
+            for k, rule in enumerate(self._rules[place][:count]):
                 squares = measure(field, reference, rule, law)
                 for name in alike:
                     metric = ERRORS[name]

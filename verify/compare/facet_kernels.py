@@ -1,24 +1,32 @@
-"""Kernel: distance to segments."""
+"""Kernel: nearest segments."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+_Floats = NDArray[np.float64]
 
-def distance_to_segments(
-    points: NDArray[np.float64], starts: NDArray[np.float64], ends: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d)."""
-    distance = np.empty(len(points))
-    _distances(points, starts, ends, distance)
-    return distance
+
+def distance_to_segments(points: _Floats, starts: _Floats, ends: _Floats) -> _Floats:
+    """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d); infinite without any."""
+    return nearest_segments(points, starts, ends)[0]
+
+
+def nearest_segments(points: _Floats, starts: _Floats, ends: _Floats) -> tuple[_Floats, _Floats]:
+    """Distance (n,) of points (n, d) to the nearest of segments (k, d)–(k, d), and its foot (n, d).
+
+    Without any segment the distance is infinite, and the foot the point.
+    """
+    distance, foot = np.empty(len(points)), np.array(points, dtype=float)
+    _nearest(points, starts, ends, distance, foot)
+    return distance, foot
 
 
 @njit(cache=True)
-def _distances(points, starts, ends, distance):
+def _nearest(points, starts, ends, distance, foot):
     n, d = points.shape
     for i in range(n):
-        best = np.inf
+        best, where, share = np.inf, -1, 0.0
         for k in range(starts.shape[0]):
             along, length2 = 0.0, 0.0
             for c in range(d):
@@ -29,5 +37,9 @@ def _distances(points, starts, ends, distance):
             away2 = 0.0
             for c in range(d):
                 away2 += (points[i, c] - (1 - t) * starts[k, c] - t * ends[k, c]) ** 2
-            best = min(best, away2)
+            if away2 < best:
+                best, where, share = away2, k, t
         distance[i] = np.sqrt(best)
+        if where >= 0:
+            for c in range(d):
+                foot[i, c] = (1 - share) * starts[where, c] + share * ends[where, c]

@@ -30,6 +30,8 @@ class MembraneField(SolutionField):
     body : MembraneBody
     step : int
         Output time that is evaluated; default the last.
+    sided : bool
+        Whether points are evaluated on their sides of the cuts.
 
     Attributes
     ----------
@@ -38,11 +40,13 @@ class MembraneField(SolutionField):
         surface, m.
     """
 
-    def __init__(self, solution: Solution, body: MembraneBody, step: int = -1) -> None:
+    def __init__(
+        self, solution: Solution, body: MembraneBody, step: int = -1, sided: bool = True
+    ) -> None:
         super().__init__(solution, step)
-        self._patches = body.patches
+        self._patches = body.patches if sided else []
         level = [patch.level(self.shape.corners.reshape(-1, 3)) for patch in self._patches]
-        self._sides = _sides_of(np.array(level).reshape(len(level), -1, 3))
+        self._sides = _sides_of(np.array(level).reshape(len(level), len(self.shape.corners), 3))
         probes = np.concatenate([body.corners.reshape(-1, 3), body.corners.mean(axis=1)])
         self.off_surface = float(self._on_surface(probes)[1].max())
 

@@ -72,11 +72,15 @@ class SolutionMotion:
     solution : Solution
     body : Body or SolidBody
         Its cuts as asked say where the sides are.
+    deviation, continued
+        See `verify.compare.realised.field_of`.
     """
 
-    def __init__(self, solution: Solution, body: AnyBody) -> None:
+    def __init__(
+        self, solution: Solution, body: AnyBody, deviation: float = 0.0, continued: bool = True
+    ) -> None:
         self.solution = solution
-        self._field = field_of(solution, body)
+        self._field = field_of(solution, body, deviation=deviation, continued=continued)
         self._found: _Found = {}
         self._last: tuple[float, Sampled] | None = None
 
@@ -101,6 +105,11 @@ class SolutionMotion:
     def cells_at(self, points: Array, near: Array) -> NDArray[np.int64]:
         """Find the cell (n,) that holds each of `points` (n, d), on the side of `near`."""
         return self._field.cells_at(points, near)
+
+    def differs(self, other: "SolutionMotion", points: Array) -> NDArray[np.bool_]:
+        """Whether another motion of the same solution is of another cell at points (n, d)."""
+        own, others = (_Located(m._field, m._found).cells(points, points) for m in (self, other))
+        return np.asarray(own != others)
 
     def at(self, time: float | None = None) -> Field:
         """Field at a time in s; None is the last.
@@ -186,11 +195,14 @@ class _Located:
     def __init__(self, field: SolutionField, found: _Found) -> None:
         self._field, self._found = field, found
 
-    def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
+    def cells(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
         key = id(points), id(near)
         if key not in self._found:  # holds the arrays, so that their ids stay theirs
             self._found[key] = points, near, self._field.cells_at(points, near)
-        return self._field.in_cells(points, self._found[key][2])
+        return self._found[key][2]
+
+    def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
+        return self._field.in_cells(points, self.cells(points, near))
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         return self.evaluate(points, near)[0]

@@ -1,7 +1,8 @@
 """Fields whose cut is not exactly the cut as asked: facets of an arc, a snapped cut.
 
 Between the cut as asked and the cut as realised, the cell that holds a point lies on the wrong
-side. There the field is continued from the nearest cell on the right side of the realised cut.
+side. There the field is continued from the nearest cell on the right side of the realised cut,
+where that is a matter of facets (`CutRecord.continued`); else it stands as it was stored.
 Where a solver has no cut at all (ahead of a tip that it moved back), nothing is changed: the field
 there is what the solver says it is, and the error is real.
 """
@@ -22,15 +23,21 @@ Array = NDArray[np.float64]
 
 
 def field_of(
-    solution: Solution, body: AnyBody, step: int = -1, deviation: float = 0.0
+    solution: Solution,
+    body: AnyBody,
+    step: int = -1,
+    deviation: float = 0.0,
+    continued: bool = True,
 ) -> SolutionField:
     """Make the field of a solution, with the sides of the cuts of `body` as asked.
 
-    `deviation` in m is that of another solution's cut, if the field is asked on that one's sides.
+    `deviation` in m is that of another solution's cut, if the field is asked on that one's sides,
+    or what is known of its own. Unless it is `continued`, the field is that of the cell that holds
+    a point, whatever its side.
     """
     if isinstance(body, MembraneBody):
-        return MembraneField(solution, body, step)
-    if not len(solution.cut_facets) or not body.has_cuts:
+        return MembraneField(solution, body, step, continued)
+    if not len(solution.cut_facets) or not body.has_cuts or not continued:
         return SolutionField(solution, step)
     return SidedField(solution, body, step, deviation)
 

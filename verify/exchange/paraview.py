@@ -87,7 +87,8 @@ def export_fields(
             name = f"{folder_name(solve.solver)}-{solve.level}"
             own = None if solve.solver == REFERENCE else truth
             with asked_place(out):
-                written.append(_write_series(scene, solution, own, out / entry.folder.name / name))
+                place = out / entry.folder.name / name
+                written.append(_write_series(scene, solution, own, place, solve.continued))
     if not written:
         asked = f"{', '.join(solvers) or 'any solver'}, level {'any' if level is None else level}"
         raise InputError(f"holds no stored solution of {asked}", str(run))
@@ -120,11 +121,14 @@ def _truth(run: Path, entry: CaseEntry, scene: Scene, judged: Sequence[Solution]
     return truth
 
 
-def _write_series(scene: Scene, solution: Solution, truth: Truth | None, place: Path) -> Path:
+def _write_series(
+    scene: Scene, solution: Solution, truth: Truth | None, place: Path, continued: bool
+) -> Path:
     """Write the mesh and fields of each output time, and the collection that names the times."""
     place.mkdir(parents=True, exist_ok=True)
     steps = range(len(solution.times))
-    error = None if truth is None else nodal_differences(solution, truth, body_of(scene), steps)
+    body = body_of(scene) if continued else None
+    error = None if truth is None else nodal_differences(solution, truth, body, steps)
     collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     entries = ElementTree.SubElement(collection, "Collection")
     field = SolutionField(solution)

@@ -18,6 +18,7 @@ from verify.report.run_directory import CaseEntry
 from verify.report.tables import (
     MANY,
     checks_table,
+    cuts_table,
     numbers_table,
     reasons_table,
     reference_facts,
@@ -90,6 +91,7 @@ class CaseView:
     numbers: Table | None = None
     times: Table | None = None
     regularisations: Table | None = None
+    cuts: Table | None = None
     reference: list[tuple[str, str]] = field(default_factory=list)
     reference_tables: list[Table] = field(default_factory=list)
     lead: tuple[str, Drawing] | None = None
@@ -133,6 +135,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
     view.times, view.regularisations = times_table(result), regularisations_table(result)
+    view.cuts = cuts_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)
 

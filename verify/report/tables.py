@@ -22,6 +22,7 @@ from verify.report.notation import (
 )
 from verify.result import (
     CRITICAL_STEP,
+    CUT,
     CaseResult,
     Metric,
     NoticeKind,
@@ -166,6 +167,42 @@ def regularisations_table(result: CaseResult) -> Table | None:
         rows.append([solver_title(solver), kind, counts, largest])
     head = ["solver", "what was done", "how often", "largest contribution"]
     return plain_table("Regularisations", head, rows, "prose") if rows else None
+
+
+def cuts_table(result: CaseResult) -> Table | None:
+    """Return where realised cuts are not as asked, and the errors that are not judged for that."""
+    rows = []
+    for solve in _ordered(result):
+        cut = solve.cut
+        if cut is None or CUT not in solve.notes:
+            continue
+        of_ends, of_swept = ("m", "m²") if cut.dimension == 2 else ("m²", "m³")
+        judged = f"{'with' if cut.continued else 'without'} continuation"
+        judged += ", under-resolved" if cut.under_resolved else ""
+        rows.append(
+            [
+                solver_title(solve.solver),
+                str(solve.level),
+                *(
+                    _in_elements(off, solve)
+                    for off in (cut.asked_to_realised, cut.realised_to_asked)
+                ),
+                *(f"{number(amount, 2)} {of_ends}" for amount in (cut.missing, cut.surplus)),
+                f"{number(cut.swept, 2)} {of_swept}",
+                judged,
+                number(cut.errors.get("displacement_l2"), 2),
+            ]
+        )
+    head = [
+        "solver", "level", "beside it: as asked", "as realised", "missing", "too much", "swept",
+        "judged", "L² error that is not",
+    ]  # fmt: skip
+    return plain_table("Cuts that are not where they were asked", head, rows) if rows else None
+
+
+def _in_elements(length: float, solve: SolveRecord) -> str:
+    size = f" ({number(length / solve.size, 2)} h)" if solve.size else ""
+    return f"{number(length, 2)} m{size}"
 
 
 def reference_facts(reference: ReferenceRecord) -> list[tuple[str, str]]:

@@ -65,7 +65,7 @@ def main(question_file: Path) -> None:
     result = replace(result, notices=[*result.notices, *notices])
     result = replace(result, provenance=question["provenance"])
     try:
-        drawn = _error_pictures(scene, solutions, exact, folder)
+        drawn = _error_pictures(result, scene, solutions, exact, folder)
     except Exception:  # pictures cost nobody a verdict
         traceback.print_exc()
         drawn = {}
@@ -165,12 +165,17 @@ def _is_wild(solution: Solution) -> bool:
 
 
 def _error_pictures(
-    scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any, folder: Path
+    result: CaseResult,
+    scene: Scene,
+    solutions: dict[str, dict[int, Solution]],
+    exact: Any,
+    folder: Path,
 ) -> dict[str, Path]:
     """Write the error field of the finest solution of each solver, if there is a reference."""
     body = body_of(scene)
     judged = [own[max(own)] for solver, own in solutions.items() if solver != REFERENCE]
     truth = truth_of(scene, solutions.get(REFERENCE, {}), judged, exact)
+    continued = {(solve.solver, solve.level): solve.continued for solve in result.solves}
     pictures: dict[str, Path] = {}
     for solver, own in solutions.items():
         if solver == REFERENCE or truth is None:
@@ -178,7 +183,8 @@ def _error_pictures(
         path = folder / f"error_field_{folder_name(solver)}.vtu"
         try:
             finest = own[max(own)]
-            write_error_field(finest, truth(float(finest.times[-1])), path, body)
+            sides = body if continued[solver, max(own)] else None
+            write_error_field(finest, truth(float(finest.times[-1])), path, sides)
         except Exception:  # a solution that cannot be drawn costs nobody else a picture
             traceback.print_exc()
             continue

@@ -72,7 +72,7 @@ def nodal_differences(
         The reference or exact field at a time, s.
     body : Body, SolidBody or MembraneBody, optional
         Its cuts as asked: where they are not as realised, the truth is asked on the side of the
-        solution's cell.
+        solution's cell. Without it nothing is continued across the cut.
     steps : sequence of int
         Output times that are looked at; default the last.
 

@@ -1,0 +1,111 @@
+"""Cut-off teeth and corners are in the errors: against an integration of one's own."""
+
+import numpy as np
+import pytest
+from cut_meshes import scene
+
+from verify.assess.cut_errors import measured_cut, with_cut, with_other_errors
+from verify.assess.error_history import error_history
+from verify.assess.quantities import Measured
+from verify.assess.reference import Reference
+from verify.compare.body import body_of
+from verify.compare.errors import Rules
+from verify.compare.hooke import law_of
+from verify.compare.integration import spread_of
+from verify.compare.motion import ExactMotion
+from verify.reference_record import ReferenceRecord
+from verify.result import CUT, SolveRecord, Status
+from verify.scene.planar import inside_polygon
+from verify.solvers.interface import find_solver
+
+LIFT = 0.1
+TOOTH = [[-0.1, 0.53], [0.55, 0.53], [0.72, 0.73], [0.74, 0.53], [1.1, 0.53]]
+
+
+class Lifted:
+    """What is above a line moves up, what is below it stays."""
+
+    def __init__(self, points):
+        self._below = np.vstack([points, [[1.1, -1.0], [-0.1, -1.0]]])
+
+    def displacement(self, points, near=None):
+        up = ~inside_polygon(points if near is None else near, self._below)
+        return np.column_stack([np.zeros(len(points)), LIFT * up])
+
+    def gradient(self, points, near=None):
+        return np.zeros((len(points), 2, 2))
+
+
+def lifted_scene(points, cells):
+    held = [{"where": "top", "displacement": [0.0, LIFT]},
+            {"where": "bottom", "displacement": [0.0, 0.0]}]  # fmt: skip
+    cut = {"kind": "polyline", "points": np.asarray(points).tolist()}
+    return scene([cut], supports=held, mesh={"cells": [[cells, cells]]})
+
+
+def judged(points, cells, solver):
+    """The record of a solve, its judged L2 error with that of its integration, the solution."""
+    case, truth = lifted_scene(points, cells), Lifted(points)
+    solution, body, law = find_solver(solver).solve(case, 0, 0), body_of(case), law_of(case)
+    rules = Rules(body, 1 / cells)
+    one = Measured(solution, body, law, case, measured_cut(solution, body, rules))
+    record = with_cut(SolveRecord("case", solver, 0, Status.SOLVED), one, rules)
+    exact = Reference(ExactMotion(truth), "", {}, {}, ReferenceRecord("exact"))
+    record = with_other_errors(record, one, exact, [None], rules)
+    found = error_history(one.motion, exact.motion, [None], rules, law).reported()
+    return record, spread_of(found["displacement_l2"], 2), solution
+
+
+def integrated(points, solution, count=150):
+    """Relative L2 error of the stored field, and the area that moves with the wrong part."""
+    boxes = np.stack(np.meshgrid(*[np.arange(count)] * 2), axis=-1).reshape(-1, 2)
+    x = (boxes + np.random.default_rng(1).uniform(0, 1, boxes.shape)) / count
+    corners = solution.points[solution.cells]
+    u = np.full(x.shape, np.nan)
+    for cell, (a, b, c) in zip(solution.cells, corners, strict=True):
+        near = np.flatnonzero(((x >= np.minimum(np.minimum(a, b), c))
+                               & (x <= np.maximum(np.maximum(a, b), c))).all(axis=1))  # fmt: skip
+        place = np.linalg.solve(np.column_stack([b - a, c - a]), (x[near] - a).T)
+        share = np.vstack([1 - place.sum(axis=0), place])
+        here = (share >= -1e-12).all(axis=0)
+        u[near[here]] = share[:, here].T @ solution.displacement[-1][cell]
+    true = Lifted(points).displacement(x)
+    off = np.sum((u - true) ** 2, axis=1)
+    return np.sqrt(off.sum() / np.sum(true**2)), np.mean(off > (0.5 * LIFT) ** 2)
+
+
+@pytest.mark.parametrize("solver", ["xfem", "subdivision", "virtual_node", "snapping"])
+def test_a_tooth_inside_an_element_is_in_the_error(solver):
+    record, found, solution = judged(TOOTH, 8, solver)
+    expected, area = integrated(TOOTH, solution)
+    assert 0.13 < expected < 0.16
+    assert found.norm.relative == pytest.approx(expected, rel=0.02)
+    assert record.cut.swept == pytest.approx(area, rel=0.03)
+    assert not record.cut.continued
+    assert record.cut.lateral > 0.1
+    assert record.cut.errors["displacement_l2"] < 1e-10  # as it was judged before
+    assert "without continuation" in record.notes[CUT]
+
+
+def zigzag(random):
+    x = np.sort(random.uniform(0.1, 0.9, random.integers(2, 6)))
+    kinks = np.column_stack([x, random.uniform(0.3, 0.7, len(x))])
+    return np.vstack([[-0.1, 0.47], kinks, [1.1, 0.52]])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_error_of_a_random_zigzag_is_that_of_the_stored_field(seed):
+    points = zigzag(np.random.default_rng(seed))
+    for solver in ("xfem", "virtual_node", *(["conforming"] if seed == 0 else [])):
+        record, found, solution = judged(points, 7, solver)
+        expected, area = integrated(points, solution)
+        assert record.cut.swept == pytest.approx(area, rel=0.1, abs=1e-3)
+        error, known = found.norm.relative, found.integration_error
+        if record.cut.continued:  # what is left out is a strip of an element's twelfth
+            assert record.cut.swept < record.cut.limit
+            assert error < 1e-10
+        else:
+            assert error == pytest.approx(expected, abs=known + 0.02 * expected)
+            assert CUT in record.notes
+        if solver == "conforming":
+            assert record.cut.lateral < 1e-12

@@ -1,0 +1,199 @@
+"""How far a realised cut is from the cut as asked: beside it, at its ends.
+
+Measured from the facets of the realised cut and the cuts as asked alone, cut by cut: a facet
+belongs to the cut that it is nearest to. A point whose nearest point is a free end lies beyond it:
+there something is missing, or too much. All other distances are lateral deviations.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from verify.compare.body import AnyBody, Body
+from verify.compare.cell_tree import build_cell_tree
+from verify.compare.curves import Arc
+from verify.compare.cut_line import CutRule
+from verify.compare.facet_kernels import distance_to_segments, nearest_segments
+from verify.compare.locate import ROUND_OFF
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_kernels import nearest_triangles
+from verify.compare.sides import distance_to_cut
+from verify.compare.simplex_rule import points_in
+from verify.compare.simplices import simplices, triangle_frames
+from verify.compare.solid import SolidBody
+from verify.compare.splitting import heights
+from verify.cut_record import CutRecord
+from verify.solution import Solution
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Over the longest edge D of an element: what the linear interpolant of the distance from an arc of
+# radius 2D may be off by (docs/theory/judgement.md, "Where the cut is").
+LIMIT = {2: 1 / 12, 3: 3 / 32}
+_ORDER = {2: 8, 3: 3}  # of the rule on segments and on triangles
+# Of its distance from a point of the realised cut: a place this close to that cut was cut there.
+_AT = 0.1
+_STEP = 1e-6  # of the body's size: a place this far inside its surface is inside
+
+
+def cut_record(solution: Solution, body: AnyBody, rule: CutRule) -> CutRecord | None:
+    """Measure a realised cut, without what is swept; None of a body without cuts.
+
+    Parameters
+    ----------
+    solution : Solution
+    body : Body, SolidBody or MembraneBody
+    rule : CutRule
+        On its cuts as asked. Between its points nothing is seen.
+    """
+    if not body.has_cuts:
+        return None
+    same = ROUND_OFF * body.size
+    _, number = welded(solution.cut_facets, same)
+    distinct = (np.diff(np.sort(number, axis=1), axis=1) > 0).all(axis=1)
+    facets = solution.cut_facets[distinct]
+    probes = np.concatenate([facets, facets.mean(axis=1, keepdims=True)], axis=1)
+    mine, theirs = _of_cuts(body, rule.points[:, None], same), _of_cuts(body, probes, same)
+    d, element = solution.cell_dimension, _element(solution, facets)
+    limit = LIMIT[d] * element
+    forth, back, missing, surplus = [0.0], [0.0], 0.0, 0.0
+    for k, cut in enumerate(body.cuts):
+        points, weights, own = rule.points[mine[k]], rule.weights[mine[k]], facets[theirs[k]]
+        away, end = _to_realised(points, rule.normals[mine[k]], own, body, same)
+        missing += float(weights[end].sum())
+        forth.append(float(away[~end].max(initial=0.0)))
+        points, weights = points_in(own, _ORDER[facets.shape[1]])
+        points = np.concatenate([points, probes[theirs[k]].reshape(-1, points.shape[1])])
+        away, foot, end = _to_asked(points, body, cut, same)
+        # beside a place where the cut was made as asked it was made once more
+        far = np.flatnonzero(~end & (away > limit))
+        if len(far):
+            there = _to_realised(foot[far], None, own, body, same)[0]
+            end[far] = there <= _AT * away[far]
+        surplus += float(weights[end[: len(weights)]].sum())
+        back.append(float(away[~end].max(initial=0.0)))
+    return CutRecord(d, max(forth), max(back), missing, surplus, 0.0, element, limit, _radius(body))
+
+
+def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
+    """Corners (c, d) of facets (f, k, d), those within `reach` m made one, and (f, k) numbers."""
+    points = facets.reshape(-1, facets.shape[-1])
+    if not len(points):
+        return points, np.zeros(facets.shape[:2], dtype=np.int64)
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+    _, number = connected_components(link.tocsr(), directed=False)
+    _, first, number = np.unique(number, return_index=True, return_inverse=True)
+    return points[first], number.reshape(facets.shape[:2]).astype(np.int64)
+
+
+def _of_cuts(body: AnyBody, places: Array, same: float) -> Flags:
+    """Whether groups of places (g, p, d) belong to each cut (c, g): the nearest one."""
+    if len(body.cuts) == 1:
+        return np.ones((1, len(places)), dtype=bool)
+    flat = places.reshape(-1, places.shape[2])
+    away = [distance_to_cut(pieces, flat)[0] for pieces in body.cuts.values()]
+    farthest = np.array(away).reshape(len(away), *places.shape[:2]).max(axis=2)
+    return np.asarray(farthest <= farthest.min(axis=0) + same)
+
+
+def _to_realised(
+    points: Array, normals: Array | None, facets: Array, body: AnyBody, same: float
+) -> tuple[Array, Flags]:
+    """Distances (n,) of points of a cut as asked from facets, and whether these end there (n,)."""
+    if not len(facets):
+        return np.full(len(points), np.inf), np.ones(len(points), dtype=bool)
+    free = _free_faces(facets, body, same)
+    if facets.shape[1] == 3:
+        away, to_face = _to_triangles(points, facets, same), free
+    else:
+        away, foot = nearest_segments(points, *_ends(facets))
+        to_face = np.repeat(free, 2, axis=1)
+    end = distance_to_segments(points, *_ends(to_face)) <= away + same
+    if isinstance(body, MembraneBody) and normals is not None:  # the surfaces may be apart
+        away = np.abs(np.sum((points - foot) * normals, axis=1))
+    return away, end
+
+
+def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Array, Array, Flags]:
+    """Distances (n,) of points from a cut as asked, feet (n, d), and whether it ends there (n,)."""
+    if isinstance(body, MembraneBody):
+        ends = body.lines[cut].ends
+        away, foot = nearest_segments(points, *_ends(ends))
+    else:
+        pieces = body.cuts[cut]
+        feet = np.array([piece.foot(points) for piece in pieces])
+        each = np.linalg.norm(points - feet, axis=2)
+        away, foot = each.min(axis=0), feet[each.argmin(axis=0), np.arange(len(points))]
+    if isinstance(body, SolidBody):
+        nearest = each <= away + same
+        rim = np.array([patch.nearest(points)[1] for patch in body.cuts[cut]])
+        # what two patches share is no end
+        return away, foot, (nearest & rim).any(axis=0) & (nearest.sum(axis=0) == 1)
+    if isinstance(body, Body):
+        ends = np.array([piece.point(np.array([0.0, 1.0])) for piece in body.cuts[cut]])
+    free = np.repeat(_free_faces(ends, body, same), 2, axis=1)
+    end = distance_to_segments(points, *_ends(free)) <= away + same
+    if isinstance(body, MembraneBody):  # the surfaces may be apart
+        away, _ = distance_to_cut(body.cuts[cut], points)
+    return away, foot, end
+
+
+def _ends(segments: Array) -> tuple[Array, Array]:
+    return np.ascontiguousarray(segments[:, 0]), np.ascontiguousarray(segments[:, 1])
+
+
+def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
+    """Find ends (e, 1, d) or edges (e, 2, 3) inside a body that one facet alone has."""
+    corners, number = welded(facets, same)
+    faces = np.concatenate([np.delete(number, k, axis=1) for k in range(number.shape[1])])
+    distinct, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
+    free = corners[distinct[count == 1]]
+    if isinstance(body, MembraneBody):
+        return np.asarray(free)
+    middle = free.mean(axis=1)
+    within = np.ones(len(free), dtype=bool)
+    for way in _STEP * body.size * np.eye(middle.shape[1]):
+        within &= body.inside(middle + way) & body.inside(middle - way)
+    return np.asarray(free[within])
+
+
+def _to_triangles(points: Array, triangles: Array, same: float) -> Array:
+    """Distance (n,) of points (n, 3) from the nearest of triangles (f, 3, 3)."""
+    corners = np.ascontiguousarray(triangles[heights(triangles) > same])
+    shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
+    no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
+    return np.asarray(
+        nearest_triangles(
+            np.ascontiguousarray(points), np.zeros((0, 3)), no_sides[0],
+            tree.over(corners, shape.normals),
+            np.ascontiguousarray(triangle_frames(corners)[:, 2]), no_sides[1], same,
+        )[1]
+    )  # fmt: skip
+
+
+def _element(solution: Solution, facets: Array) -> float:
+    """Largest longest edge of the cells within their own diameter of the facets, or of all, m."""
+    corners = simplices(solution.points, solution.cells).corners
+    longest = np.max(
+        [np.linalg.norm(corners - np.roll(corners, k, axis=1), axis=2).max(axis=1)
+         for k in range(1, corners.shape[1])], axis=0,
+    )  # fmt: skip
+    if not len(facets):
+        return float(longest.max())
+    places = np.concatenate([*np.swapaxes(facets, 0, 1), facets.mean(axis=1)])
+    away, _ = cKDTree(places).query(corners.mean(axis=1))
+    return float(longest[away <= longest].max(initial=0.0))
+
+
+def _radius(body: AnyBody) -> float | None:
+    """Least radius of curvature of the cuts of a body, m; None if nothing is curved."""
+    if isinstance(body, Body):
+        found = [part.piece.radius for part in body.parts if isinstance(part.piece, Arc)]
+    else:
+        found = [1.0 / patch.curvature for patch in body.patches if patch.curvature]
+    return min(found, default=None)

@@ -1,0 +1,56 @@
+"""Record of how far the cut that a solver realised is from the cut as asked."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class CutRecord:
+    """The realised cut of a solve beside the cut as asked.
+
+    Parameters
+    ----------
+    dimension : int
+        Of the cells, 2 or 3.
+    asked_to_realised, realised_to_asked : float
+        Largest distance of a point of one from the other, m, where the nearest point is no end.
+    missing, surplus : float
+        Of the cut as asked beyond the ends of the realised one, and the reverse: a length, m; of
+        surfaces in space an area, m².
+    swept : float
+        Between the two over their common part: an area, m², in space a volume, m³.
+    element : float
+        Largest longest edge of the cells at the realised cut, m.
+    limit : float
+        Lateral deviation up to which fields are continued across the realised cut, m.
+    radius : float or None
+        Least radius of curvature of the cuts as asked, m; None if all are straight or plane.
+    errors : dict of str to float
+        Relative errors that are not judged, by metric: without continuation if those judged are
+        with it, and the reverse. Empty where both are the same.
+    """
+
+    dimension: int
+    asked_to_realised: float
+    realised_to_asked: float
+    missing: float
+    surplus: float
+    swept: float
+    element: float
+    limit: float
+    radius: float | None
+    errors: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def lateral(self) -> float:
+        """Larger of both lateral deviations, m."""
+        return max(self.asked_to_realised, self.realised_to_asked)
+
+    @property
+    def continued(self) -> bool:
+        """Whether what is judged is continued across the realised cut."""
+        return self.lateral <= self.limit
+
+    @property
+    def under_resolved(self) -> bool:
+        """Whether an arc is of less than two elements in radius."""
+        return self.radius is not None and self.radius < 2.0 * self.element
