@@ -91,7 +91,7 @@ def test_graded_quadratic_elements_beat_the_demand_at_the_griffith_crack():
     assert np.log2(errors[:-1] / errors[1:]) == pytest.approx([4.0, 4.0], abs=0.3)
     # and the error bar that is made of the levels covers, without being ten times too wide
     sizes = [4.0, 2.0, 1.0]
-    known = extrapolate((1 + errors).tolist(), sizes, theoretical=2, best=4)
+    known = extrapolate((1 + errors).tolist(), sizes, 4)
     assert errors[-1] <= known.half_width <= 10 * errors[-1]
 
 

@@ -89,7 +89,7 @@ def test_the_reference_of_a_narrow_strip_knows_its_error():
     # the strip is a bar of its own: levels must approach each other at the energy's order
     scene = two_cuts(1e-2, reference={"size": 0.25})
     values = [energy_of(scene, level=level) for level in range(4)]
-    known = extrapolate(values[:3], [4.0, 2.0, 1.0], theoretical=2, best=4)
+    known = extrapolate(values[:3], [4.0, 2.0, 1.0], 4)
     assert abs(values[3] - values[2]) <= known.half_width
     assert known.half_width < 2e-4 * values[3]
 

@@ -44,6 +44,7 @@ from verify.scene.acceptance import (
 from verify.solution import Solution
 
 _CLOSED_FORM = 1e-11  # relative accuracy of an exact solution's own strain energy
+_LEAST = 0.25  # order in the energy norm that is counted on at least
 OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
 
 # of the mean and of the largest cell: so fine, so coarse a solution may state itself to be
@@ -287,12 +288,10 @@ def known_quantity(
         around = [local_difference(asked, *pair) for pair in pairwise(measured)]
         return place_uncertainty(values[-1], around, sizes, order + 1, falls)
     if isinstance(asked, MaximumDisplacementQuantity):
-        return extrapolate(values, sizes, order, order + 1, falls=falls)
-    # functionals of a Galerkin solution converge with up to twice its order, and with twice that
-    # of the field where the field's is less
-    sane = field_order is not None and 0.5 * order <= field_order <= 2 * order + 0.5
-    second = 2 * min(field_order or 0.0, order) if sane else None
-    return extrapolate(values, sizes, order, 2 * order, second, falls)
+        return extrapolate(values, sizes, order + 1, falls)
+    # functionals of a Galerkin solution converge with twice the order of its field
+    own = order if field_order is None else min(max(field_order, _LEAST), order)
+    return extrapolate(values, sizes, 2 * own, falls)
 
 
 def _round_off(asked: Quantity, measured: Measured) -> float:
@@ -342,7 +341,7 @@ def _field_norms(
     for name in steps[-1]:
         counted = order + ERRORS[base_of(name)].beyond
         absolute = [step[name][0].absolute for step in steps]
-        found = field_uncertainty(absolute, sizes, counted, falls=falls)
+        found = field_uncertainty(absolute, sizes, counted, falls)
         norms[name] = found.half_width
         scale = steps[-1][name][0].scale or 1.0
         entries[name] = _entry([value / scale for value in absolute], found, scale)
