@@ -77,6 +77,27 @@ def test_a_verdict_counts_the_uncertainty_of_the_divisor():
     assert verdicts({**ENERGY, "at_most": 0.0664}, record)[0].verdict is PASS
 
 
+@pytest.mark.parametrize(
+    ("check", "records", "share", "badge"),
+    [
+        (BOUND, [solve(0, 0.02, 9.8e-3)], 0.49, "reference: 0.49 of the error"),
+        (BOUND, [solve(0, 0.02, 2e-3)], 0.1, ""),
+        (BOUND, [solve(0, 0.9, 0.9), solve(1, 0.02, 0.001)], 0.05, ""),  # on the finest level
+        (BOUND, [solve(0, 1e-14, 1e-13)], None, ""),  # round-off
+        (ENERGY, energy(1.02, 0.01), 0.5, "reference: 0.5 of the error"),
+        (STATED, energy(1.0, 0.01), None, ""),  # no reference judges
+        ({"check": "ratio", "at_most": 2.0},
+         [solve(0, 0.03, 0.003), solve(0, 0.02, 0.003, "conforming")], 0.15,
+         "reference: 0.15 of the error"),
+    ],
+)  # fmt: skip
+def test_the_share_of_the_reference_stands_beside_the_verdict(check, records, share, badge):
+    records = [replace(r, metrics=[replace(m, source="it") for m in r.metrics]) for r in records]
+    found = verdicts(check, records)[0]
+    assert found.reference_share == (None if share is None else pytest.approx(share, rel=1e-6))
+    assert found.badge == badge
+
+
 JUDGED = {
     "below the limit": (BOUND, [solve(0, 0.02)], PASS, ""),
     "the whole interval satisfies it": (BOUND, [solve(0, 0.02, 0.029)], PASS, ""),

@@ -168,10 +168,11 @@ def _names(made: Iterable[tuple[str, str, str]]) -> list[str]:
     return names
 
 
-def _judge(runs: _Runs, source: str, name: str) -> "VerdictRecord":
+def _judge(item: pytest.Item, source: str, name: str) -> "VerdictRecord":
     """End the test unless the check passes."""
     from verify.result import Verdict
 
+    runs = item.config.stash[_RUNS]
     if name == _NO_CHECK:
         pytest.skip("the case makes no acceptance check")
     record = runs.verdict(source, name)
@@ -180,6 +181,9 @@ def _judge(runs: _Runs, source: str, name: str) -> "VerdictRecord":
     observed = "not observed" if record.observed is None else f"{record.observed:.6g}"
     text = f"{record.verdict}: {record.metric} ({record.solver}): {observed}, "
     text += f"wanted {record.limit}: {record.reason}"
+    if record.badge:
+        text += f" [{record.badge}]"
+        item.user_properties.append(("badge", record.badge))  # in JUnit, of a test that passes too
     if record.known:
         pytest.xfail(f"known finding: {record.known}: {text}")
     if record.verdict is Verdict.UNDECIDED and not runs.strict:
@@ -234,7 +238,7 @@ class CheckItem(pytest.Item):
 
     def runtest(self) -> None:
         """Run the case, if that is not done, and judge the check."""
-        _judge(self.config.stash[_RUNS], f"{self.path}{self._row}", self._check)
+        _judge(self, f"{self.path}{self._row}", self._check)
 
     def reportinfo(self) -> tuple[Path, None, str]:
         """Say which check of which file this is."""
@@ -273,7 +277,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> None:
     marker = pyfuncitem.get_closest_marker("verify")
     if marker is not None:
         name: Any = pyfuncitem.callspec.params["verify_check"]
-        record = _judge(pyfuncitem.config.stash[_RUNS], _case_of(marker), name)
+        record = _judge(pyfuncitem, _case_of(marker), name)
         pyfuncitem.funcargs["verify_check"] = record
 
 

@@ -15,6 +15,7 @@ from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 
 SCHEMA_VERSION = 1
+SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 CRITICAL_STEP = (
@@ -223,7 +224,9 @@ class VerdictRecord:
     `solver` is empty if the check holds for no solver of the run. `observed` is what was measured,
     `low`/`high` the interval in which its true value lies given the reference's uncertainty,
     `limit` what the case demands (as text), `reason` one sentence. `known` is the reason that the
-    case gives for a FAIL that it lists as a known finding, else empty.
+    case gives for a FAIL that it lists as a known finding, else empty. `reference_share` is the
+    half-width of the reference over the error that is judged, on the finest level; None where no
+    reference judges, or both are round-off.
     """
 
     check: str
@@ -236,6 +239,13 @@ class VerdictRecord:
     limit: str
     reason: str
     known: str = ""
+    reference_share: float | None = None
+
+    @property
+    def badge(self) -> str:
+        """What stands beside the verdict where the reference is not clearly better than judged."""
+        share = self.reference_share
+        return f"reference: {share:.2g} of the error" if share and share > SUFFICIENT else ""
 
     @property
     def counts_as_failed(self) -> bool:
@@ -350,6 +360,14 @@ class CaseResult:
         if whole is Verdict.ERROR and lost < {v.solver for v in self.verdicts}:
             return Verdict.UNDECIDED
         return whole
+
+    @property
+    def badge(self) -> str:
+        """The badge of the check whose reference is the largest share of the error judged."""
+        shares = sorted(self.verdicts, key=lambda record: record.reference_share or 0.0)
+        if not shares or not shares[-1].badge:
+            return ""
+        return f"{shares[-1].badge} ({shares[-1].metric} of {shares[-1].solver})"
 
     def content(self) -> dict[str, Any]:
         """Return all of it as plain values; of the reference what its record says."""

@@ -10,9 +10,23 @@ from dataclasses import replace
 from math import isfinite
 
 from verify.applied_checks import applied_checks, limit_text, unjudged
-from verify.assess.intervals import Interval, NotMeasuredError, error_interval
+from verify.assess.intervals import (
+    Interval,
+    NotMeasuredError,
+    error_interval,
+    reference_share,
+)
 from verify.assess.rates import ROUND_OFF
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result import (
+    CaseResult,
+    Metric,
+    Rate,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+    finest_of,
+)
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
@@ -56,7 +70,8 @@ def judge(
             verdicts.append(unjudged(check, Verdict.UNDECIDED, applied.not_judged))
             continue
         try:
-            verdicts.append(judges[type(check)](check, records, rates))
+            found = judges[type(check)](check, records, rates)
+            verdicts.append(replace(found, reference_share=_reference_share(check, records)))
         except NotMeasuredError as problem:
             verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
     return [_marked(scene, verdict) for verdict in verdicts]
@@ -93,6 +108,7 @@ def judged_against_rows(
         check = one.check
         if isinstance(check, RatioCheck) and check.row is not None and not one.not_judged:
             found = _marked(scene, _against_row(check, result, rows))
+            found = replace(found, reference_share=_reference_share(check, result.solves))
         verdicts.append(found)
     return replace(result, verdicts=verdicts)
 
@@ -221,6 +237,16 @@ def _judge_rate(
         at_most = Interval(rate.pairwise[-1], least, rate.pairwise[-1] + rate.uncertainty)
         return _record(check, Verdict.FAIL, at_most, limit_text(check), rate.reason)
     return _record(check, Verdict.UNDECIDED, None, limit_text(check), rate.reason)
+
+
+def _reference_share(check: Check, records: Sequence[SolveRecord]) -> float | None:
+    """Return the largest share of the reference in an error that a check compares, if it does."""
+    if isinstance(check, ValueCheck):
+        return None
+    solvers = {check.solver, check.to if isinstance(check, RatioCheck) else None}
+    metrics = [s.metric(check.metric) for s in finest_of(records).values() if s.solver in solvers]
+    shares = [reference_share(metric) for metric in metrics if metric is not None]
+    return max((share for share in shares if share is not None), default=None)
 
 
 def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:

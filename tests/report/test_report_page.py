@@ -7,16 +7,18 @@ import random
 import re
 import subprocess
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from xml.etree import ElementTree
 
 import pytest
 from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
+from verify.cli.verdict_text import verdict_lines
 from verify.report import load_run, render, render_markdown
 from verify.report.exports import COLUMNS
-from verify.result import SolveRecord, Status
+from verify.result import SolveRecord, Status, Verdict
+from verify.result_files import read_result, write_result
 
 
 def page_of(root):
@@ -90,6 +92,30 @@ def test_junit_has_one_test_case_per_verdict_with_its_outcome(plain_run):
     assert "level 3 timed out" in root.find(".//error").get("message")
     assert "is not clearly below" in root.find(".//skipped").get("message")
     assert len(root.findall("testsuite")) == 3
+
+
+def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_beside_its_pass(
+    tmp_path,
+):
+    root = make_run(tmp_path / "run", pictures=False)
+    file = root / "cases/statics__f3_inclined/result.json"
+    result = read_result(file)
+    (at, passed) = next((i, v) for i, v in enumerate(result.verdicts) if v.verdict is Verdict.PASS)
+    result.verdicts[at] = replace(passed, reference_share=0.493)
+    write_result(result, file)
+    said = "reference: 0.49 of the error"
+    page = render(root).read_text(encoding="utf-8")
+    assert page.count(said) == 2  # beside the check, and beside the verdict of the case
+    assert render_markdown(root).read_text(encoding="utf-8").count(said) == 2
+    junit = ElementTree.parse(root / "junit.xml").getroot()
+    assert [one.text for one in junit.findall(".//testcase/system-out")] == [said]
+    rows = csv.DictReader(io.StringIO((root / "results.csv").read_text()))
+    shares = {(r["solver"], r["level"], r["metric"]) for r in rows if r["reference_share"]}
+    assert shares == {("xfem", "3", passed.metric)}
+    (line, *_) = verdict_lines([read_result(file)])
+    assert line.endswith(f"[{said} ({passed.metric} of xfem)]")
+    result.verdicts[at] = replace(passed, reference_share=0.1)
+    assert said not in next(iter(verdict_lines([result])))
 
 
 def test_csv_has_a_row_per_metric_and_one_per_failed_solve(plain_run):

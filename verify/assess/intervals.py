@@ -1,6 +1,7 @@
 """Intervals of measured errors: a value and the bounds of its true value."""
 
 from dataclasses import dataclass
+from math import inf
 
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.error_history import ERROR_NAMES
@@ -9,6 +10,8 @@ from verify.scene.acceptance import OVERLAP
 
 # metrics that are relative errors themselves; all others are quantities with a reference
 ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
+
+_ROUND_OFF = 1e-10  # relative: an error that small is none, and needs no reference to say so
 
 
 @dataclass(frozen=True)
@@ -49,3 +52,19 @@ def error_interval(metric: Metric) -> Interval:
     if metric.reference == 0.0:
         raise NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
     return Interval(*metric.relative_distance())
+
+
+def reference_share(metric: Metric) -> float | None:
+    """Half-width of the reference over the error that it judges.
+
+    None where no reference judges, and where error and half-width are round-off.
+    """
+    if not metric.source or metric.name in ACCOUNT:
+        return None
+    scale = 1.0 if metric.reference is None else abs(metric.reference)
+    # measured values may be numpy's, whose comparisons JSON cannot hold
+    error = float(abs(metric.value - (metric.reference or 0.0)))
+    width = float(metric.uncertainty)
+    if not max(error, width) > _ROUND_OFF * scale:
+        return None
+    return width / error if error > 0.0 else inf

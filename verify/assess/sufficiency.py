@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from verify.result import Metric, SolveRecord, Status, finest_of
+from verify.assess.intervals import reference_share
+from verify.result import SUFFICIENT, Metric, SolveRecord, Status, finest_of
 from verify.scene import Scene
-
-SHARE = 0.1  # of the error that is judged, below which the reference's uncertainty shall be
-_ROUND_OFF = 1e-10  # relative: an error that small is none, and needs no reference to say so
 
 
 def sufficiency(
@@ -49,21 +47,18 @@ def sufficiency(
         return {"suffices": False, "suffices_reason": "no error was judged", "judged_errors": {}}
     name, worst = next(iter(rows.items()))
     ratio = worst["ratio"] or 0.0
-    reached = ratio <= SHARE
+    reached = ratio <= SUFFICIENT
     said = "reached" if reached else "not reached"
     reason = (
         f"{said} with {levels} levels: its uncertainty is at most {ratio:.2g} of an error "
-        f"({name}); {SHARE:g} is wanted"
+        f"({name}); {SUFFICIENT:g} is wanted"
     )
     return {"suffices": reached, "suffices_reason": reason, "judged_errors": rows}
 
 
 def _row(metric: Metric) -> dict[str, float | None]:
-    scale = 1.0 if metric.reference is None else abs(metric.reference)
-    # measured values may be numpy's, whose comparisons JSON cannot hold
-    error = float(abs(metric.value - (metric.reference or 0.0)))
-    uncertainty = float(metric.uncertainty)
-    ratio: float | None = None
-    if max(error, uncertainty) > _ROUND_OFF * scale:
-        ratio = uncertainty / error if error > 0.0 else float("inf")
-    return {"error": error, "uncertainty": uncertainty, "ratio": ratio}
+    return {
+        "error": float(abs(metric.value - (metric.reference or 0.0))),
+        "uncertainty": float(metric.uncertainty),
+        "ratio": reference_share(metric),
+    }

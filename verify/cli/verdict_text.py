@@ -14,12 +14,15 @@ def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
         counts = Counter(record.verdict for record in result.verdicts)
         said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
         verdict = result.verdict if result.verdicts else "NOT JUDGED"
+        if result.badge:
+            said += f" [{result.badge}]"
         yield f"{result.case:<{width}}  {verdict:<10} {said}"
         yield from (f"    {notice_text(notice)}" for notice in result.notices)
         for record in result.verdicts:
             if record.verdict is not Verdict.PASS:
                 known = f" (known finding: {record.known})" if record.known else ""
-                said = f"{record.verdict}: {_check(record)}: {record.reason}{known}"
+                badge = f" [{record.badge}]" if record.badge else ""
+                said = f"{record.verdict}{badge}: {_check(record)}: {record.reason}{known}"
                 yield f"    {one_line(said)}"
         for solve in result.solves:
             if solve.status is not Status.SOLVED:

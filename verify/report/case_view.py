@@ -71,6 +71,7 @@ class CaseView:
     by_solver: dict[str, str] = field(default_factory=dict)
     defect: str = ""
     unjudged: list[SolveRecord] = field(default_factory=list)
+    badge: str = ""  # of the check whose reference is the worst
     warnings: list[tuple[str, str]] = field(default_factory=list)
     facts: list[tuple[str, list[str]]] = field(default_factory=list)
     sketch: Drawing | None = None
@@ -119,6 +120,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     for record in result.verdicts:
         of_solver.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
     view.by_solver = {name: str(worst(own)) for name, own in of_solver.items()}
+    view.badge = result.badge
     for notice in result.warnings:
         whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
         view.warnings.append((f"{whose}{notice.about}", notice.text))

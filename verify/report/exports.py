@@ -12,13 +12,13 @@ from verify.csv_files import csv_text
 from verify.report.curves import duration
 from verify.report.notation import printable
 from verify.report.run_directory import CaseEntry, Run
-from verify.result import SolveRecord, Verdict, VerdictRecord
+from verify.result import SolveRecord, Verdict, VerdictRecord, finest_of
 
 EXPORT_SCHEMA = 1
 COLUMNS = (
     "case", "solver", "level", "parameters", "status", "reason", "size", "unknowns", "metric",
     "value", "unit", "reference", "uncertainty", "source", "seconds_median", "seconds_min",
-    "seconds_max", "meshing_median", "repetitions", "wall", "peak_memory",
+    "seconds_max", "meshing_median", "repetitions", "wall", "peak_memory", "reference_share",
 )  # fmt: skip
 
 _OF_A_SOLVE = ("level", "status", "size", "unknowns", "wall", "peak_memory")
@@ -45,7 +45,8 @@ def json_document(run: Run) -> str:
 def csv_rows(run: Run) -> str:
     """Return one row per case, solver, level and metric; one without metric for failed solves.
 
-    A notice is a row whose status is its kind, without level and value.
+    A notice is a row whose status is its kind, without level and value. `reference_share` stands
+    beside the number that a check judges.
     """
     return csv_text(COLUMNS, (row for entry in run.entries for row in _rows_of(entry)))
 
@@ -74,9 +75,8 @@ def junit_document(run: Run) -> str:
             _testcase(suite, entry, "result", Verdict.UNDECIDED, "the case states no check")
         else:
             for record in entry.result.verdicts:
-                _testcase(
-                    suite, entry, _test_name(record), record.verdict, record.reason, record.known
-                )
+                name, badge = _test_name(record), record.badge
+                _testcase(suite, entry, name, record.verdict, record.reason, record.known, badge)
         _count(suite)
         if entry.result and entry.result.notices:
             said = "\n".join(
@@ -102,6 +102,13 @@ def _rows(entry: CaseEntry, solve: SolveRecord) -> Iterator[dict[str, Any]]:
         "reason": printable(solve.reason),
         **{key: getattr(solve, key) for key in _OF_A_SOLVE},
     }
+    result = entry.result
+    last = result is not None and finest_of(result.solves)[solve.solver] is solve
+    shares = {
+        record.metric: record.reference_share
+        for record in (result.verdicts if result and last else [])
+        if record.solver == solve.solver
+    }
     if meshing := solve.timings.get("meshing"):
         common["meshing_median"] = median(meshing)
     if time:
@@ -110,6 +117,7 @@ def _rows(entry: CaseEntry, solve: SolveRecord) -> Iterator[dict[str, Any]]:
     for metric in solve.metrics:
         own = {key: printable(getattr(metric, key)) for key in ("unit", "source")}
         numbers = {key: getattr(metric, key) for key in ("value", "reference", "uncertainty")}
+        numbers["reference_share"] = shares.get(metric.name)
         yield common | {"metric": printable(metric.name)} | own | numbers
     if not solve.metrics:
         yield common
@@ -126,6 +134,7 @@ def _testcase(
     verdict: Verdict,
     reason: str,
     known: str = "",
+    badge: str = "",
 ) -> None:
     """Add a verdict; a known finding does not count as a failure, as in the exit code."""
     classname = printable(entry.name).replace("/", ".")
@@ -133,9 +142,12 @@ def _testcase(
     elements = {Verdict.FAIL: "failure", Verdict.ERROR: "error", Verdict.UNDECIDED: "skipped"}
     if verdict in elements:
         said = f"{verdict}: {printable(reason) or 'no reason given'}"
+        said = f"{said} [{badge}]" if badge else said
         if known:
             said = f"known finding ({printable(known)}): {said}"
         ElementTree.SubElement(case, "skipped" if known else elements[verdict], message=said)
+    elif badge:
+        ElementTree.SubElement(case, "system-out").text = badge
 
 
 def _count(element: ElementTree.Element) -> None:

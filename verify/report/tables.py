@@ -55,7 +55,7 @@ def check_row(record: VerdictRecord) -> list[Cell]:
         Cell(check_text(record)),
         Cell(observed),
         Cell(record.limit),
-        Cell("", known, verdict=str(record.verdict)),
+        Cell(record.badge, known, verdict=str(record.verdict)),
     ]
 
 
@@ -80,7 +80,8 @@ def checks_table(result: CaseResult) -> Table | None:
     for record in result.verdicts:
         observed = _observed(record)
         shown = number(record.observed, 2) if "[" in observed else observed
-        cell = Cell(note=shown, tip=f"{observed}: {record.reason}",
+        badge = f"{record.badge}; " if record.badge else ""
+        cell = Cell(note=f"{badge}{shown}", tip=f"{observed}: {record.reason}",
                     verdict=str(record.verdict))  # fmt: skip
         checks.setdefault((check_text(record, named=False), record.limit), {})[record.solver] = cell
     across = [[Cell(what, limit), *(own.get(solver, "–") for solver in solvers)]
