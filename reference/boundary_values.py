@@ -9,7 +9,9 @@ from reference.linear_solvers import rigid_motions
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.parts import copies_on_part
+from verify.scene.held_facets import held_facets, shifted_ends
+from verify.scene.held_nodes import held_nodes
+from verify.solution import Regularisation
 
 _HELD = 1e-9  # lever of the supports over the size of the piece, below which it may turn
 
@@ -54,7 +56,7 @@ def constrained_values(
 def nodes_on_part(
     scene: Scene, space: ConformingSpace, where: str, key: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes (k,) of the boundary on a part, each on its own side of the cuts.
+    """Nodes (k,) that a support on a part holds, each on its own side of the cuts.
 
     Returns
     -------
@@ -63,12 +65,17 @@ def nodes_on_part(
         Centroid of a cell of each: on its side of the cuts, m.
     """
     nodes, owner = space.boundary_nodes()
-    number = np.zeros(len(space.node_points), dtype=np.int64)
-    number[nodes] = np.arange(len(nodes))
-    of_facets, middle = space.nodes_of_boundary_facets()
-    points = space.node_points[nodes]
-    chosen = copies_on_part(scene, where, points, (number[of_facets], middle), key)
+    of_facets, corners = space.boundary_facets
+    facets = np.searchsorted(nodes, of_facets), corners
+    chosen, _ = held_nodes(scene, where, space.node_points[nodes], facets, key)
     return nodes[chosen], space.centroids[owner[chosen]]
+
+
+def support_ends(scene: Scene, space: ConformingSpace, size: float) -> list[Regularisation]:
+    """Report where supports hold more than their parts; `size` is that of the elements, m."""
+    corners = space.boundary_facets[1]
+    found = [held_facets(scene.geometry, support.where, corners) for support in scene.supports]
+    return shifted_ends(found, size)
 
 
 def _check_every_piece_is_held(

@@ -1,5 +1,6 @@
 """Linear elasticity on a conforming mesh with DOLFINx, in the plane and in space."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Literal
@@ -17,16 +18,17 @@ from reference.linear_solvers import (
     solve_directly,
 )
 from reference.moduli import density, lame_constants
+from reference.part_loads import LoadedFacets, density_on_whole, loaded_facets
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Material, Scene, Traction, is_uniform
-from verify.scene.parts import on_part
 
 # Unknowns in space up to which MUMPS was measured to be quicker (in the plane it always is)
 _MOST_DIRECT = 30_000
 # marks of the faces of cuts in a measure, beyond those of the loads on the boundary
 _FACE = 1_000_000
+_PART = 2_000_000  # and of facets in which loads end
 
 
 @dataclass(frozen=True)
@@ -189,11 +191,17 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
     domain = space.function_space.mesh
     form = ufl.inner(fem.Constant(domain, np.zeros(space.dimension)), v) * ufl.dx
     thickness = scene.material.thickness or 1.0  # loads of a membrane are per volume and area too
-    tractions = {
-        i: _facets(scene, space, load, f"loads[{i}].where")
-        for i, load in enumerate(scene.loads)
-        if isinstance(load, Traction)
-    }
+    tractions: dict[int, NDArray[np.int32]] = {}
+    parted: dict[int, list[tuple[int, Any]]] = {}
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Traction):
+            loaded = loaded_facets(scene, space, load, f"loads[{i}].where")
+            tractions[i] = _pairs(space, *space.mesh.boundary[loaded.whole].T)
+            parted[i] = []
+            for corner, pairs, given in _parted(space, loaded, load, exact, time):
+                mark = _PART + 4 * i + corner
+                tractions[mark] = pairs
+                parted[i].append((mark, given))
     for i, load in enumerate(scene.loads):
         if isinstance(load, CutFaces):
             cell, opposite, positive = cut_facets_of(scene, space, load, f"loads[{i}]")
@@ -225,7 +233,33 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
         else:
             traction = thickness * _density(space, load, load.traction, time)
             form += ufl.inner(traction, v) * ds(i)
+        for mark, given in parted.get(i, []):
+            form += thickness * ufl.inner(given, v) * ds(mark)
     return form
+
+
+def _parted(
+    space: ConformingSpace, loaded: LoadedFacets, load: Traction, exact: Any, time: float
+) -> Iterator[tuple[int, NDArray[np.int32], Any]]:
+    """Facets in which a load ends, with their densities: corner opposite, pairs and a function.
+
+    Those of one function are opposite to the same corner: no cell has two of them.
+    """
+    from dolfinx import fem
+
+    if not len(loaded.ended):
+        return
+    domain = space.function_space.mesh
+    broken = fem.functionspace(domain, ("DG", space.degree, (space.dimension,)))
+    for corner in np.unique(space.mesh.boundary[loaded.ended, 1]):
+        mine = loaded.opposite_to(space, int(corner))
+        values = density_on_whole(space, mine, load, exact, time)
+        cell, opposite = space.mesh.boundary[mine.ended].T
+        here = space.dolfinx_cell[cell] >= 0
+        function = fem.Function(broken)
+        at = space.broken_facet_dofs(broken, cell[here], opposite[here])
+        function.x.array.reshape(-1, space.dimension)[at] = values[here]
+        yield int(corner), _pairs(space, cell[here], opposite[here]), function
 
 
 def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any, time: float) -> Any:
@@ -247,23 +281,6 @@ def _face_density(space: ConformingSpace, load: CutFaces, time: float) -> Any:
         return fem.Constant(space.function_space.mesh, given)
     shape = (len(load.components),)
     return _sided_function(space, lambda points, _near: load.given(points, time), shape)
-
-
-def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:
-    """Find the facets that a traction acts on, as DOLFINx's pairs of cell and local facet."""
-    d = space.mesh.cell_dimension
-    cell, opposite = space.mesh.boundary.T
-    corners_of = np.array([[c for c in range(d + 1) if c != k] for k in range(d + 1)])
-    ends = space.mesh.cells[cell[:, None], corners_of[opposite]]
-    corners = np.unique(ends)
-    mark = np.zeros(len(space.mesh.points), dtype=bool)
-    mark[corners[on_part(scene, load.where, space.mesh.points[corners], key)]] = True
-    chosen = mark[ends].all(axis=1)
-    if not chosen.any():
-        raise InputError(
-            f"{key}: no facet of the boundary lies in '{load.where}'", str(scene.file or "")
-        )
-    return _pairs(space, cell[chosen], opposite[chosen])
 
 
 def _pairs(

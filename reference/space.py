@@ -129,6 +129,39 @@ class ConformingSpace(SharedUnknowns):
         on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
         return np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
 
+    def edges_of_facet(self, opposite: int) -> list[tuple[int, int]]:
+        """Edges with a node in their middle of the facet opposite a corner, in order of nodes.
+
+        By the numbers of their ends among the corners of the facet; none of linear elements.
+        """
+        if self.degree == 1:
+            return []
+        edges = _VTK_EDGES[: 3 * (self.mesh.cell_dimension - 1)]
+        number = [corner - (corner > opposite) for corner in range(4)]
+        return [(number[i], number[j]) for i, j in edges if opposite not in (i, j)]
+
+    def broken_facet_dofs(
+        self, broken: Any, cell: NDArray[np.int64], opposite: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Unknowns (f, q) of a discontinuous space of this degree at the nodes of facets.
+
+        They are in the order of `facet_nodes`; the cells must be this rank's.
+        """
+        dofs = np.asarray(broken.dofmap.list, dtype=np.int64)[self.dolfinx_cell[cell]]
+        dofs = dofs[:, _TO_VTK[self.mesh.cell_dimension, self.degree]]
+        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
+        return np.take_along_axis(dofs, on_facet, axis=1)
+
+    def outward_normals(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Outward unit normals (f, d) of facets of the boundary, by their rows (f,) there."""
+        cell, opposite = self.mesh.boundary[rows].T
+        corners = self.boundary_facets[1][rows]
+        inward = self.mesh.points[self.mesh.cells[cell, opposite]] - corners[:, 0]
+        along = np.linalg.qr(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))[0]
+        inward -= np.einsum("fik,fjk,fj->fi", along, along, inward)
+        normals: NDArray[np.float64] = -inward / np.linalg.norm(inward, axis=1)[:, None]
+        return normals
+
     def boundary_nodes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes (b,) on the outer boundary (not on the faces of the cut), and a cell of each."""
         cell, opposite = self.mesh.boundary.T
@@ -142,14 +175,11 @@ class ConformingSpace(SharedUnknowns):
         beside[self.cell_nodes] = self.centroids[:, None]
         return beside
 
-    def nodes_of_boundary_facets(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Nodes (k,) of all facets of the outer boundary, and centroids (k, d) of the facets, m."""
-        cell, opposite = self.mesh.boundary.T
-        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
-        nodes = np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
-        corners = nodes[:, : self.mesh.cell_dimension]
-        middle = self.node_points[corners].mean(axis=1)
-        return nodes.ravel(), np.repeat(middle, nodes.shape[1], axis=0)
+    @cached_property
+    def boundary_facets(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Nodes (b, q) of all facets of the outer boundary, and their corners (b, k, d), m."""
+        nodes = self.facet_nodes(*self.mesh.boundary.T)
+        return nodes, self.node_points[nodes[:, : self.mesh.cell_dimension]]
 
     @property
     def owned(self) -> int:

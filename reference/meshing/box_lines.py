@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Traction
-from verify.scene.parts import lie_on_part
+from verify.scene.parts import on_part
 from verify.scene.regions import Region, parse_region
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def _held(scene: Scene, points: Array, size: float) -> NDArray[np.bool_]:
     """Whether some support holds points of the surface."""
     held = np.zeros(len(points), dtype=bool)
     for support in scene.supports:
-        held |= lie_on_part(scene, support.where, points, size)
+        held |= on_part(scene.geometry, support.where, points, size)
     return held
 
 

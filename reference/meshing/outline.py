@@ -4,33 +4,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Polygon, Rectangle, Scene, Traction
-from verify.scene.parts import on_edges
-from verify.scene.regions import parse_region
+from verify.scene.part_pieces import pieces_on_part
 
 Array = NDArray[np.float64]
-_SAMPLES = 257  # per edge: an interval of the inequality shorter than 1/256 of it may be missed
 _SAME = 1e-6  # of the body's size: an end closer than that to a corner counts as the corner
 
 
 def divided_outline(scene: Scene) -> Array:
-    """Corners (k, 2) of the body, and the points of its edges where an inequality changes.
-
-    Along each edge the inequality is sampled and the change is found by bisection to round-off.
-    """
+    """Corners (k, 2) of the body, and the points of its edges where such a part ends."""
     outline = _outline(scene)
     size = float(np.ptp(outline, axis=0).max())
-    names = (*scene.geometry.parts(), "boundary")
     where = {s.where for s in scene.supports}
     where |= {load.where for load in scene.loads if isinstance(load, Traction)}
-    regions = [parse_region(text, 2) for text in sorted(where - set(names))]
+    following = np.roll(outline, -1, axis=0)
+    edges = np.stack([outline, following], axis=1)
+    stops = [stop for text in sorted(where) for stop in _ends(scene, text, edges)]
     found = []
-    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        stops = [0.0]
-        for region in regions:
-            stops += _changes(region, a, b)
+    for i, (a, b) in enumerate(zip(outline, following, strict=True)):
         length = float(np.linalg.norm(b - a))
         kept = [0.0]
-        for stop in sorted(stops):
+        for stop in sorted(share for edge, share in stops if edge == i):
             if (stop - kept[-1]) * length > _SAME * size and (1 - stop) * length > _SAME * size:
                 kept.append(stop)
         found.append(a + np.array(kept)[:, None] * (b - a))
@@ -41,7 +34,7 @@ def supported_edges(scene: Scene, corners: Array) -> NDArray[np.bool_]:
     """Whether each edge of the divided outline is held by a support, in any component."""
     held = np.zeros(len(corners), dtype=bool)
     for support in scene.supports:
-        held |= on_edges(scene, support.where, corners)
+        held |= _on_edges(scene, support.where, corners)
     return held
 
 
@@ -55,7 +48,7 @@ def load_jumps(scene: Scene, corners: Array) -> NDArray[np.bool_]:
     traction, at_end = np.zeros_like(corners), np.zeros_like(corners)  # at either end of each edge
     for load in scene.loads:
         if isinstance(load, Traction) and load.traction != "exact":
-            chosen = on_edges(scene, load.where, corners)
+            chosen = _on_edges(scene, load.where, corners)
             traction[chosen] += load.values(corners[chosen])
             at_end[chosen] += load.values(following[chosen])
     along = following - corners
@@ -73,16 +66,20 @@ def _outline(scene: Scene) -> Array:
     return scene.geometry.outline()
 
 
-def _changes(region: object, a: Array, b: Array) -> list[float]:
-    """Parameters in (0, 1) of the segment ab at which the region begins or ends."""
-    assert callable(region)
-    t = np.linspace(0.0, 1.0, _SAMPLES)
-    inside = region(a + t[:, None] * (b - a))
+def _on_edges(scene: Scene, where: str, corners: Array) -> NDArray[np.bool_]:
+    """Tell which edges (k,) of a divided outline lie on a part."""
+    edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    return pieces_on_part(scene.geometry, where, edges).covered(len(edges)) > 0.5
+
+
+def _ends(scene: Scene, where: str, edges: Array) -> list[tuple[int, float]]:
+    """Edges (e, 2, 2) in which a part begins or ends, and at which share of each."""
+    pieces = pieces_on_part(scene.geometry, where, edges)
+    spans = np.sort(pieces.barycentric[:, :, 1], axis=1)
     found = []
-    for i in np.flatnonzero(inside[1:] != inside[:-1]):
-        low, high = t[i], t[i + 1]
-        while (middle := 0.5 * (low + high)) not in (low, high):
-            same = region((a + middle * (b - a))[None])[0] == inside[i]
-            low, high = (middle, high) if same else (low, middle)
-        found.append(float(high))
+    for edge in np.unique(pieces.facet):
+        low, high = spans[pieces.facet == edge].T
+        order = np.argsort(low)
+        # what begins where the one before ends goes on
+        found += [(int(edge), float(x)) for x in np.setxor1d(low[order], high[order])]
     return found

@@ -9,7 +9,7 @@ from verify.compare.ledger import SCHEME, total_energy
 from verify.compare.separated import boundary_nodes
 from verify.result import Metric, PartRecord
 from verify.scene import BodyForce, Gravity, Scene, Traction
-from verify.scene.parts import lie_on_part
+from verify.scene.parts import on_part
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
     acting = [s.where for s in scene.supports]
     acting += [load.where for load in scene.loads if isinstance(load, Traction)]
     for where in acting:
-        held[boundary] |= lie_on_part(scene, where, solution.points[boundary], size)
+        held[boundary] |= on_part(scene.geometry, where, solution.points[boundary], size)
     return held
 
 

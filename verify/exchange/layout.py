@@ -20,7 +20,7 @@ from verify.scene import (
     Support,
     Traction,
 )
-from verify.scene.parts import copies_on_part
+from verify.scene.part_pieces import Pieces
 from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary
@@ -28,6 +28,7 @@ from verify.solvers.loads_of_scene import ForceDensity, is_moving
 from verify.xfem.loads import simplex_rule
 
 Array = NDArray[np.float64]
+_WHOLE = 1e-12  # of a facet: what may be left of one that is loaded as a whole
 _DEGREE = 7  # of the rule for loads that vary: an exact field's traction is smooth on a facet
 
 
@@ -109,12 +110,7 @@ def _at_every_time(scene: Scene, exact: ExactSolution | None) -> str | None:
 def _held(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any) -> HeldNodes:
     """Find the nodes that a support holds, each on its own side of the cuts."""
     support, points = scene.supports[i], boundary.points
-    middle = np.repeat(points[boundary.corners].mean(axis=1), boundary.corners.shape[1], axis=0)
-    number = np.searchsorted(boundary.nodes, boundary.corners.ravel())
-    on_part = copies_on_part(
-        scene, support.where, points[boundary.nodes], (number, middle), f"supports[{i}].where"
-    )
-    nodes = boundary.nodes[on_part]
+    nodes, _ = boundary.held(scene, support.where, f"supports[{i}].where")
     field = exact if support.displacement == "exact" else None
     near = None
     if conforming:  # a node on the cut belongs to the side of its own cells
@@ -153,17 +149,19 @@ def _load(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any
     assert not isinstance(load, CutFaces)  # refused
     normals = None
     if isinstance(load, Traction):
-        chosen = boundary.facets_on(scene, load.where, f"loads[{i}].where")
-        simplices, cells = boundary.corners[chosen], boundary.facets[chosen, 0]
-        normals = boundary.outward_normals(chosen)
+        pieces = boundary.loaded(scene, load.where, f"loads[{i}].where")
+        simplices, cells = boundary.corners[pieces.facet], boundary.facets[pieces.facet, 0]
+        normals = boundary.outward_normals(pieces.facet)
     else:
         simplices, cells = boundary.cells, np.arange(len(boundary.cells))
-    barycentric, weights = simplex_rule(simplices.shape[1] - 1, _DEGREE)
-    barycentric = barycentric[:, ::-1]  # collapsed onto the first corner
+        pieces = Pieces.whole(cells, simplices.shape[1])
+    rule, weights = simplex_rule(simplices.shape[1] - 1, _DEGREE)
+    barycentric = rule[:, ::-1] @ pieces.barycentric  # collapsed onto the first corner
     corners = boundary.points[simplices]
-    points = np.einsum("qi,kic->kqc", barycentric, corners)
+    points = barycentric @ corners
     # a membrane's forces per volume and area count times its thickness
-    measured = measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
+    measured = (measures(corners) * pieces.share)[:, None] * weights
+    measured = measured * (scene.material.thickness or 1.0)
     density = ForceDensity(scene, load, exact)
     uniform = density.uniform(_centroids(boundary, cells))
     if uniform is None:
@@ -175,7 +173,8 @@ def _load(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any
         values = values.reshape(points.shape)
     else:  # one, or one for each cell
         values = np.broadcast_to(uniform[..., None, :], points.shape)
-        uniform = uniform if uniform.ndim == 1 else None
+        whole = bool((pieces.share > 1.0 - _WHOLE).all())
+        uniform = uniform if uniform.ndim == 1 and whole else None
     history = None if isinstance(load, Gravity) else load.history
     return Load(simplices, uniform, points, measured, values, barycentric, history)
 

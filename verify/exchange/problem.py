@@ -51,13 +51,14 @@ class Load:
     Attributes
     ----------
     simplices : (k, d) or (k, d + 1) int array
-        Nodes of the facets or cells that are loaded.
+        Nodes of the facets or cells that are loaded; a facet in which the load ends is there once
+        for each of the simplices that are loaded of it.
     uniform : (d,) array or None
-        Its value, if it is the same everywhere.
+        Its value, if it is the same everywhere and facets are loaded as a whole.
     points, weights, values : (k, q, d), (k, q), (k, q, d) arrays
         Its values at quadrature points; the weights contain the measure.
-    barycentric : (q, k) array
-        The quadrature points in each simplex.
+    barycentric : (k, q, corners) array
+        The quadrature points in each facet or cell.
     history : list of (time, factor), optional
         By what the load is multiplied in time; see `verify.scene.history`.
     """
@@ -116,7 +117,7 @@ class Problem:
         """Consistent forces (n, d) of all loads on linear elements, N (per metre in 2D)."""
         force = np.zeros(self.points.shape)
         for load in self.loads:
-            shares = np.einsum("kq,qi,kqc->kic", load.weights, load.barycentric, load.values)
+            shares = np.einsum("kq,kqi,kqc->kic", load.weights, load.barycentric, load.values)
             np.add.at(force, load.simplices, shares)
         return force
 

@@ -1,8 +1,7 @@
 """Supports and tractions that would act nowhere, found before anything is solved.
 
-An inequality is held against the nodes that the structured meshes of the scene have on the
-boundary. Of other meshes nothing is known but that they have nodes at the corners: there the
-boundary is sampled much finer than their elements are.
+A traction needs a part of the boundary's facets; a support that, or a node of the structured meshes
+of the scene. Of other meshes nothing is known but that they have nodes at the corners.
 """
 
 from itertools import product
@@ -11,18 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene.geometry import Box, Polygon, Rectangle
+from verify.scene.held_facets import held_facets
+from verify.scene.part_pieces import pieces_on_part
+from verify.scene.parts import on_part
 from verify.scene.physics import Traction
-from verify.scene.regions import parse_region
 from verify.scene.tables import SceneTables
 
 Array = NDArray[np.float64]
 
-_PER_EDGE = 4096  # samples of an edge of the boundary of an unstructured mesh
-_TOLERANCE = 1e-9  # of the body: as where the nodes are found
-
 
 def check_parts_act(scene: SceneTables) -> None:
-    """Raise ValueError if an inequality holds no node, or for a traction no facet, of a level."""
+    """Raise ValueError if a support's inequality holds nothing of a level, or a traction's none."""
     parts = _inequalities(scene)
     if not parts:
         return
@@ -50,7 +48,7 @@ def check_parts_of_mesh(scene: SceneTables, points: Array, cells: NDArray[np.int
 
 
 def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:
-    """Key, inequality, and whether a whole facet is needed, of supports and tractions."""
+    """Key, inequality, and whether more than a node is needed, of supports and tractions."""
     parts = [(f"supports[{i}].where", s.where, False) for i, s in enumerate(scene.supports)]
     parts += [
         (f"loads[{i}].where", load.where, True)
@@ -64,23 +62,19 @@ def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:
 def _check(
     scene: SceneTables, parts: list[tuple[str, str, bool]], facets: Array, where_it_is: str
 ) -> None:
-    """Refuse a part that holds too few of the corners of all facets (k, corners, d)."""
+    """Refuse a part that has nothing of facets (k, corners, d), and for a support no node."""
     points = facets.reshape(-1, scene.dimension)
-    tolerance = _TOLERANCE * float(np.ptp(points, axis=0).max())
-    for key, where, whole in parts:
-        inside = _inside(where, points, tolerance).reshape(facets.shape[:2])
-        if inside.sum(axis=1).max() < (scene.cell_dimension if whole else 1):
-            what = "facet" if whole else "node"
+    size = float(np.ptp(points, axis=0).max())
+    for key, where, area in parts:
+        if not area and on_part(scene.geometry, where, points, size).any():
+            continue
+        if area:
+            nothing = not len(pieces_on_part(scene.geometry, where, facets).facet)
+        else:
+            nothing = not held_facets(scene.geometry, where, facets).held.any()
+        if nothing:
+            what = "facet" if area else "node"
             raise ValueError(f"{key}: no {what} of the boundary lies in '{where}'{where_it_is}")
-
-
-def _inside(where: str, points: Array, tolerance: float) -> NDArray[np.bool_]:
-    dimension = points.shape[1]
-    region = parse_region(where, dimension)
-    found = region(points)
-    for step in tolerance * np.vstack([np.eye(dimension), -np.eye(dimension)]):
-        found |= region(points + step)
-    return found
 
 
 def _boundary(scene: SceneTables) -> list[Array]:
@@ -99,15 +93,12 @@ def _boundary(scene: SceneTables) -> list[Array]:
         return levels
     if isinstance(body, Rectangle | Polygon):
         outline = body.outline()
-        share = np.linspace(0.0, 1.0, _PER_EDGE + 1)[:, None]
-        ends = np.roll(outline, -1, axis=0)
-        lines = [a + share * (b - a) for a, b in zip(outline, ends, strict=True)]
-        return [np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])]
+        return [np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)]
     return []  # known from its mesh alone, or meshed by nobody
 
 
 def _faces(lower: Array, upper: Array, counts: NDArray[np.int64]) -> Array:
-    """Edges (k, 2, 2) of a divided rectangle, or squares (k, 4, 3) of a divided box."""
+    """Edges (k, 2, 2) of a divided rectangle, or half squares (k, 3, 3) of a divided box."""
     dimension = len(counts)
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(lower, upper, counts, strict=True)]
     found = []
@@ -123,5 +114,7 @@ def _faces(lower: Array, upper: Array, counts: NDArray[np.int64]) -> Array:
                 for k, index, s in zip(others, first, step, strict=True):
                     point[:, k] = axes[k][index + s]
                 corners.append(point)
-            found.append(np.stack(corners, axis=1))
+            square = np.stack(corners, axis=1)
+            halves = [square] if dimension == 2 else [square[:, :3], square[:, 1:]]
+            found.extend(halves)
     return np.concatenate(found)

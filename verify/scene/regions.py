@@ -105,6 +105,25 @@ def comparisons(text: str, dimension: int) -> list[tuple[Side, Side]]:
     return found
 
 
+def is_affine(text: str) -> bool:
+    """Whether the sides of all comparisons of an inequality are affine in x, y, z, by its form."""
+
+    def varies(node: ast.AST) -> bool:
+        return any(isinstance(n, ast.Name) and n.id in _COORDINATES for n in ast.walk(node))
+
+    def bends(node: ast.AST) -> bool:
+        match node:
+            case ast.Call() | ast.BinOp(op=ast.Pow()):
+                return varies(node)
+            case ast.BinOp(left=left, op=ast.Mult(), right=right):
+                return varies(left) and varies(right)
+            case ast.BinOp(op=ast.Div(), right=right):
+                return varies(right)
+        return False
+
+    return not any(bends(node) for node in ast.walk(ast.parse(text.strip(), mode="eval")))
+
+
 def _side(node: ast.AST) -> Side:
     def side(points: Array) -> Array:
         with np.errstate(all="ignore"):

@@ -6,13 +6,13 @@ import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Gravity, Scene, Skin, ToolPathCut, is_uniform
-from verify.scene.parts import on_part
 from verify.scene.replay import Pull
 from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.stage import Hold, Hook, Stage
 from verify.solvers.body_of_scene import background_mesh
+from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
@@ -113,10 +113,7 @@ def _material(scene: Scene, thickness: float) -> Material:
 
 
 def _holds(scene: Scene, mesh: SimplexMesh, rim: Bools | None) -> list[Hold]:
-    facets = mesh.boundary_facets
-    on_facet = np.ones((len(facets), mesh.dim + 1), dtype=bool)
-    on_facet[np.arange(len(facets)), facets[:, 1]] = False
-    boundary = np.unique(mesh.cells[facets[:, 0]][on_facet])
+    boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
     holds = []
     for i, support in enumerate(scene.supports):
         key = f"supports[{i}].where"
@@ -126,7 +123,7 @@ def _holds(scene: Scene, mesh: SimplexMesh, rim: Bools | None) -> list[Hold]:
             if not rim.any():
                 raise InputError(f"{key}: the surface is closed and has no rim", str(scene.file))
         else:
-            nodes[boundary[on_part(scene, support.where, mesh.points[boundary], key)]] = True
+            nodes[boundary.held(scene, support.where, key)[0]] = True
         held = support.held(scene.dimension)
         holds.append(Hold(nodes, held, np.array(support.displacement, dtype=float)))
     return holds

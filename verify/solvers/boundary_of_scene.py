@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.parts import on_part
+from verify.scene.held_facets import HeldFacets
+from verify.scene.held_nodes import held_nodes
+from verify.scene.part_pieces import Pieces, pieces_on_part
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
@@ -46,20 +48,36 @@ class Boundary:
         """Nodes of the boundary, ascending."""
         return np.unique(self.corners)
 
-    def facets_on(self, scene: Scene, where: str, key: str) -> _Ints:
-        """Numbers of the facets whose nodes all lie on the part `where` of a scene.
+    @cached_property
+    def places(self) -> _Floats:
+        """Corners (b, k, d) of each facet, m."""
+        places: _Floats = self.points[self.corners]
+        return places
+
+    def loaded(self, scene: Scene, where: str, key: str) -> Pieces:
+        """Pieces of the facets that lie on the part `where` of a scene, on which a load acts.
 
         Raises
         ------
         InputError
             If there is none; `key` is the key of the scene that names the part.
         """
-        mark = np.zeros(len(self.points), dtype=bool)
-        mark[self.nodes[on_part(scene, where, self.points[self.nodes], key)]] = True
-        chosen = np.flatnonzero(mark[self.corners].all(axis=1))
-        if not len(chosen):
-            raise InputError(f"{key}: no boundary facet lies in '{where}'", str(scene.file or ""))
-        return chosen
+        pieces = pieces_on_part(scene.geometry, where, self.places)
+        if not len(pieces.facet):
+            raise no_facet(scene, where, key)
+        return pieces
+
+    def held(self, scene: Scene, where: str, key: str) -> tuple[_Ints, HeldFacets]:
+        """Nodes (h,) that a support on the part `where` holds, ascending, and by which facets.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        facets = np.searchsorted(self.nodes, self.corners), self.places
+        found, by = held_nodes(scene, where, self.points[self.nodes], facets, key)
+        return self.nodes[found], by
 
     def outward_normals(self, chosen: _Ints) -> _Floats:
         """Return the unit normals (q, d) of some facets (q,); of a membrane's edge in its plane."""
@@ -75,3 +93,8 @@ class Boundary:
         normals *= np.sign(np.einsum("qc,qc->q", normals, outward))[:, None]
         unit: _Floats = normals / np.linalg.norm(normals, axis=1)[:, None]
         return unit
+
+
+def no_facet(scene: Scene, where: str, key: str) -> InputError:
+    """Error of a load on a part of no area."""
+    return InputError(f"{key}: no boundary facet lies in '{where}'", str(scene.file or ""))

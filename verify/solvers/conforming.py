@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.boundary_values import constrained_values
+from reference.boundary_values import constrained_values, support_ends
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_of
@@ -209,7 +209,7 @@ def _solve(
         if repetitions:
             for phase, seconds in {"meshing": meshed, **result.timings}.items():
                 timings.setdefault(phase, []).append(seconds)
-    return _solution(mesh, result, size, timings)
+    return _solution(scene, mesh, result, size, timings)
 
 
 def _comm() -> Any:
@@ -300,7 +300,11 @@ def _specks(mesh: ConformingMesh) -> list[Regularisation]:
 
 
 def _solution(
-    mesh: ConformingMesh, result: _Answer, size: float, timings: dict[str, list[float]]
+    scene: Scene,
+    mesh: ConformingMesh,
+    result: _Answer,
+    size: float,
+    timings: dict[str, list[float]],
 ) -> Solution:
     space = result.space
     return Solution(
@@ -313,7 +317,7 @@ def _solution(
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
-        regularisations=_specks(mesh),
+        regularisations=[*_specks(mesh), *support_ends(scene, space, size)],
         ledger=result.ledger,
         mass=None if result.velocity is None else CONSISTENT,
         unknowns=result.displacement[0].size,

@@ -7,14 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, is_uniform
+from verify.scene.part_pieces import pieces_on_part
 from verify.scene.physics import Load
 from verify.solvers.body_of_scene import volumetric_mass
-from verify.solvers.boundary_of_scene import Boundary
+from verify.solvers.boundary_of_scene import Boundary, no_facet
 from verify.solvers.cut_face_loads import face_forces
 from verify.xfem.loads import body_force, traction
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -127,16 +129,26 @@ def _traction(phantom: PhantomMesh, density: ForceDensity, key: str) -> _Floats:
     load, mesh = density.load, phantom.mesh
     assert isinstance(load, Traction)
     boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
-    chosen = boundary.facets_on(density.scene, load.where, key)
-    facets = boundary.facets[chosen]
-    if not load.exact:
+    found = 0
+
+    def loaded(corners: _Floats) -> tuple[_Ints, _Floats]:
+        nonlocal found
+        pieces = pieces_on_part(density.scene.geometry, load.where, corners, boundary.places)
+        found += len(pieces.facet)
+        return pieces.facet, pieces.barycentric
+
+    if load.exact:
+        normals = boundary.outward_normals(np.arange(len(boundary.facets)))
+        distinct, group = np.unique(np.round(normals, 12), axis=0, return_inverse=True)
+        forces = np.zeros_like(phantom.node_points)
+        for k, normal in enumerate(distinct):
+            facets = boundary.facets[group.ravel() == k]
+            forces += traction(phantom, facets, _of_points(density, normal), loaded=loaded)
+    else:
         given: Any = load.traction if is_uniform(load.traction) else _of_points(density)
-        return traction(phantom, facets, given)
-    normals = boundary.outward_normals(chosen)
-    forces = np.zeros_like(phantom.node_points)
-    distinct, group = np.unique(np.round(normals, 12), axis=0, return_inverse=True)
-    for k, normal in enumerate(distinct):
-        forces += traction(phantom, facets[group.ravel() == k], _of_points(density, normal))
+        forces = traction(phantom, boundary.facets, given, loaded=loaded)
+    if not found:
+        raise no_facet(density.scene, load.where, key)
     return forces
 
 

@@ -39,7 +39,7 @@ from verify.solvers.runs import (
     repeated,
     solution_on,
 )
-from verify.solvers.supports_of_scene import path_of_supports, supports_of
+from verify.solvers.supports_of_scene import path_of_supports, support_ends, supports_of
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
@@ -318,6 +318,7 @@ def _solution(scene: Scene, name: str, done: Repeated[_Answer]) -> Solution:
         for change in body.changes
     ]
     regularisations += [*done.answer.further, *across_interfaces(scene, body.phantom.mesh)]
+    regularisations += support_ends(scene, body.phantom, done.size)
     if done.answer.left_out:
         kind = "spring that the fit would make negative left out"
         regularisations.append(Regularisation(kind, done.answer.left_out, 0.0, "N/m"))

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Scene
+from verify.scene.held_facets import HeldFacets, held_facets, shifted_ends
+from verify.scene.held_nodes import no_node, points_apart
 from verify.scene.history import factor_at, first_factor
-from verify.scene.parts import copies_on_part, lie_on_part
 from verify.scene.prescribed import PrescribedMotion
+from verify.solution import Regularisation
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.body import MovingSupports
+from verify.xfem.loads import facet_parts, facet_places
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports
 
@@ -80,41 +83,83 @@ def _filled(
     return fixed, filled
 
 
+def support_ends(scene: Scene, phantom: PhantomMesh, size: float) -> list[Regularisation]:
+    """Report where supports hold more than their parts; `size` is that of the elements, m."""
+    parts = _boundary_parts(phantom)
+    return shifted_ends([_held_parts(scene, s.where, parts) for s in scene.supports], size)
+
+
 def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     """Find what each support holds.
 
-    A node of the boundary is on a part by its place, and so is every unknown whose material
-    reaches that node; where a cut runs through the node, each by the boundary of its own material.
-    The other unknowns there belong to material beyond a cut: they are held if the boundary of
-    *that* material is on the part. So a part may end at a cut, and a cut close to a support frees
-    what is behind it.
+    A facet that a cut crosses is held on each side for itself, by the unknowns that move that side.
+    So a part may end at a cut, and a cut close to a support frees what is behind it. Where a part
+    is a mere point or line, it holds the unknowns whose material reaches there.
     """
-    mesh = phantom.mesh
-    unknowns, parts = _facet_parts(phantom)
-    at_node = _own_corners(phantom)
-    outer = np.zeros(len(mesh.points), dtype=bool)
-    outer[Boundary(mesh.points, mesh.cells, mesh.boundary_facets).nodes] = True
-    own = np.flatnonzero(at_node & outer[phantom.node_parent])
-    number = np.full(len(at_node), -1)
-    number[own] = np.arange(len(own))
-    beside = number[unknowns] >= 0
-    own_parts = number[unknowns[beside]], parts[beside]
-    beyond = ~at_node[unknowns]
-    unknowns, parts = unknowns[beyond], parts[beyond]
-    size = float(np.ptp(mesh.points, axis=0).max())
+    parts, corners = _boundary_parts(phantom), _own_corners(phantom)
+    own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.nodes))
     found = []
     for i, support in enumerate(scene.supports):
-        key = f"supports[{i}].where"
-        mark = np.zeros(len(at_node), dtype=bool)
-        places = phantom.node_points[own]
-        mark[own[copies_on_part(scene, support.where, places, own_parts, key)]] = True
-        mark[unknowns[lie_on_part(scene, support.where, parts, size)]] = True
+        mark = np.zeros(phantom.node_count, dtype=bool)
+        unknowns = parts.unknowns[_held_parts(scene, support.where, parts).held]
+        mark[unknowns[unknowns >= 0]] = True
+        mark[own] |= points_apart(scene, support.where, phantom.node_points[own], mark[own])
         at = np.flatnonzero(mark)
+        if not len(at):
+            raise no_node(scene, support.where, f"supports[{i}].where")
         components = support.held(scene.dimension)
         field = exact if support.displacement == "exact" else None
         points, near = phantom.node_points[at], phantom.node_piece_points[at]
         found.append(_Held(support, points, near, field, at, components))
     return found
+
+
+def _held_parts(scene: Scene, where: str, parts: "_BoundaryParts") -> HeldFacets:
+    return held_facets(scene.geometry, where, parts.corners, parts.boundary.places, parts.facet)
+
+
+@dataclass(frozen=True)
+class _BoundaryParts:
+    """Boundary facets, those that are cut as simplices on either side.
+
+    Attributes
+    ----------
+    boundary : Boundary
+        Of the uncut mesh.
+    corners : (q, d, space) array
+        Places of the corners of the simplices, m.
+    facet : (q,) int array
+        Number of the facet of each, on its side of the cuts.
+    unknowns : (q, d) int array
+        Dof nodes at the nodes of the facet that move that side; −1 where one follows a root cell.
+    """
+
+    boundary: Boundary
+    corners: _Floats
+    facet: _Ints
+    unknowns: _Ints
+
+    @property
+    def nodes(self) -> _Ints:
+        """Nodes of the boundary of the uncut mesh."""
+        return self.boundary.nodes
+
+
+def _boundary_parts(phantom: PhantomMesh) -> _BoundaryParts:
+    mesh = phantom.mesh
+    corners, facet, unknowns = [], [], []
+    for local in range(mesh.dim + 1):
+        cells = mesh.boundary_facets[mesh.boundary_facets[:, 1] == local, 0]
+        piece, barycentric, _ = facet_parts(phantom, cells, local)
+        corners.append(facet_places(phantom, piece, barycentric))
+        facet.append(piece * (mesh.dim + 1) + local)
+        rest = [k for k in range(mesh.dim + 1) if k != local]
+        unknowns.append(phantom.corner_node[phantom.cells[piece][:, rest]])
+    _, number = np.unique(np.concatenate(facet), return_inverse=True)
+    return _BoundaryParts(
+        Boundary(mesh.points, mesh.cells, mesh.boundary_facets),
+        np.concatenate(corners), number.ravel(), np.concatenate(unknowns),
+    )  # fmt: skip
 
 
 def _own_corners(phantom: PhantomMesh) -> NDArray[np.bool_]:
@@ -127,40 +172,3 @@ def _own_corners(phantom: PhantomMesh) -> NDArray[np.bool_]:
     simplex, vertex = np.nonzero(barycentric.max(axis=2) == 1.0)
     own[phantom.cells[piece[simplex], barycentric[simplex, vertex].argmax(axis=1)]] = True
     return own[phantom.node_corner]
-
-
-def _facet_parts(phantom: PhantomMesh) -> tuple[_Ints, _Floats]:
-    """Boundary facets, of those that are cut the parts, each for every unknown that moves it.
-
-    Returns
-    -------
-    unknowns : (k,) int array
-        Dof nodes at the nodes of a facet, on the side of the part; nodes that follow a root
-        cell have none.
-    points : (k, space) array
-        Centroid of the part, m.
-    """
-    mesh = phantom.mesh
-    piece, in_cell, _ = phantom.solid_simplices
-    facets = mesh.boundary_facets
-    outer = np.zeros(len(mesh.cells), dtype=bool)
-    outer[facets[:, 0]] = True
-    mine = outer[phantom.parent[piece]]
-    piece, cell, in_cell = piece[mine], phantom.parent[piece[mine]], in_cell[mine]
-    unknowns, points = [], []
-    corners = mesh.dim + 1
-    for local in range(corners):
-        wanted = np.zeros(len(mesh.cells), dtype=bool)
-        wanted[facets[facets[:, 1] == local, 0]] = True
-        here = np.flatnonzero(wanted[cell])
-        rest = [k for k in range(corners) if k != local]
-        for opposite in range(corners):
-            side = [k for k in range(corners) if k != opposite]
-            on_facet = here[(in_cell[here][:, side, local] == 0.0).all(axis=1)]
-            middle = in_cell[on_facet][:, side].mean(axis=1)
-            nodes = mesh.points[mesh.cells[cell[on_facet]]]
-            centroid = np.einsum("ki,kij->kj", middle, nodes)
-            unknowns.append(phantom.cells[piece[on_facet]][:, rest].ravel())
-            points.append(np.repeat(centroid, mesh.dim, axis=0))
-    node = phantom.corner_node[np.concatenate(unknowns)]
-    return node[node >= 0], np.concatenate(points)[node >= 0]

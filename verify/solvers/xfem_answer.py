@@ -9,6 +9,7 @@ from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import across_interfaces
 from verify.solvers.cuts_of_scene import EndNodes
 from verify.solvers.runs import Answer, Repeated, solution_on
+from verify.solvers.supports_of_scene import support_ends
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
@@ -41,6 +42,7 @@ def solution_of(scene: Scene, done: Repeated[Answer], notes: dict[str, str]) -> 
             *_regularisations(scene, phantom, body, made_nodes),
             *further,
             *across_interfaces(scene, phantom.mesh),
+            *support_ends(scene, phantom, done.size),
         ],
         notes,
     )

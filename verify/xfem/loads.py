@@ -49,6 +49,9 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
 
 # points (q, d) and sides of every cut (q, cuts) to force densities (q, d)
 Density = Callable[[Floats, Sides], Floats]
+# corners (q, k, d) of parts of facets to the simplices in them that are loaded: of which each is
+# (r,), and barycentric coordinates (r, k, k) of its corners there
+LoadedPart = Callable[[Floats], tuple[Ints, Floats]]
 
 
 def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int = 4) -> Floats:
@@ -86,6 +89,7 @@ def traction(
     facets: ArrayLike,
     density: ArrayLike | Density,
     degree: int = 4,
+    loaded: LoadedPart | None = None,
 ) -> Floats:
     """Nodal forces (N, d) of a traction on boundary facets, in newtons (per metre in 2D).
 
@@ -99,6 +103,8 @@ def traction(
         Force per area in pascal; a function as in `body_force`.
     degree : int
         As in `body_force`.
+    loaded : callable, optional
+        Gives what of the facets, divided where cuts cross them, is loaded; default: all.
 
     Raises
     ------
@@ -120,15 +126,26 @@ def traction(
         density = finite_array(density, "load density", load.shape[1:])
     for local in range(mesh.dim + 1):
         cells = chosen[chosen[:, 1] == local, 0]
-        piece, corners, area = _facet_parts(phantom, cells, local)
+        piece, corners, area = facet_parts(phantom, cells, local)
+        if loaded is not None and len(piece):
+            of, within = loaded(facet_places(phantom, piece, corners))
+            piece, corners = piece[of], within @ corners[of]
+            area = area[of] * np.abs(np.linalg.det(within))
         _integrate(phantom, load, piece, corners, area, density, degree)
     return phantom.restrict(load)
 
 
-def _facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Floats, Floats]:
+def facet_places(phantom: PhantomMesh, piece: Ints, corners: Floats) -> Floats:
+    """Places (q, k, space), m, of barycentric corners (q, k, d + 1) in the cells of pieces (q,)."""
+    places: Floats = corners @ phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
+    return places
+
+
+def facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Floats, Floats]:
     """Material of the facets of `cells` opposite to a corner, as simplices.
 
-    Pieces (q,), barycentric coordinates (q, d, d + 1) of the corners, and measures (q,).
+    A facet that a cut crosses is divided by it. Pieces (q,), barycentric coordinates (q, d, d + 1)
+    of the corners, and measures (q,).
     """
     mesh = phantom.mesh
     others = [k for k in range(mesh.dim + 1) if k != local]

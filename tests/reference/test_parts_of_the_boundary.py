@@ -1,0 +1,166 @@
+"""A part of the boundary is the same part on every mesh, for every solver and for the reference."""
+
+import numpy as np
+import pytest
+import scenes
+from reference_scenes import needs_fenicsx
+
+from verify.exchange import problem_of
+from verify.methods.catalogue import METHODS
+from verify.solvers import find_solver
+from verify.solvers.body_of_scene import background_mesh
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.loads_of_scene import loads_of
+
+pytestmark = needs_fenicsx
+
+SEED = 27
+TRACTION = np.array([0.7, -0.4, 0.9])
+SIDED = ("subdivision", "virtual_node")  # that realise a straight cut as it is asked
+
+
+def clipped(polygon, normal, offset):
+    """Part of a polygon or segment (k, d) where normal · x < offset (Sutherland and Hodgman)."""
+    found, count = [], len(polygon)
+    for k, (a, b) in enumerate(zip(polygon, np.roll(polygon, -1, axis=0), strict=True)):
+        inside, beyond = normal @ a < offset, normal @ b < offset
+        if inside:
+            found.append(a)
+        if inside != beyond and not (count == 2 and k == 1):
+            found.append(a + (offset - normal @ a) / (normal @ (b - a)) * (b - a))
+    return np.array(found)
+
+
+def integrals(polygon):
+    """Measure, and first moments (d,), of a convex polygon or a segment."""
+    if len(polygon) < 2:
+        return 0.0, np.zeros(3)
+    if len(polygon) == 2:
+        length = np.linalg.norm(polygon[1] - polygon[0])
+        return length, length * polygon.mean(axis=0)
+    fans = [polygon[[0, k, k + 1]] for k in range(1, len(polygon) - 1)]
+    areas = [0.5 * np.linalg.norm(np.cross(f[1] - f[0], f[2] - f[0])) for f in fans]
+    return sum(areas), sum(a * f.mean(axis=0) for a, f in zip(areas, fans, strict=True))
+
+
+class Drawn:
+    """A load on a part of the upper face that ends anywhere, and a cut through it or none."""
+
+    def __init__(self, d, number):
+        rng = np.random.default_rng([SEED, d, number])
+        self.d, self.rng = d, rng
+        if d == 2:
+            low, high = rng.uniform(0.1, 0.45), rng.uniform(0.5, 0.9)
+            self.limits = [(np.array([1.0, 0.0]), high), (np.array([-1.0, 0.0]), -low)]
+        else:  # two lines across the middle of the face, at any angle
+            normals = [np.r_[rng.normal(size=2), 0.0] for _ in range(2)]
+            self.limits = [
+                (n, float(n @ np.r_[rng.uniform(0.3, 0.7, 2), 1.0] + 0.1)) for n in normals
+            ]
+        axes = "xyz"[:d]
+        ends = [
+            " + ".join(f"({n!r})*{x}" for n, x in zip(normal.tolist(), axes, strict=True))
+            + f" < {offset!r}"
+            for normal, offset in self.limits
+        ]
+        self.where = " and ".join([f"{axes[-1]} > 0.999999", *ends])
+        # through the middle of the body, a little inclined; every other scene has none
+        self.across = np.r_[1.0, rng.uniform(-0.2, 0.2, d - 1)]
+        self.offset = self.across @ np.full(d, 0.5) + rng.uniform(-0.1, 0.1)
+        self.cut = self._cut() if number % 2 else None
+
+    def _cut(self):
+        at = (
+            [[-0.1, -0.1], [1.1, -0.1], [1.1, 1.1], [-0.1, 1.1]] if self.d == 3 else [[-0.1], [1.1]]
+        )
+        points = [[(self.offset - self.across[1:] @ p) / self.across[0], *p] for p in at]
+        kind = "polygon" if self.d == 3 else "polyline"
+        return {"kind": kind, "points": np.array(points, dtype=float).tolist()}
+
+    def scene(self, cells):
+        return scenes.scene(
+            [] if self.cut is None else [self.cut],
+            self.d,
+            mesh={"cells": [[n] * self.d for n in cells]},
+            supports=[{"where": w, "displacement": [0.0] * self.d} for w in ("left", "right")],
+            loads=[
+                {"kind": "traction", "where": self.where, "traction": TRACTION[: self.d].tolist()}
+            ],
+        )
+
+    def work(self, gradient, shift, side=0):
+        """Work on u = gradient x + shift, which may be there on one side of the cut only."""
+        corners = [[0, 1], [1, 1]] if self.d == 2 else [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+        part = np.array(corners, dtype=float)
+        for normal, offset in self.limits:
+            part = clipped(part, normal, offset)
+        if side:
+            part = clipped(part, -side * self.across, -side * self.offset)
+        measure, moment = integrals(part)
+        return TRACTION[: self.d] @ (gradient @ moment[: self.d] + measure * shift)
+
+    def check(self, forces, points, near, sided=True):
+        """Hold the work of nodal forces at points, by material beside them, against the exact."""
+        gradient, shift = self.rng.normal(size=(self.d, self.d)), self.rng.normal(size=self.d)
+        field = points @ gradient.T + shift
+        for side in (0, 1, -1) if self.cut and sided else (0,):
+            there = side * (near @ self.across - self.offset) >= 0.0
+            done = float(np.sum(forces[there] * field[there]))
+            assert done == pytest.approx(self.work(gradient, shift, side), rel=1e-12, abs=1e-13)
+
+
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (1, 3))])
+def test_a_load_is_that_of_its_piece_for_every_way_to_cut(d, cells, number):
+    drawn = Drawn(d, number)
+    scene = drawn.scene(cells)
+    for level in range(len(cells)):
+        mesh, size = background_mesh(scene, level)
+        for method in (*SIDED, "snapping") if drawn.cut else ("uncut",):
+            body = METHODS[method](mesh, cuts_of(scene, size)).phantom
+            forces = loads_of(scene, body, None)
+            drawn.check(forces, body.node_points, body.node_piece_points, method in SIDED)
+        problem = problem_of(scene, level)
+        drawn.check(problem.nodal_forces(), problem.points, problem.points, sided=False)
+
+
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (2,))])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degree):
+    import ufl
+
+    from reference.elasticity import load_form
+    from reference.nodal_algebra import nodal_forces
+    from reference.space import conforming_space
+    from verify.solvers.conforming_meshes import peer_mesh
+
+    drawn = Drawn(d, number)
+    scene = drawn.scene(cells)
+    for level in range(len(cells)):
+        space = conforming_space(peer_mesh(scene, level, "imprinted"), degree)
+        form = load_form(scene, space, ufl.TestFunction(space.function_space), None)
+        forces = nodal_forces(form, space).reshape(-1, d)
+        drawn.check(forces, space.node_points, space.beside_nodes())
+
+
+PARTED = {
+    "mesh": {"cells": [[5, 5], [9, 9]]},
+    "material": {"young": 1.0, "poisson": 0.0, "plane": "strain"},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
+    "loads": [
+        {"kind": "traction", "where": "x > 0.999999 and y < 0.5", "traction": [1.0, 0.0]},
+    ],
+    "reference": {"size": 0.25},
+}
+
+
+@pytest.mark.parametrize(
+    "solver",
+    ["xfem", *SIDED, "snapping", "conforming", "reference"],
+)
+def test_a_load_that_reaches_to_a_cut_stretches_its_own_half_only(solver):
+    scene = scenes.scene([{"kind": "polyline", "points": [[-0.1, 0.5], [1.1, 0.5]]}], **PARTED)
+    for level in range(2):
+        energy = find_solver(solver).solve(scene, level, 0).ledger["strain"][-1]
+        assert energy == pytest.approx(0.25, rel=1e-8)

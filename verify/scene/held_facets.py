@@ -1,0 +1,110 @@
+"""Facets of a boundary that a support on a part of it holds, and how far it reaches beyond.
+
+A support cannot end inside a facet of linear elements. All solvers follow one rule: it holds every
+facet that its part meets with positive measure. As facets are divided what is held shrinks to the
+part, so that the energy under a load rises from level to level.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.regularisation import Regularisation
+from verify.scene.geometry import Geometry
+from verify.scene.part_pieces import pieces_on_part, size_of
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: of an end that is not where the part ends: twice, in m and in element sizes h
+END_OF_SUPPORT = "support holds more than its part, to the edge of a facet"
+_DEPTH = 1e-5  # of the body: a part that reaches less far into a facet does not hold it
+_COVERED = 1e-9  # of a facet: what may be left of one on which no part ends
+
+
+@dataclass(frozen=True)
+class HeldFacets:
+    """Facets that a support holds.
+
+    Attributes
+    ----------
+    held : (q,) bool array
+    ended : int
+        How many of them the part ends in.
+    shift : float
+        How far the farthest point that is held is from the part, m.
+    """
+
+    held: NDArray[np.bool_]
+    ended: int
+    shift: float
+
+
+def held_facets(
+    geometry: Geometry,
+    where: str,
+    corners: Array,
+    boundary: Array | None = None,
+    facet: Ints | None = None,
+) -> HeldFacets:
+    """Find the facets that a support on the part `where` holds.
+
+    Parameters
+    ----------
+    geometry, where, corners, boundary
+        As of `verify.scene.part_pieces.pieces_on_part`.
+    facet : (q,) int array, optional
+        Where a cut divides facets, and `corners` are simplices in them: number of the facet, and
+        of its side of the cut. What lies on each side is held for itself.
+    """
+    boundary = corners if boundary is None else boundary
+    facet = np.arange(len(corners)) if facet is None else facet
+    pieces = pieces_on_part(geometry, where, corners, boundary)
+    k, size = corners.shape[1], size_of(boundary)
+    edges = corners[:, 1:] - corners[:, :1]
+    gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
+    measure = np.sqrt(np.maximum(gram, 0.0)) / factorial(k - 1)
+    lengths = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(k)]
+    of_facet = np.bincount(facet, measure)
+    covered = np.bincount(facet, measure * pieces.covered(len(corners)))
+    reach = np.zeros(len(of_facet))
+    np.maximum.at(reach, facet, np.max(lengths, axis=0))
+    least = np.minimum(_DEPTH * size * reach ** (k - 2), 0.5 * of_facet)
+    held = (covered > 0.0) & (covered >= least)
+    ended = np.flatnonzero(held & (covered < (1.0 - _COVERED) * of_facet))
+    beyond = [
+        _reach(corners[facet == one], pieces.places(corners)[facet[pieces.facet] == one])
+        for one in ended
+    ]
+    return HeldFacets(held[facet], len(ended), max(beyond, default=0.0))
+
+
+def shifted_ends(found: list[HeldFacets], size: float) -> list[Regularisation]:
+    """Report by how much supports hold more than their parts; `size` is that of the elements, m."""
+    count, shift = sum(one.ended for one in found), max((one.shift for one in found), default=0.0)
+    if not count:
+        return []
+    return [
+        Regularisation(END_OF_SUPPORT, count, shift, "m"),
+        Regularisation(END_OF_SUPPORT, count, shift / size, "h"),
+    ]
+
+
+def _reach(corners: Array, pieces: Array) -> float:
+    """How far the farthest corner of simplices (s, k, d) is from pieces (p, k, d) of them, m."""
+    points, apart = corners.reshape(-1, corners.shape[2]), []
+    for i, j in _pairs(corners.shape[1]):
+        start, along = pieces[:, i], pieces[:, j] - pieces[:, i]
+        square = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
+        away = points[:, None] - start
+        share = np.clip(np.sum(away * along, axis=2) / square, 0.0, 1.0)
+        distance = np.linalg.norm(away - share[:, :, None] * along, axis=2)
+        apart.append(distance.min(axis=1))
+    return float(np.min(apart, axis=0).max())
+
+
+def _pairs(corners: int) -> list[tuple[int, int]]:
+    return list(combinations(range(corners), 2))

@@ -1,0 +1,198 @@
+"""Pieces of boundary facets that lie on a part of the boundary, whatever the mesh.
+
+A facet is divided where a comparison of the part's formula changes: where that is affine, exactly;
+else by bisection, until its chords are within a tolerance. Loads and supports of every solver rest
+on these pieces, so that a part is the same for all of them.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.scene.geometry import Geometry
+from verify.scene.parts import on_formula, on_named
+from verify.scene.regions import Side, comparisons, is_affine
+from verify.scene.ridges import off_ridges
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_SAME = 1e-12  # of the body: a node closer than that to the end of a part is on it
+# of the body, for segments and triangles: how far a chord of a curved end may be off it, and the
+# smallest simplex that is divided for that
+_CHORD = {2: 1e-13, 3: 1e-6}
+_SMALLEST = {2: 1e-13, 3: 2e-4}
+# of the body: the largest simplex on which a comparison that is not affine is tried
+_LARGEST = {2: 1 / 256, 3: 1 / 64}
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Simplices that make up what some facets have in common with a part of the boundary.
+
+    Attributes
+    ----------
+    facet : (r,) int array
+        Facet of each.
+    barycentric : (r, k, k) array
+        Barycentric coordinates of its corners (second axis) in the facet.
+    """
+
+    facet: Ints
+    barycentric: Array
+
+    @property
+    def share(self) -> Array:
+        """(r,) measure of each over that of its facet."""
+        return np.abs(np.linalg.det(self.barycentric))
+
+    def covered(self, count: int) -> Array:
+        """Share (count,) of each facet that lies on the part."""
+        return np.bincount(self.facet, self.share, minlength=count)
+
+    def places(self, corners: Array) -> Array:
+        """Corners (r, k, d) of the pieces of facets (q, k, d), m."""
+        return np.asarray(self.barycentric @ corners[self.facet])
+
+    def __getitem__(self, rows: NDArray) -> "Pieces":
+        """Return some of them."""
+        return Pieces(self.facet[rows], self.barycentric[rows])
+
+    def __add__(self, other: "Pieces") -> "Pieces":
+        """Return them and others."""
+        both = np.concatenate([self.barycentric, other.barycentric])
+        return Pieces(np.concatenate([self.facet, other.facet]), both)
+
+    @staticmethod
+    def whole(facets: Ints, k: int) -> "Pieces":
+        """Facets (q,) with k corners as they are."""
+        return Pieces(facets, np.broadcast_to(np.eye(k), (len(facets), k, k)))
+
+
+def size_of(boundary: Array) -> float:
+    """Size of a body by the facets (b, k, d) of its boundary: the longest side of its box, m."""
+    return float(np.ptp(boundary.reshape(-1, boundary.shape[2]), axis=0).max(initial=0.0))
+
+
+def pieces_on_part(
+    geometry: Geometry, where: str, corners: Array, boundary: Array | None = None
+) -> Pieces:
+    """Divide facets by a part of the boundary and return what lies on it; it may be nothing.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Names parts.
+    where : str
+        Name of a part, ``boundary``, or an inequality.
+    corners : (q, k, d) array
+        Facets, or simplices in them: segments (k = 2) or triangles (k = 3), m.
+    boundary : (b, k, d) array, optional
+        All facets of the boundary, if these are not all.
+
+    Notes
+    -----
+    A strip beside an edge of the body (where its boundary turns) that is narrower than 1e-5 of the
+    body belongs to what is next to it: ``x > 0.999999`` means a face, and nothing of the faces
+    beside it. A curved end is followed to 1e-6 of the body in space, to round-off in the plane.
+    """
+    count, k, d = corners.shape
+    boundary = corners if boundary is None else boundary
+    size = size_of(boundary)
+    if where == "boundary":
+        return Pieces.whole(np.arange(count), k)
+    if where in geometry.parts():
+        on = on_named(geometry, where, corners.reshape(-1, d), size).reshape(count, k)
+        return Pieces.whole(np.flatnonzero(on.all(axis=1)), k)
+    pieces = Pieces.whole(np.arange(count), k)
+    largest = np.inf if is_affine(where) else _LARGEST[k] * size
+    for sides in comparisons(where, geometry.dimension):
+        pieces, values = _refined(pieces, corners, sides, size, largest)
+        pieces = _clipped(pieces, values)
+    points = off_ridges(pieces.places(corners), boundary, size)
+    away = _normal_projections(corners)[pieces.facet]
+    return _joined(pieces, on_formula(geometry, where, points, away, size), count)
+
+
+def _refined(
+    pieces: Pieces, corners: Array, sides: tuple[Side, Side], size: float, largest: float
+) -> tuple[Pieces, Array]:
+    """Bisect simplices until a comparison is affine on each, or cannot change there.
+
+    Returns
+    -------
+    pieces : Pieces
+    values : (r, k) array
+        Difference of the sides at the corners; 0 where the part ends within round-off.
+    """
+    k = corners.shape[1]
+    i, j = np.array(list(combinations(range(k), 2))).T
+    done, found = [], []
+    while len(pieces.facet):
+        at = pieces.places(corners)
+        ends = at[:, i] - at[:, j]
+        lengths = np.linalg.norm(ends, axis=2)
+        nodes = np.concatenate([at, 0.5 * (at[:, i] + at[:, j])], axis=1)
+        one, other = (side(nodes.reshape(-1, nodes.shape[2])) for side in sides)
+        given = (one - other).reshape(nodes.shape[:2])
+        noise = 1e-14 * np.abs([one, other]).max(axis=0).reshape(given.shape).max(axis=1)
+        values = given[:, :k]
+        off = np.abs(given[:, k:] - 0.5 * (values[:, i] + values[:, j])).max(axis=1)
+        rise = np.abs(values[:, i] - values[:, j])
+        slope = (rise / np.where(lengths > 0.0, lengths, np.inf)).max(axis=1)
+        flat = off <= np.maximum(4.0 * noise, _CHORD[k] * size * slope)
+        far = (np.abs(given).min(axis=1) > 4.0 * off) & (np.ptp(np.sign(given), axis=1) == 0.0)
+        far |= np.isnan(given).all(axis=1)
+        diameter = lengths.max(axis=1)
+        ready = ((flat | far) & (diameter <= largest)) | (diameter <= _SMALLEST[k] * size)
+        near = np.maximum(noise, _SAME * size * slope)[:, None]
+        done.append(pieces[ready])
+        found.append(np.where(np.abs(values) <= near, 0.0, values)[ready])
+        pieces, longest = pieces[~ready], lengths[~ready].argmax(axis=1)
+        share = np.full(len(longest), 0.5)
+        pieces = _bisected(pieces, i[longest], j[longest], share)
+    return sum(done[1:], done[0]), np.concatenate(found)
+
+
+def _clipped(pieces: Pieces, values: Array) -> Pieces:
+    """Divide simplices along the zeros of functions that are affine on each (r, k)."""
+    pairs = np.array(list(combinations(range(values.shape[1]), 2)))
+    done: list[Pieces] = []
+    while len(pieces.facet):
+        with np.errstate(invalid="ignore"):
+            crossed = values[:, pairs[:, 0]] * values[:, pairs[:, 1]] < 0.0
+        some = crossed.any(axis=1)
+        done.append(pieces[~some])
+        pieces, values = pieces[some], values[some]
+        i, j = pairs[crossed[some].argmax(axis=1)].T
+        row = np.arange(len(i))
+        a, b = values[row, i], values[row, j]
+        pieces = _bisected(pieces, i, j, a / (a - b))
+        values = np.concatenate([values, values])
+        values[row, j] = values[len(row) + row, i] = 0.0
+    return sum(done[1:], done[0]) if done else pieces
+
+
+def _bisected(pieces: Pieces, i: Ints, j: Ints, share: Array) -> Pieces:
+    """Halves of simplices at a share of their edges ij; the first have corner i, in order."""
+    row = np.arange(len(i))
+    near, far = pieces.barycentric.copy(), pieces.barycentric.copy()
+    middle = (1.0 - share)[:, None] * near[row, i] + share[:, None] * near[row, j]
+    near[row, j], far[row, i] = middle, middle
+    return Pieces(pieces.facet, near) + Pieces(pieces.facet, far)
+
+
+def _normal_projections(corners: Array) -> Array:
+    """Projections (q, d, d) onto what is normal to simplices (q, k, d)."""
+    along = np.linalg.qr(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))[0]
+    projections: Array = np.eye(corners.shape[2]) - along @ np.swapaxes(along, 1, 2)
+    return projections
+
+
+def _joined(pieces: Pieces, on: NDArray[np.bool_], count: int) -> Pieces:
+    """Take those that are on the part; where that are all of a facet, the facet itself."""
+    full = np.bincount(pieces.facet, ~on, minlength=count) == 0
+    whole = Pieces.whole(np.flatnonzero(full), pieces.barycentric.shape[1])
+    return whole + pieces[on & ~full[pieces.facet]]
