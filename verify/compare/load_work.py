@@ -16,14 +16,13 @@ from verify.compare.simplices import EDGES
 from verify.compare.splitting import measures
 from verify.scene import BodyForce, Scene, Traction
 from verify.scene.history import factor_at
-from verify.scene.parts import lie_on_part
+from verify.scene.part_pieces import Pieces, pieces_on_part
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _GAUSS = np.polynomial.legendre.leggauss(2)  # exact for the rate of a cubic times a line
-_SAMPLES = 4  # points per direction in a facet that say whether a part ends in it
 
 
 def load_work(
@@ -33,7 +32,7 @@ def load_work(
 
     The half-width is what the cubic and a line between output times differ by: zero while the
     factor of the load stands still. None where the work is not known from the fields: the load is
-    another field at every time, or its part of the boundary ends inside a facet.
+    another field at every time.
 
     Parameters
     ----------
@@ -46,8 +45,6 @@ def load_work(
     if load.exact or load.timed:
         return None
     nodal = _forces(scene, load, solution)
-    if nodal is None:
-        return None
     assert solution.velocity is not None
     place = np.einsum("na,tna->t", nodal, solution.displacement)
     rate = np.einsum("na,tna->t", nodal, solution.velocity)
@@ -77,24 +74,24 @@ def _worked(times: Array, history: object, place: Array, rate: Array) -> tuple[A
     return work, width
 
 
-def _forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Array | None:
-    """Consistent nodal forces (n, d) of a load without its factor, N; None if a part is cut off."""
+def _forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Array:
+    """Consistent nodal forces (n, d) of a load without its factor, N."""
     if isinstance(load, BodyForce):
         nodes, k = solution.cells, solution.cell_dimension
+        pieces = Pieces.whole(np.arange(len(nodes)), k + 1)
     else:
-        facets = _facet_nodes(solution)
-        on = _on_part(scene, load.where, solution, facets)
-        if on is None:
-            return None
-        nodes, k = facets[on], solution.cell_dimension - 1
+        nodes, k = _facet_nodes(solution), solution.cell_dimension - 1
+        pieces = pieces_on_part(scene.geometry, load.where, solution.points[nodes[:, : k + 1]])
+        nodes = nodes[pieces.facet]
     place, share = simplex_rule(k, 4)
-    hats = shape_functions(place, k, solution.order)
+    within = place @ pieces.barycentric
+    hats = shape_functions(within.reshape(-1, k + 1), k, solution.order)
     corners = solution.points[nodes[:, : k + 1]]
-    points = np.einsum("qk,mkd->mqd", place, corners)
+    points = within @ corners
     force = load.values(points.reshape(-1, solution.dimension)).reshape(points.shape)
     thickness = scene.material.thickness or 1.0
-    weight = thickness * measures(corners)[:, None] * share
-    local = np.einsum("mq,qn,mqd->mnd", weight, hats, force)
+    weight = thickness * (measures(corners) * pieces.share)[:, None] * share
+    local = np.einsum("mq,mqn,mqd->mnd", weight, hats.reshape(*weight.shape, -1), force)
     found = np.zeros_like(solution.points)
     np.add.at(found, nodes, local)
     return found
@@ -113,18 +110,3 @@ def _facet_nodes(solution: Solution) -> Ints:
         columns = np.column_stack([rest, np.array(rows)])
     nodes: Ints = np.take_along_axis(solution.cells[cell], columns[opposite], axis=1)
     return nodes
-
-
-def _on_part(
-    scene: Scene, where: str, solution: Solution, facets: Ints
-) -> NDArray[np.bool_] | None:
-    """Whether facets lie on a part of the boundary; None if it ends inside one of them."""
-    k = solution.cell_dimension - 1
-    corners = solution.points[facets[:, : k + 1]]
-    place, _ = simplex_rule(k, _SAMPLES)
-    points = np.einsum("qk,mkd->mqd", place, corners).reshape(-1, solution.dimension)
-    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
-    inside = lie_on_part(scene, where, points, size).reshape(len(facets), -1)
-    if (inside.any(axis=1) != inside.all(axis=1)).any():
-        return None
-    return inside.all(axis=1)

@@ -18,7 +18,7 @@ from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, ToolPathC
 from verify.scene.cuts import whole_cut
 from verify.scene.history import factor_at
 from verify.scene.initial import AtRest, InitialField, Moving
-from verify.scene.parts import lie_on_part
+from verify.scene.parts import on_part
 from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.loads_of_scene import ForceDensity
 from verify.xfem.mesh import SimplexMesh
@@ -86,7 +86,7 @@ class _Fit:
         true = field.displacement(points, near)
         given, by = np.full_like(true, np.nan), np.zeros(true.shape, dtype=np.int64)
         for i, support in enumerate(scene.supports):
-            on = np.flatnonzero(lie_on_part(scene, support.where, points, self._size))
+            on = np.flatnonzero(on_part(scene.geometry, support.where, points, self._size))
             place = np.ix_(on, support.held(scene.dimension))
             given[place], by[place] = self._prescribed(support, points[on], near[on], time), i
         largest = max(np.abs(true).max(initial=0.0), np.nanmax(np.abs(given), initial=0.0))
@@ -105,8 +105,8 @@ class _Fit:
         points, near, _ = self._boundary
         nodes, beside = samples.boundary_nodes(self._mesh)
         for support in self._scene.supports:
-            if not lie_on_part(self._scene, support.where, points, self._size).any():
-                on = lie_on_part(self._scene, support.where, nodes, self._size)
+            if not on_part(self._scene.geometry, support.where, points, self._size).any():
+                on = on_part(self._scene.geometry, support.where, nodes, self._size)
                 points, near = np.vstack([points, nodes[on]]), np.vstack([near, beside[on]])
         return points, near
 
@@ -125,13 +125,13 @@ class _Fit:
         by = np.full(len(points), -1)
         for i, load in enumerate(scene.loads):
             if isinstance(load, Traction):
-                on = np.flatnonzero(lie_on_part(scene, load.where, points, self._size))
+                on = np.flatnonzero(on_part(scene.geometry, load.where, points, self._size))
                 density = ForceDensity(scene, load, field, time)
                 value = density.at(points[on], near[on], normals[on])
                 given[on] += factor_at(load.history, time) * value
                 by[on] = i
         for support in scene.supports:
-            on = np.flatnonzero(lie_on_part(scene, support.where, points, self._size))
+            on = np.flatnonzero(on_part(scene.geometry, support.where, points, self._size))
             held[np.ix_(on, support.held(scene.dimension))] = True
         largest = max(np.abs(stress).max(initial=0.0), np.abs(given).max(initial=0.0))
         off = np.where(held, 0.0, np.abs(given - true))
