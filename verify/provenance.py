@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import verify
+from verify.meaning import REVISION
 
 # what is reported -> the distributions that may carry it, the likelier first
 _DISTRIBUTIONS = {
@@ -36,7 +37,8 @@ def provenance() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``commit`` (str or None), ``dirty`` (bool or None if unknown), ``versions``, ``cpu``,
+        ``commit`` (str or None), ``dirty`` (bool or None if unknown), ``meaning`` (revision of
+        what numbers mean, `verify.meaning`), ``versions``, ``cpu``,
         ``cores`` (usable by this process), ``memory`` (bytes), ``load`` (one-minute average
         when asked), ``threads`` (of a solving process), ``os`` and ``date`` (UTC, ISO 8601).
     """
@@ -44,6 +46,7 @@ def provenance() -> dict[str, Any]:
     return {
         "commit": commit,
         "dirty": dirty,
+        "meaning": REVISION,
         "versions": dict(versions()),
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),

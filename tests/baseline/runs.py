@@ -69,12 +69,14 @@ def verdict(check, metric, what, observed=1.0):
     return VerdictRecord(check, "xfem", metric, Verdict(what), observed, 0.0, 2.0, "≤ 2", "so")
 
 
-def run(folder, *results, cpu="a CPU", finished="2026-01-02", date="2026-01-01", commit="c0ffee"):
+def run(
+    folder, *results, cpu="a CPU", finished="2026-01-02", date="2026-01-01", commit="c0ffee", **more
+):
     """Write the directory of a run."""
     results = list(results) or [result()]
     for one in results:
         write_result(replace(one), folder / "cases" / one.case.replace("/", "__") / "result.json")
-    origin = {"commit": commit, "dirty": False, "date": date, "cpu": cpu}
+    origin = {"commit": commit, "dirty": False, "date": date, "cpu": cpu, **more}
     record = {
         "schema": 1,
         "cases": [one.case for one in results],

@@ -1,9 +1,13 @@
 """The last own value and the independent value are two axes, and only the first ever moves."""
 
 import json
+from dataclasses import replace
 
 import pytest
 import runs
+
+from verify.cut_record import CutRecord
+from verify.meaning import changes_of
 
 
 def rows(answer, axis=None):
@@ -170,3 +174,54 @@ def test_a_slip_of_the_hand_in_the_file_is_named(baseline, tmp_path, change, sai
     assert code == 2
     assert said in error
     assert error.count("\n") == 1
+
+
+REGION = {"supports": [{"where": "x < 0.3", "displacement": [0.0, 0.0]}]}
+
+
+def of_region(energy=2.001):
+    return runs.result(runs.solve(energy=energy), scene=REGION)
+
+
+def test_a_number_that_means_something_else_than_the_stored_one_says_so_and_fails_nothing(
+    baseline, tmp_path
+):
+    """A file from before revisions, of a case with a part of the boundary that a formula names."""
+    baseline("save", runs.run(tmp_path / "old", of_region()))
+    content = json.loads(baseline.file.read_text())
+    for quantity in content["cases"]["a/case"]["quantities"].values():
+        del quantity["own"]["meaning"], quantity["independent"]["meaning"]
+    baseline.file.write_text(json.dumps(content))
+    new = runs.run(tmp_path / "new", of_region(2.002), meaning=2)
+    code, answer = baseline("check", new)
+    assert code == 0
+    found = {(r["quantity"], r["axis"]): r for r in answer["rows"]}
+    changed = found["xfem/1/strain_energy", "meaning"]
+    assert changed["verdict"] == "UNDECIDED"
+    assert "since revision 2 loads and supports act on" in changed["reason"]
+    assert "`update` it by name" in changed["reason"]
+    assert found["xfem/1/sag", "meaning"]["verdict"] == "PASS"  # it has not moved
+    assert found["xfem/1/strain_energy", "independent"]["verdict"] == "PASS"
+    assert baseline("check", new, "--strict")[0] == 5
+    baseline("update", new, "--only", "a/case:strain_energy")
+    code, answer = baseline("check", new)
+    assert rows(answer)["xfem/1/strain_energy", "own"] == "PASS"
+    # and from then on it is held as ever
+    later = runs.run(tmp_path / "later", of_region(2.003), meaning=2)
+    assert rows(baseline("check", later)[1])["xfem/1/strain_energy", "own"] == "FAIL"
+
+
+@pytest.mark.parametrize(("scene", "metric", "lateral", "count"), [
+    ({}, "strain_energy", None, 0),
+    (REGION, "strain_energy", None, 1),
+    ({}, "energy_drift", None, 0),  # at rest
+    ({"analysis": {"kind": "dynamic"}}, "energy_drift", None, 1),
+    ({"analysis": {"kind": "dynamic"}}, "displacement_l2", None, 0),
+    ({}, "displacement_l2", 0.1, 1),
+    ({}, "displacement_l2", 0.001, 0),  # a faceted arc: nothing changed
+])  # fmt: skip
+def test_a_change_of_meaning_concerns_only_what_it_names(scene, metric, lateral, count):
+    cut = lateral and CutRecord(2, lateral, 0.0, 0.0, 0.0, 0.0, 0.1, 0.01, None)
+    solve = replace(runs.solve(), cut=cut or None)
+    assert len(list(changes_of(metric, scene, solve, 1, 2))) == count
+    assert not list(changes_of(metric, scene, solve, 2, 2))

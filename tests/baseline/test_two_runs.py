@@ -39,3 +39,15 @@ def test_a_fail_is_worse_than_a_check_that_could_not_be_judged(baseline, tmp_pat
     new_run = runs.run(tmp_path / "new", runs.result(verdicts=[verdict("error", "sag", "FAIL")]))
     code, answer = baseline("diff", old_run, new_run)
     assert (code, [c["direction"] for c in answer["changes"]]) == (1, ["worse"])
+
+
+def test_two_runs_say_which_numbers_mean_something_else_in_the_newer(baseline, tmp_path):
+    scene = {"supports": [{"where": "x < 0.3", "displacement": [0.0, 0.0]}]}
+    old_run = runs.run(tmp_path / "old", runs.result(scene=scene))
+    new_run = runs.run(tmp_path / "new", runs.result(scene=scene), meaning=2)
+    code, answer = baseline("diff", old_run, new_run)
+    assert code == 0
+    numbers, widths = answer["meaning"]
+    assert "a/case:xfem/1/displacement_l2, a/case:xfem/1/strain_energy" in numbers
+    assert "half-widths" in widths
+    assert baseline("diff", new_run, new_run)[1]["meaning"] == []

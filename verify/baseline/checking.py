@@ -1,12 +1,13 @@
 """A run held against a baseline: a row per quantity and axis."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from verify.baseline.finished_run import FinishedRun, physics_of
 from verify.baseline.measured import finest, metric_of, quantities_of, speed_of
 from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity, Speed
 from verify.calibration import KERNEL
+from verify.meaning import changes_of
 from verify.result import CaseResult, Metric, Verdict
 from verify.runner.ending import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 
@@ -22,8 +23,9 @@ class Row:
     ----------
     case, quantity : str
     axis : str
-        ``own``, ``independent``, ``reference`` (did the reference itself move?), ``speed``, or
-        ``case`` (the case as a whole).
+        ``own``, ``independent``, ``reference`` (did the reference itself move?), ``speed``,
+        ``meaning`` (in place of ``own``: the number means something else than the stored one;
+        no FAIL), or ``case`` (the case as a whole).
     verdict : Verdict
         ERROR: it could not be checked.
     now, stored : float or None
@@ -57,7 +59,7 @@ def check_run(baseline: Baseline, run: FinishedRun, partial: bool = False) -> li
             if not partial:
                 rows.append(Row(name, "", "case", Verdict.ERROR, reason="not in this run"))
             continue
-        rows += _case_rows(name, case, run.results[name], cpu)
+        rows += _case_rows(name, case, run.results[name], cpu, run.meaning)
     for name, result in run.results.items():
         known = baseline.cases.get(name)
         new = set(quantities_of(result, {})) - set(known.quantities if known else ())
@@ -67,7 +69,9 @@ def check_run(baseline: Baseline, run: FinishedRun, partial: bool = False) -> li
     return rows
 
 
-def _case_rows(name: str, case: CaseBaseline, result: CaseResult, cpu: str) -> Iterator[Row]:
+def _case_rows(
+    name: str, case: CaseBaseline, result: CaseResult, cpu: str, meaning: int
+) -> Iterator[Row]:
     if physics_of(result) != case.physics:
         text = "its scene is another one now; remove its entry from the file and save it again"
         yield Row(name, "", "case", Verdict.ERROR, reason=text)
@@ -77,13 +81,29 @@ def _case_rows(name: str, case: CaseBaseline, result: CaseResult, cpu: str) -> I
         if metric is None:
             yield Row(name, key, "own", Verdict.ERROR, None, quantity.own.value, why)
             continue
-        yield own_row(name, key, quantity, metric)
+        row = own_row(name, key, quantity, metric)
+        if changed := changes_between(result, key, quantity.own.meaning, meaning):
+            verdict = Verdict.PASS if row.verdict is Verdict.PASS else Verdict.UNDECIDED
+            text = "; ".join(part for part in (row.reason, changed, "`update` it by name") if part)
+            row = replace(row, axis="meaning", verdict=verdict, reason=text)
+        yield row
         if quantity.independent is not None:
             if quantity.independent.tolerance is not None:
                 yield independent_row(name, key, quantity.independent, metric)
             yield from _reference_rows(name, key, quantity.independent, metric)
     for key, speed in case.speed.items():
         yield _speed_row(name, key, speed, result, cpu)
+
+
+def changes_between(result: CaseResult, key: str, old: int, new: int) -> str:
+    """Say what changed in the meaning of ``solver/level/metric`` of a case, or nothing."""
+    place, _, metric = key.rpartition("/")
+    return "; ".join(
+        f"since revision {change.revision} {change.why}"
+        for solve in result.solves
+        if f"{solve.solver}/{solve.level}" == place
+        for change in changes_of(metric, result.scene, solve, old, new)
+    )
 
 
 def own_row(case: str, key: str, quantity: Quantity, metric: Metric) -> Row:

@@ -1,10 +1,13 @@
 """Two runs side by side: which verdicts changed."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from verify.baseline.checking import changes_between
 from verify.baseline.finished_run import FinishedRun
+from verify.baseline.measured import finest
+from verify.meaning import WIDTHS
 from verify.result import CaseResult, Verdict, VerdictRecord, worst
 
 
@@ -44,6 +47,22 @@ def any_worse(changes: Sequence[VerdictChange]) -> bool:
         change.direction == "worse" or (change.direction == "gone" and change.old is Verdict.PASS)
         for change in changes
     )
+
+
+def meaning_lines(old: FinishedRun, new: FinishedRun) -> Iterator[str]:
+    """Yield a line per change of meaning between two runs, with the numbers that it concerns."""
+    found: dict[str, list[str]] = {}
+    for case, result in new.results.items():
+        for solve in finest(result):
+            for metric in solve.metrics:
+                key = f"{solve.solver}/{solve.level}/{metric.name}"
+                if changed := changes_between(result, key, old.meaning, new.meaning):
+                    found.setdefault(changed, []).append(f"{case}:{key}")
+    for changed, numbers in found.items():
+        more = f" and {len(numbers) - 3} more" if len(numbers) > 3 else ""
+        yield f"meaning: {changed} ({', '.join(numbers[:3])}{more})"
+    if (old.meaning < WIDTHS[0]) != (new.meaning < WIDTHS[0]):
+        yield f"meaning: since revision {WIDTHS[0]} {WIDTHS[1]}"
 
 
 def _checks(result: CaseResult | None) -> dict[str, VerdictRecord]:

@@ -26,8 +26,15 @@ class FinishedRun:
 
     @property
     def origin(self) -> dict[str, Any]:
-        """What a baseline keeps of the provenance: commit, dirty flag, date."""
-        return {key: self.provenance.get(key) for key in ("commit", "dirty", "date")}
+        """What a baseline keeps of the provenance: commit, dirty flag, date, meaning."""
+        kept = {key: self.provenance.get(key) for key in ("commit", "dirty", "date")}
+        return kept | {"meaning": self.meaning}
+
+    @property
+    def meaning(self) -> int:
+        """Revision of what its numbers mean; 1 before revisions were kept."""
+        found = self.provenance.get("meaning", 1)
+        return found if isinstance(found, int) else 1
 
 
 def read_run(directory: Path) -> FinishedRun:

@@ -17,6 +17,7 @@ class _From(Strict):
     commit: str | None = None
     dirty: bool | None = None
     date: str | None = None
+    meaning: int = Field(default=1, description="revision of what the number means")
 
 
 class Own(_From):

@@ -18,7 +18,7 @@ from verify.baseline import (
     verdict_changes,
     write_baseline,
 )
-from verify.baseline.difference import any_worse
+from verify.baseline.difference import any_worse, meaning_lines
 from verify.result import Verdict
 
 
@@ -57,7 +57,7 @@ def _check(arguments: argparse.Namespace) -> int:
         return code
     _print_rows([row for row in rows if row.verdict is not Verdict.PASS])
     counts = Counter((row.axis, row.verdict) for row in rows)
-    for axis in ("own", "independent", "reference", "speed"):
+    for axis in ("own", "meaning", "independent", "reference", "speed"):
         said = ", ".join(f"{counts[axis, v]} {v}" for v in Verdict if counts[axis, v])
         if said:
             print(f"{axis:<12} {said}")
@@ -103,12 +103,15 @@ def _diff(arguments: argparse.Namespace) -> int:
     code = 1 if any_worse(changes) else 0
     if arguments.json:
         answer = {"exit": code, "old": old.origin, "new": new.origin}
+        answer["meaning"] = list(meaning_lines(old, new))
         print(json.dumps({**answer, "changes": [asdict(c) for c in changes]}, indent=2))
         return code
     for run, name in ((old, "old"), (new, "new")):
         commit = str(run.origin.get("commit") or "no commit")[:12]
         dirty = ", with local changes" if run.origin.get("dirty") else ""
         print(f"{name}: {run.directory} ({commit}{dirty}, {run.origin.get('date')})")
+    for line in meaning_lines(old, new):
+        print(line)
     for change in changes:
         verdicts = f"{change.old or '–'} → {change.new or '–'}"
         numbers = " → ".join(
