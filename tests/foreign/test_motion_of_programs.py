@@ -5,6 +5,9 @@ import sys
 import numpy as np
 import pytest
 
+from verify.assess.energy_account import account_metrics
+from verify.assess.motion_account import motion_account
+from verify.compare.hooke import law_of
 from verify.exchange import export_case, read_answers
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
@@ -23,7 +26,7 @@ def modules(monkeypatch):
         sys.modules.pop(name, None)
 
 
-def newmark(example):
+def newmark(example, lumped=False):
     """Dense average acceleration as an engine of `motion`, with the mass of linear simplices."""
 
     class Engine:
@@ -38,6 +41,8 @@ def newmark(example):
             mass = np.zeros((n, n))
             for cell, share in zip(stage.cells, weight / (k * (k + 1)), strict=True):
                 mass[np.ix_(cell, cell)] += share * (1.0 + np.eye(k))
+            if lumped:
+                mass = np.diag(mass.sum(axis=1))
             self.mass = np.kron(mass, np.eye(self.shape[1]))
 
         def solved(self, matrix, right):
@@ -101,6 +106,20 @@ def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, 
     found = read_answers(scene, tmp_path).solutions[0]
     expected = find_solver("conforming").solve(scene, 0, repetitions=1)
     assert_same_motion(found, expected, 1e-9)
+
+
+@pytest.mark.parametrize("mass", ["consistent", "lumped"])
+def test_a_program_that_says_with_which_mass_it_moves_keeps_its_energy(mass, modules, tmp_path):
+    scene = load_scene("dynamics/block_falls_apart")
+    export_case(scene, tmp_path, [0], conforming=True)
+    laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    engine = newmark(modules["example"], lumped=mass == "lumped")
+    modules["motion"].run_engine(laid, engine, mass)
+    found = read_answers(scene, tmp_path).solutions[0]
+    metrics, notes = account_metrics(scene, motion_account(scene, found, law_of(scene)))
+    drift = next(metric for metric in metrics if metric.name == "energy_drift")
+    assert drift.value + drift.uncertainty < 1e-10
+    assert "declared" in notes["mass"]
 
 
 def test_cuts_that_open_in_turn_open_one_by_one(modules, tmp_path):

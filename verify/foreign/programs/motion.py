@@ -125,8 +125,18 @@ def _distance(points, cut):
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
 
 
-def run_engine(case, engine, **said):
-    """Solve the case by an engine, time it, and write the answer."""
+def run_engine(case, engine, mass=None, **said):
+    """Solve the case by an engine, time it, and write the answer.
+
+    Parameters
+    ----------
+    case : Case
+    engine : class
+    mass : {"consistent", "lumped"}, optional
+        With which the engine moves.
+    said
+        Further keys of the answer.
+    """
     if case.cells.shape[1] != case.dimension + 1:
         raise RefusedError("no membranes")
     if case.content["analysis"]["kind"] == "static":
@@ -149,8 +159,18 @@ def run_engine(case, engine, **said):
             for k, name in enumerate(names[: len(outputs[0])])
         }
         said = {"times": case.content["output_times"], "iterations": {"steps": steps}, **said}
+        said["mass"] = _lumped(case) if mass == "lumped" else mass
     case.answer(case.points, case.cells, **fields, unknowns=case.points.size,
                 cut_facets=case.problem["cut_facets"], **said)  # fmt: skip
+
+
+def _lumped(case):
+    """Mass (N,) of the nodes of linear cells: each has an equal share of its cells."""
+    edges = np.diff(case.points[case.cells], axis=1)
+    share = np.abs(np.linalg.det(edges)) * case.constant("density")
+    corners = case.cells.shape[1]
+    share = np.repeat(share / [1, 1, 2, 6][corners - 1] / corners, corners)
+    return np.bincount(case.cells.ravel(), share, minlength=len(case.points))
 
 
 def _march(case, engine, trial=False):

@@ -100,7 +100,7 @@ def solve(case):
     if any(support.get("history") for support in case.problem["held"]):
         raise RefusedError("supports that move in time")
     said = {"version": aka.__version__, "scheme": "trapezoidal rule", "mass": "consistent"}
-    run_engine(case, Body, notes={**said, "linear solver": "MUMPS"})
+    run_engine(case, Body, said["mass"], notes={**said, "linear solver": "MUMPS"})
 
 
 if __name__ == "__main__":

@@ -123,8 +123,8 @@ def solve(case):
         raise RefusedError(f"{text} Kirchhoff or a neo-Hookean one, not that of the corotation")
     KM.ParallelUtilities.SetNumThreads(1)
     KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
-    said = {"version": KM.KratosGlobals.Kernel.Version(), "scheme": "newmark"}
-    run_engine(case, Body, notes={**said, "mass": "consistent", "linear solver": "Eigen SparseLU"})
+    said = {"version": KM.KratosGlobals.Kernel.Version(), "scheme": "newmark", "mass": "consistent"}
+    run_engine(case, Body, said["mass"], notes={**said, "linear solver": "Eigen SparseLU"})
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ def solve(case):
         return
     notes |= {"scheme": "trapezoidal rule", "mass": "consistent, of each side; no ghost penalty"}
     parted = PartedCase(case, body, answer, forms, ghost)
-    run_engine(parted, Body, notes=notes)
+    run_engine(parted, Body, "consistent", notes=notes)
 
 
 def solve_static(case, body, answer, forms, ghost, notes):

@@ -82,7 +82,7 @@ class Body:
 def solve(case):
     """Solve the case."""
     SofaRuntime.importPlugin("Sofa.Component")
-    run_engine(case, Body, notes={
+    run_engine(case, Body, "lumped", notes={
         "version": str(Sofa.__version__), "scheme": "implicit Euler, one linearisation",
         "mass": "lumped", "method": case.parameters["method"], "linear solver": "SparseLDL",
     })  # fmt: skip

@@ -92,7 +92,7 @@ class Body:
 def solve(case):
     """Answer, and say by which model."""
     wp.config.quiet = True
-    run_engine(case, Body, notes={
+    run_engine(case, Body, "lumped", notes={
         "version": newton.__version__, "scheme": "implicit Euler", "mass": "lumped",
         "model": "stable neo-Hookean; differs from the scene's law by the order of strain",
         "iterations": str(case.parameters["iterations"]), "step": case.parameters["step"],
