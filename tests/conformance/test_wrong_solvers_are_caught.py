@@ -1,8 +1,12 @@
 """A fault of each kind breaks the check that is there for it."""
 
+from dataclasses import replace
+
 import pytest
 
-from verify.conformance import State, conform, exit_code_of
+from verify.conformance import State, conform, exit_code_of, scenes
+from verify.conformance.energy_in_motion import energy_in_motion
+from verify.solvers.xfem import XfemSolver
 
 
 def state(solver, *names, **options):
@@ -29,6 +33,7 @@ def state(solver, *names, **options):
         ("IgnoresTheCut", "parted-3d", "displacement off by"),
         ("LumpsAsTheThesis", "free-fall", "does not stay as it is"),
         ("ForgetsOutputs", "free-fall", "output times"),
+        ("SaysTooFast", "energy-in-motion", "not the rates of its displacements"),
         ("KnowsOnlyUpright", "mirrored-cut", "discretisation"),
         ("DependsOnNumbers", "renumbering", ""),
         ("Noisy", "repeatability", "not equal bit by bit"),
@@ -47,6 +52,26 @@ def test_a_fault_breaks_the_check_that_is_there_for_it(solver, check, said):
 
 def test_a_solver_that_states_the_energy_of_its_field_keeps_its_account():
     assert state("Stating", "energy-account")["energy-account"].state is State.PASS
+
+
+def test_a_loss_of_three_thousandths_is_measured_as_that():
+    found = state("LosesEnergySlowly", "energy-in-motion")["energy-in-motion"]
+    assert found.state is State.FAIL
+    assert "nothing accounts for" in found.reason
+    assert found.observed == pytest.approx(0.003, rel=0.02)  # to first order in the loss
+
+
+@pytest.mark.parametrize("scheme, said", [
+    ("newmark", ""), ("central_differences", ""), ("energy_momentum", ""),
+    ("implicit_euler", "takes 0.0"), ("generalised_alpha", ""),
+])  # fmt: skip
+def test_a_scheme_that_dissipates_and_says_so_passes_like_one_that_does_not(scheme, said):
+    solution = XfemSolver().solve(scenes.swinging(), 0, 0, scheme=scheme)
+    found = energy_in_motion().judge({"swinging": solution})
+    assert found.observed < 1e-6
+    assert said in found.note
+    # without its mass nothing is known that exactly, and that is not held against it
+    assert energy_in_motion().judge({"swinging": replace(solution, mass=None)}).limit is None
 
 
 def test_noise_far_below_the_errors_breaks_repeatability_only():

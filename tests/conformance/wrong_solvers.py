@@ -114,6 +114,37 @@ class StatesStrainOfRotation(XfemSolver):
         return replace(solution, ledger={"strain": np.array([1e-3])})
 
 
+class LosesEnergySlowly(XfemSolver):
+    """Loses 0.3 % of the energy in play, by a damping that the scene has not and nothing says."""
+
+    def solve(self, scene, level, repetitions=1):
+        if scene.analysis.kind == "static":
+            return super().solve(scene, level, repetitions)
+        own = self.damped(scene, 0.0, level).ledger
+        # what damping proportional to the mass takes is twice its factor times ∫T
+        time = np.linspace(0.0, scene.analysis.duration, len(own["kinetic"]))
+        taken = 2 * np.trapezoid(own["kinetic"], time)
+        in_play = max(np.ptp(own[name]) for name in ("kinetic", "strain", "gravity"))
+        solution = self.damped(scene, 0.003 * in_play / taken, level)
+        kept = {name: solution.ledger[name] for name in ("strain", "gravity")}
+        total = own["kinetic"][0] + sum(row[0] for row in kept.values())
+        return replace(solution, ledger={**kept, "kinetic": total - sum(kept.values())})
+
+    def damped(self, scene, factor, level):
+        analysis = scene.analysis.model_copy(update={"damping": (factor, 0.0)})
+        return super().solve(changed(scene, analysis=analysis), level, 0)
+
+
+class SaysTooFast(XfemSolver):
+    """Hands out velocities that are not the rates of its displacements."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        if solution.velocity is None:
+            return solution
+        return replace(solution, velocity=1.1 * solution.velocity)
+
+
 class ForgetsOutputs(XfemSolver):
     def solve(self, scene, level, repetitions=1):
         solution = super().solve(scene, level, repetitions)

@@ -15,7 +15,7 @@ from solid_meshes import cube_grid
 from verify.assess.energy_account import account_metrics
 from verify.assess.motion_account import motion_account
 from verify.compare.hooke import law_of
-from verify.compare.kinetic import lumped_shares, lumping_range, nodal_weights
+from verify.compare.lumping import lumped_shares, lumping_range, nodal_weights
 from verify.compare.simplices import simplices
 from verify.result import Verdict
 from verify.scene import Scene
@@ -23,6 +23,7 @@ from verify.scene.loading import load_scene
 from verify.solution import Solution
 from verify.solvers.xfem import XfemSolver
 
+D = 0.003 / 0.46  # 1/s: takes 2 D ∫T dt, of a bar that has half of its energy in motion
 DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
 
 
@@ -146,3 +147,20 @@ def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
         Verdict.UNDECIDED
     )
     assert verdict_of(case, honest, {**DRIFT, "at_most": 1e-6}) is Verdict.PASS
+
+
+def test_a_hidden_loss_of_three_thousandths_fails_the_prestrained_bar():
+    """0.3 % of its energy, taken by a damping that the case has not; no opening shows it."""
+    case = load_scene("dynamics/prestrained_bar")
+    asked = case.model_dump(mode="json", by_alias=True) | {"mesh": {"cells": [[31, 2]]}}
+    asked["acceptance"] = [one for one in asked["acceptance"] if one["check"] == "error"]
+    honest = XfemSolver().solve(Scene.model_validate(asked), 0, 0)
+    damped = Scene.model_validate(asked | {"analysis": {**asked["analysis"], "damping": [D, 0.0]}})
+    lossy = XfemSolver().solve(damped, 0, 0)
+    total = {"kinetic": honest.ledger["total"] - lossy.ledger["strain"]}
+    lossy = replace(lossy, ledger={"strain": lossy.ledger["strain"], **total})
+    found = judged(Scene.model_validate(asked), {"honest": {0: honest}, "lossy": {0: lossy}})
+    assert [v.verdict for v in found.verdicts] == [Verdict.PASS, Verdict.FAIL]
+    assert found.verdicts[1].observed == pytest.approx(0.003, rel=0.1)
+    assert not found.warnings  # it is below what is warned of, and named in the notes
+    assert "kinetic by 0.003" in found.solves[1].notes["ledger"]

@@ -1,7 +1,7 @@
 """Kinetic energy of a solution with the mass that its solver declares, once that is checked.
 
 Not with the consistent mass of its field: a body that moves with a lumped mass keeps the energy of
-that mass, which for short waves is up to `verify.compare.kinetic.lumping_range` times as large.
+that mass, which for short waves is up to `verify.compare.lumping.lumping_range` times as large.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, issparse
 
-from verify.compare.kinetic import Kinetic, lumping_range, nodal_weights
+from verify.compare.kinetic import Kinetic
+from verify.compare.lumping import lumping_of, lumping_range, nodal_weights
 from verify.compare.separated import Part
 from verify.compare.simplices import simplices
 from verify.declared_mass import CONSISTENT
@@ -36,8 +37,8 @@ class Inertia:
         Half-width of its interval, J.
     weights : (n,) array
         Mass at the nodes, kg.
-    off : float
-        Share by which total and first moments of a declared mass are off those of the body.
+    moment : (t, d) array
+        Half-width of Σ weights × displacements, kg m.
     note : str
         Which mass it is.
     """
@@ -45,7 +46,7 @@ class Inertia:
     kinetic: Array
     width: Array
     weights: Array
-    off: float
+    moment: Array
     note: str
 
 
@@ -71,24 +72,29 @@ def inertia_of(
         All separated parts.
     """
     weights = nodal_weights(solution, density)
+    known = np.zeros_like(whole.energy), np.zeros((len(whole.energy), solution.dimension))
     if isinstance(solution.mass, str):
         assert solution.mass == CONSISTENT
-        none = np.zeros_like(whole.energy)
-        return Inertia(whole.energy, none, weights, 0.0, "the consistent mass, as declared")
-    if solution.mass is None:
-        note = "no mass is declared: that of the field, give or take its lumping"
-        return Inertia(whole.energy, whole.lumping, weights, 0.0, note)
-    matrix = _matrix(solution.mass)
-    own = np.asarray(matrix.sum(axis=1)).ravel()
-    energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in _velocities(solution)])
-    off = _off(solution, own, weights, parts)
-    wrong = _outside(solution, energy, whole)
-    if off > _WRONG:
-        wrong = f"its total, first moments or parts are off by {off:.2g} of the body's mass"
-    if wrong:
-        note = f"the declared mass is not taken: {wrong}; that of the field, give or take lumping"
-        return Inertia(whole.energy, whole.lumping, weights, 0.0, note)
-    return Inertia(energy, off * energy, own, off, "the declared mass")
+        return Inertia(
+            whole.energy, known[0], weights, known[1], "the consistent mass, as declared"
+        )
+    wrong = "no mass is declared"
+    if solution.mass is not None:
+        matrix = _matrix(solution.mass)
+        own = np.asarray(matrix.sum(axis=1)).ravel()
+        energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in _velocities(solution)])
+        off = _off(solution, own, weights, parts)
+        wrong = _outside(solution, energy, whole)
+        if off > _WRONG:
+            wrong = f"its total, first moments or parts are off by {off:.2g} of the body's mass"
+        if not wrong:
+            moved = solution.displacement - solution.displacement[0]
+            moment = off * np.abs(np.einsum("n,tna->ta", own, moved))
+            return Inertia(energy, off * energy, own, moment, "the declared mass")
+        wrong = f"the declared mass is not taken: {wrong}"
+    lumping = lumping_of(solution, density)
+    note = f"{wrong}: that of the field, give or take its lumping"
+    return Inertia(whole.energy, lumping.kinetic, weights, lumping.moment, note)
 
 
 def _velocities(solution: Solution) -> Array:

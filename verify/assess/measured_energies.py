@@ -89,7 +89,7 @@ def measured_energies(
     if weight:
         pulled = np.einsum("n,tna->ta", inertia.weights, solution.displacement)
         found["gravity"] = -pulled @ np.sum(weight, axis=0)
-        widths["gravity"] = inertia.off * np.abs(found["gravity"] - found["gravity"][0])
+        widths["gravity"] = inertia.moment @ np.abs(np.sum(weight, axis=0))
     if any(scene.analysis.damping):
         found["damping"], widths["damping"] = _damped(scene, solution, law, inertia)
     for name, (known, width, unknown) in {

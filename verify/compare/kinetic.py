@@ -1,7 +1,6 @@
 """Kinetic energy and momenta of a solution, from its velocities with the consistent mass."""
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,6 @@ class Kinetic:
         Current centre of mass, m.
     energy : (t,) array
         ½ ∫ ρ v², J.
-    lumping : (t,) array
-        By how much it may be another one if the mass is lumped at nodes, J.
     linear : (t, d) array
         ∫ ρ v, N s.
     angular : (t, 1 or 3) array
@@ -43,7 +40,6 @@ class Kinetic:
     mass: float
     centre: Array
     energy: Array
-    lumping: Array
     linear: Array
     angular: Array
     spin: Array
@@ -91,9 +87,7 @@ def kinetic(
     hats = shape_functions(place, k, solution.order)
     own = density if cells is None or np.ndim(density) == 0 else np.asarray(density)[cells]
     mass = ((own * shape.volume)[:, None] * share).ravel()
-    at_nodes = (own * shape.volume)[:, None] * lumped_shares(k, solution.order)
-    larger = _larger_beside(nodes[:, : k + 1], shape.corners)
-    names = ("centre", "energy", "lumping", "linear", "angular", "spin", "scales")
+    names = ("centre", "energy", "linear", "angular", "spin", "scales")
     rows: dict[str, list[Array]] = {name: [] for name in names}
     for u, v in zip(solution.displacement, solution.velocity, strict=True):
         x, speed = (
@@ -104,10 +98,7 @@ def kinetic(
         centre = mass @ x / max(mass.sum(), 1e-300)
         rows["centre"].append(centre)
         arm = np.linalg.norm(x - centre, axis=1)
-        of_cells = 0.5 * (mass * size**2).reshape(len(nodes), -1).sum(axis=1)
-        lumped = 0.5 * np.sum(at_nodes * np.sum(v[nodes] ** 2, axis=2), axis=1)
-        rows["energy"].append(of_cells.sum())
-        rows["lumping"].append(np.abs(lumped - of_cells) @ larger**2)
+        rows["energy"].append(0.5 * mass @ size**2)
         rows["linear"].append(mass @ speed)
         rows["angular"].append(mass @ _cross(x, speed))
         rows["spin"].append(mass @ _cross(x - centre, speed))
@@ -115,65 +106,9 @@ def kinetic(
     scales = np.max(rows["scales"], axis=0)
     return Kinetic(
         float(mass.sum()), np.array(rows["centre"]), np.array(rows["energy"]),
-        np.array(rows["lumping"]), np.array(rows["linear"]), np.array(rows["angular"]),
-        np.array(rows["spin"]), float(scales[0]), float(scales[1]),
+        np.array(rows["linear"]), np.array(rows["angular"]), np.array(rows["spin"]),
+        float(scales[0]), float(scales[1]),
     )  # fmt: skip
-
-
-def _larger_beside(nodes: NDArray[np.int64], corners: Array) -> Array:
-    """Diameter (m,) of the largest cell that shares a node with each, over its own.
-
-    The pieces of a cut cell are small, and a mass may be lumped at the nodes of the whole: what
-    lumping changes goes with the square of the size.
-    """
-    edges = corners[:, :, None] - corners[:, None, :]
-    size = np.linalg.norm(edges, axis=3).max(axis=(1, 2))
-    largest = np.zeros(nodes.max() + 1)
-    np.maximum.at(largest, nodes, size[:, None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found: Array = largest[nodes].max(axis=1) / size
-    return np.where(size > 0.0, found, 1.0)
-
-
-def nodal_weights(solution: Solution, density: float | Array) -> Array:
-    """Integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
-    k = solution.cell_dimension
-    shares = _consistent(k, solution.order).sum(axis=1)
-    mass = (density * simplices(solution.points, solution.cells).volume)[:, None] * shares
-    return np.bincount(solution.cells.ravel(), mass.ravel(), minlength=len(solution.points))
-
-
-@cache
-def lumped_shares(k: int, order: int) -> Array:
-    """Shares (n,) of the mass of a cell of k dimensions that its nodes have when it is lumped.
-
-    The diagonal of the consistent mass, scaled to the mass of the cell (Hinton, Rock, Zienkiewicz
-    1976, Earthq. Eng. Struct. Dyn. 4): for linear cells the sums of its rows.
-    """
-    diagonal = np.diag(_consistent(k, order))
-    shares: Array = diagonal / diagonal.sum()
-    return shares
-
-
-@cache
-def lumping_range(k: int, order: int) -> tuple[float, float]:
-    """Smallest and largest of lumped over consistent kinetic energy of a cell of k dimensions.
-
-    The consistent mass of a linear simplex is (I + 11ᵀ)/((k + 1)(k + 2)) of its mass and the
-    lumped one I/(k + 1): they differ by 1, for a velocity that is uniform, to k + 2, where its
-    nodal values sum to zero. A body of such cells lies between its cells.
-    """
-    root = np.diag(1.0 / np.sqrt(lumped_shares(k, order)))
-    ratios = 1.0 / np.linalg.eigvalsh(root @ _consistent(k, order) @ root)
-    return float(ratios.min()), float(ratios.max())
-
-
-def _consistent(k: int, order: int) -> Array:
-    """Mass (n, n) of a cell of mass 1."""
-    place, share = simplex_rule(k, 2 if order == 1 else 4)
-    hats = shape_functions(place, k, order)
-    matrix: Array = hats.T @ (share[:, None] * hats)
-    return matrix
 
 
 def _cross(x: Array, v: Array) -> Array:

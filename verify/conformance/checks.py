@@ -17,6 +17,7 @@ from verify.compare.realised import cut_deviation
 from verify.compare.strain_energy import strain_energy
 from verify.conformance import scenes
 from verify.conformance.check import Check, Finding
+from verify.conformance.energy_in_motion import energy_in_motion
 from verify.conformance.measures import covered, distance, nodal_deviation, weight_imbalance
 from verify.conformance.scenes import Field
 from verify.conformance.trials import Outcome, Trial
@@ -49,6 +50,7 @@ def checks(folder: Path) -> list[Check]:
         _two_materials(),
         _hanging_halves(),
         _freed_half(),
+        energy_in_motion(),
         _mirrored_cut(),
         _renumbering(folder),
         _repeatability(),

@@ -143,6 +143,17 @@ def freed_half() -> tuple[Scene, Array]:
     return scene, gravity
 
 
+def swinging() -> Scene:
+    """Let a square that stands on its lower side swing under a sudden weight, cut from its side."""
+    return _scene(
+        "swinging",
+        cuts=[{"kind": "polyline", "points": [[0.37, 0.41], [1.1, 0.63]]}],
+        supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "gravity", "acceleration": [0.02, -0.01]}],
+        analysis={"kind": "dynamic", "duration": 9.0, "time_step": 0.05, "outputs": 31},
+    )
+
+
 def strained_sides() -> tuple[Scene, Field, float]:
     """Strain the two sides of an inclined cut differently and move them apart.
 

@@ -1,0 +1,134 @@
+"""Lumped masses: at the nodes of a solution, and what they may change in its energies."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from verify.compare.kinetic import shape_functions
+from verify.compare.locate import ROUND_OFF
+from verify.compare.simplex_rule import simplex_rule
+from verify.compare.simplices import simplices
+from verify.solution import Solution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lumping:
+    """By how much energies may be others than those of the field, over the output times.
+
+    Parameters
+    ----------
+    kinetic : (t,) array
+        J (2D: per metre).
+    moment : (t, d) array
+        Of ∫ρu, at which gravity pulls, kg m.
+    """
+
+    kinetic: Array
+    moment: Array
+
+
+def lumping_of(solution: Solution, density: float | Array) -> Lumping:
+    """Bound what a mass that is lumped at nodes changes, where it is not said whether it is.
+
+    Cells along a cut may be pieces of larger ones, at whose nodes their mass may be lumped: as
+    much larger as the largest cell beside. What lumping changes goes with the square of that
+    size; and the mass of a piece then acts at the centre of the whole, up to half that size away.
+
+    Parameters
+    ----------
+    solution : Solution
+        With velocities.
+    density : float or (m,) array
+        kg/m³, of each cell.
+    """
+    assert solution.velocity is not None
+    k, order, nodes = solution.cell_dimension, solution.order, solution.cells
+    shape = simplices(solution.points, nodes)
+    mass = density * shape.volume
+    own, beside = _sizes(nodes[:, : k + 1], shape.corners)
+    cut = _along_cuts(solution)
+    larger = np.where(cut & (own > 0.0), beside / np.where(own > 0.0, own, 1.0), 1.0)
+    away = np.where(cut, 0.5 * beside, 0.0)
+    matrix = np.diag(lumped_shares(k, order)) - _consistent(k, order)
+    kinetic, moment = [], []
+    for u, v in zip(solution.displacement, solution.velocity, strict=True):
+        local = v[nodes]
+        change = 0.5 * np.einsum("mia,ij,mja->m", local, matrix, local)
+        gradients = [
+            np.einsum("mia,mib->mab", field[nodes[:, : k + 1]], shape.gradients) for field in (u, v)
+        ]
+        steepest = np.linalg.norm(gradients[1], axis=(1, 2)) * np.linalg.norm(
+            local.mean(axis=1), axis=1
+        )
+        kinetic.append(mass @ (np.abs(change) * larger**2 + steepest * away))
+        moment.append((mass * away) @ np.linalg.norm(gradients[0], axis=2))
+    return Lumping(np.array(kinetic), np.array(moment))
+
+
+def nodal_weights(solution: Solution, density: float | Array) -> Array:
+    """Integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
+    k = solution.cell_dimension
+    shares = _consistent(k, solution.order).sum(axis=1)
+    mass = (density * simplices(solution.points, solution.cells).volume)[:, None] * shares
+    return np.bincount(solution.cells.ravel(), mass.ravel(), minlength=len(solution.points))
+
+
+@cache
+def lumped_shares(k: int, order: int) -> Array:
+    """Shares (n,) of the mass of a cell of k dimensions that its nodes have when it is lumped.
+
+    The diagonal of the consistent mass, scaled to the mass of the cell (Hinton, Rock, Zienkiewicz
+    1976, Earthq. Eng. Struct. Dyn. 4): for linear cells the sums of its rows.
+    """
+    diagonal = np.diag(_consistent(k, order))
+    shares: Array = diagonal / diagonal.sum()
+    return shares
+
+
+@cache
+def lumping_range(k: int, order: int) -> tuple[float, float]:
+    """Smallest and largest of lumped over consistent kinetic energy of a cell of k dimensions.
+
+    The consistent mass of a linear simplex is (I + 11ᵀ)/((k + 1)(k + 2)) of its mass and the
+    lumped one I/(k + 1): they differ by 1, for a velocity that is uniform, to k + 2, where its
+    nodal values sum to zero. A body of such cells lies between its cells.
+    """
+    root = np.diag(1.0 / np.sqrt(lumped_shares(k, order)))
+    ratios = 1.0 / np.linalg.eigvalsh(root @ _consistent(k, order) @ root)
+    return float(ratios.min()), float(ratios.max())
+
+
+def _consistent(k: int, order: int) -> Array:
+    """Mass (n, n) of a cell of mass 1."""
+    place, share = simplex_rule(k, 2 if order == 1 else 4)
+    hats = shape_functions(place, k, order)
+    matrix: Array = hats.T @ (share[:, None] * hats)
+    return matrix
+
+
+def _sizes(nodes: NDArray[np.int64], corners: Array) -> tuple[Array, Array]:
+    """Diameter (m,) of each cell, and of the largest that shares a node with it, m."""
+    edges = corners[:, :, None] - corners[:, None, :]
+    size = np.linalg.norm(edges, axis=3).max(axis=(1, 2))
+    largest = np.zeros(nodes.max() + 1)
+    np.maximum.at(largest, nodes, size[:, None])
+    return size, largest[nodes].max(axis=1)
+
+
+def _along_cuts(solution: Solution) -> NDArray[np.bool_]:
+    """Whether cells (m,) have a node whose place another node has too, or a point of a cut."""
+    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+    near = 10 * ROUND_OFF * size
+    tree = cKDTree(solution.points)
+    on = np.zeros(len(solution.points), dtype=bool)
+    on[tree.query_pairs(near, output_type="ndarray").ravel()] = True
+    if len(solution.cut_facets):
+        places = np.unique(solution.cut_facets.reshape(-1, solution.dimension), axis=0)
+        found = tree.query(places, distance_upper_bound=near)[1]
+        on[found[found < len(on)]] = True
+    return on[solution.cells].any(axis=1)
