@@ -25,6 +25,7 @@ BREAKS: dict[str, set[str]] = {
     },
     "mass_spring": {
         "cut-patch", "energy-account", "closed-cut", "traction", "two-materials", "weight",
+        "energy-in-motion",
     },
 }  # fmt: skip
 

@@ -41,6 +41,7 @@ class Account:
                 for column, name in _DONE.items()
             }
             row |= self._removed
+            row["penalty"] = float(ledger.penalty[k])
             row["total"] = (
                 sum(row[name] for name in _STATE)
                 - row["work_of_loads"]
@@ -77,9 +78,13 @@ class Account:
             self._done["algorithmic"] += before - after
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
-        """All entries (t,) by name: energies in J, momenta in kg m/s and kg m²/s."""
+        """All entries (t,) by name: energies in J, momenta in kg m/s and kg m²/s.
+
+        The share of a ghost penalty in the strain energy is among them if there is one.
+        """
         names = self._rows[0] if self._rows else {}
-        return {name: np.array([row[name] for row in self._rows]) for name in names}
+        found = {name: np.array([row[name] for row in self._rows]) for name in names}
+        return {name: row for name, row in found.items() if name != "penalty" or row.any()}
 
 
 def _components(name: str, vector: NDArray[np.float64]) -> dict[str, float]:
