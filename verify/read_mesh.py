@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any
 
 from verify.errors import InputError
-from verify.printable import words_of
+from verify.printable import one_line, words_of
 
 _SECONDS, _SECONDS_PER_MB = 5.0, 4.0  # of processor time; meshio reads a megabyte in less than one
 
@@ -43,18 +43,28 @@ def read_with_meshio(path: Path, file_format: str | None = None, what: str = "a 
         kind = "is no plain file" if path.exists() else "no such file"
         raise InputError(f"{kind}; expected {what}", str(path))
     seconds = _SECONDS + _SECONDS_PER_MB * os.path.getsize(path) / 1e6
+    printed = io.StringIO()
     try:
         with (
-            contextlib.redirect_stderr(io.StringIO()),
-            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(printed),
+            contextlib.redirect_stdout(printed),
             warnings.catch_warnings(),
             _limited(seconds),
         ):
             warnings.simplefilter("ignore")
             return meshio.read(path, file_format=file_format)
     except (Exception, SystemExit) as error:
-        reason = words_of(error).removesuffix(": 1")
+        reason = _reason(error, printed.getvalue())
         raise InputError(f"not {what} that meshio can read ({reason})", str(path)) from None
+
+
+def _reason(error: BaseException, printed: str) -> str:
+    """Say why a file is not read: what meshio prints before it leaves, or its exception."""
+    if isinstance(error, SystemExit) and (said := printed.split()):
+        return one_line(" ".join(said).removeprefix("Error: "))
+    if isinstance(error, ModuleNotFoundError):
+        return f"this format needs the package '{error.name}': pip install {error.name}"
+    return words_of(error).removesuffix(": 1")
 
 
 @contextlib.contextmanager

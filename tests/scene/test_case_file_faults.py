@@ -29,6 +29,13 @@ FAULTS = {
     "unknown key": ("young = ", "yuong = ", "material.yuong: unknown key; did you mean 'young'?"),
     "missing value": ("poisson = 0.3\n", "", "material.poisson: missing"),
     "number too large": ("poisson = 0.3", "poisson = 0.5", "expected a number < 0.5, got 0.5"),
+    "number too small": ("density = 1000.0", "density = 5e-324", "a number ≥ 1e-60, got 4.9"),
+    "cells too many": ("[8, 16]", "[800000, 16000]", "mesh.cells[1]: about 1e+10 nodes in a body"),
+    "cells too small": (
+        "cells = [[4, 8], [8, 16]]",
+        "sizes = [1e-30]",
+        "mesh.sizes[0]: about 2e+60 nodes in a body of 1 × 2 m; expected at most 1e+10",
+    ),
     "not a number": ("young = 1e4", "young = nan", "material.young: expected a finite number"),
     "half a cell": ("[8, 16]", "[8, 16.5]", "mesh.cells[1][1]: expected a whole number"),
     "levels backwards": ("[8, 16]", "[2, 16]", "mesh: cells must go from coarse to fine"),

@@ -32,7 +32,7 @@ from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.reference_record import ReferenceRecord
-from verify.scene import Scene
+from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,
     MaximumDisplacementQuantity,
@@ -219,7 +219,8 @@ def conforming_reference(
     solutions = [levels[level] for level in sorted(levels)]
     if len(solutions) < 3:
         raise InputError(
-            f"the reference has {len(solutions)} solved levels; its uncertainty needs at least 3"
+            f"the reference has {len(solutions)} solved levels; its uncertainty needs at least 3: "
+            f"{_coarser(scene, solutions)}"
         )
     sizes = [size_of(solution) for solution in solutions]
     measured = [Measured(solution, body, law, scene) for solution in solutions]
@@ -256,6 +257,18 @@ def conforming_reference(
         missing=missing or None,
     )
     return Reference(measured[-1].motion, source, norms, quantities, record)
+
+
+def _coarser(scene: Scene, solutions: Sequence[Solution]) -> str:
+    """Say with which lines in its case a reference of too few solved levels has three."""
+    if isinstance(scene.geometry, MeshFile):
+        if scene.reference.degree == 2:
+            return "add to the case the lines '[reference]' and 'degree = 1'"
+        return "give a mesh of fewer cells, or more time (--timeout) and memory (--memory)"
+    if not solutions:
+        return "give [reference] of the case a larger size, or more time (--timeout)"
+    size = size_of(solutions[0]) * 2 ** (3 - len(solutions))
+    return f"add to the case the lines '[reference]' and 'size = {size:.3g}'"
 
 
 def known_quantity(

@@ -11,6 +11,8 @@ from verify.scene.nearest import nearest
 from verify.solvers import solver_names
 from verify.solvers.named import parameters_in, solver_in
 
+_CHECKED = 200_000  # most nodes of the coarsest mesh of a scene whose mechanics are checked: 1 s
+
 
 def check_scene(scene: Scene) -> None:
     """Raise `InputError` if something that `scene` names is not there or is bad."""
@@ -39,13 +41,19 @@ def check_scene(scene: Scene) -> None:
 def _check_mechanics(scene: Scene, exact: Any) -> None:
     """Refuse what has no solution, or another one than the exact solution."""
     # they cut meshes: commands that check nothing shall not load what that takes
+    from verify.runner.cost import mesh_of_level
     from verify.runner.exact_fit import check_exact_fits
+    from verify.runner.finite_formulas import check_formulas_are_finite
     from verify.runner.held_pieces import check_pieces_are_held
     from verify.solvers.body_of_scene import background_mesh
 
+    if (mesh_of_level(scene, 0) or (0.0,))[0] > _CHECKED:
+        return
+    mesh = background_mesh(scene, 0)[0]
+    check_formulas_are_finite(scene, mesh)
     check_pieces_are_held(scene, exact)
     if exact is not None and scene.judged_by_exact:
-        check_exact_fits(scene, exact, background_mesh(scene, 0)[0])
+        check_exact_fits(scene, exact, mesh)
 
 
 def _exact_of(scene: Scene, where: str) -> Any:

@@ -16,7 +16,7 @@ from verify.scene.acceptance import (
 from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
-from verify.scene.geometry import MeshFile, Polygon
+from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
 from verify.scene.initial import InitialField, Moving
 from verify.scene.material_regions import check_material_regions
 from verify.scene.nearest import nearest
@@ -27,6 +27,7 @@ from verify.scene.spatial_cuts import DiscCut, PolygonCut
 from verify.scene.tables import SceneTables
 from verify.scene.tool_path import ToolPathCut
 
+_MOST = 1e10  # nodes of a mesh (25 TB in the plane), and time steps
 _ON_FRONT = 1e-3  # of the radius or the edge: what is given in a few digits is on the front
 # quantities that need no name of their own
 _QUANTITIES = ("strain_energy", "maximum_displacement")
@@ -35,6 +36,7 @@ _QUANTITIES = ("strain_energy", "maximum_displacement")
 def check_placement(scene: SceneTables) -> None:
     """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
     _check_dimensions(scene)
+    _check_counts(scene)
     _check_regions(scene)
     check_material_regions(scene)
     _check_formulas(scene)
@@ -107,6 +109,31 @@ def _check_dimensions(scene: SceneTables) -> None:
         )
     if scene.analysis.kind == "dynamic" and scene.material.density is None:
         raise ValueError("material.density: a dynamic analysis needs it")
+
+
+def _check_counts(scene: SceneTables) -> None:
+    """Refuse meshes and steps of which there would be more than any machine holds."""
+    body, analysis = scene.geometry, scene.analysis
+    if isinstance(body, Rectangle | Polygon | Box):
+        ends = [body.lower, body.upper] if isinstance(body, Box) else body.outline()
+        sides = np.ptp(ends, axis=0)
+        levels = [sides / size for size in scene.mesh.sizes or []]
+        levels += [np.array(cells, dtype=float) for cells in scene.mesh.cells or []]
+        for i, counts in enumerate(levels):
+            if (nodes := np.prod(counts + 1.0)) > _MOST:
+                key = "sizes" if scene.mesh.sizes else "cells"
+                extent = " × ".join(f"{side:.3g}" for side in sides)
+                raise ValueError(
+                    f"mesh.{key}[{i}]: about {nodes:.0e} nodes in a body of {extent} m; expected "
+                    f"at most {_MOST:.0e}"
+                )
+    if analysis.duration and analysis.time_step:
+        steps = analysis.duration / analysis.time_step
+        if steps > _MOST:
+            raise ValueError(
+                f"analysis.time_step: {steps:.0e} steps to the end at {analysis.duration:g} s; "
+                f"expected at most {_MOST:.0e}"
+            )
 
 
 def _check_faces(scene: SceneTables, load: CutFaces, place: str) -> None:

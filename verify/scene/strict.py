@@ -2,13 +2,26 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 # `strict`: a number is a number; "1e4" and true are not
-# and none is so large that its powers are not
+# and none is so large, or so small above zero, that its powers are not
 _LARGEST = 1e60
+_SMALLEST = 1e-60
+
+
+def _not_tiny(value: float) -> float:
+    if value < _SMALLEST:
+        raise ValueError(f"expected a number ≥ {_SMALLEST:g}, got {value:g}")
+    return value
+
+
 Finite = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST, allow_inf_nan=False)]
+Positive = Annotated[
+    float,
+    Field(strict=True, gt=0, le=_LARGEST, allow_inf_nan=False),
+    AfterValidator(_not_tiny),
+]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 # of what is printed: no escapes of the terminal, no marks of direction
