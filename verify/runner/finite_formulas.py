@@ -11,7 +11,7 @@ from verify.errors import InputError
 from verify.runner import exact_samples as samples
 from verify.scene import BodyForce, CutFaces, InitialField, Scene, Traction
 from verify.scene.cuts import whole_cut
-from verify.scene.parts import lie_on_part
+from verify.scene.parts import on_part
 from verify.scene.physics import field_values
 from verify.xfem.mesh import SimplexMesh
 
@@ -46,12 +46,12 @@ def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array
     inside = samples.in_body(mesh, rng)[:, 0]
     for i, support in enumerate(scene.supports):
         if support.displacement != "exact":
-            on = lie_on_part(scene, support.where, nodes, mesh.extent)
+            on = on_part(scene.geometry, support.where, nodes, mesh.extent)
             given = cast(list[Any], support.displacement)
             yield f"supports[{i}].displacement", partial(field_values, given), nodes[on]
     for i, load in enumerate(scene.loads):
         if isinstance(load, Traction) and not load.exact:
-            on = lie_on_part(scene, load.where, facets, mesh.extent)
+            on = on_part(scene.geometry, load.where, facets, mesh.extent)
             yield f"loads[{i}].traction", load.values, facets[on]
         elif isinstance(load, BodyForce) and not load.exact:
             yield f"loads[{i}].force", load.values, inside
