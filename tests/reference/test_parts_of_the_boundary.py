@@ -164,3 +164,125 @@ def test_a_load_that_reaches_to_a_cut_stretches_its_own_half_only(solver):
     for level in range(2):
         energy = find_solver(solver).solve(scene, level, 0).ledger["strain"][-1]
         assert energy == pytest.approx(0.25, rel=1e-8)
+
+
+def energies(scene, solver, levels):
+    return [
+        float(find_solver(solver).solve(scene, level, 0).ledger["strain"][-1]) for level in levels
+    ]
+
+
+def held_to(where, d, cells, cuts=(), **more):
+    """A body that is held on a part which ends inside facets, and pulled aside."""
+    return scenes.scene(
+        cuts,
+        d,
+        mesh={"cells": [[n] * d for n in cells]},
+        supports=[{"where": where, "displacement": [0.0] * d}],
+        loads=[{"kind": "traction", "where": "right", "traction": [1.0, 0.5, 0.3][:d]}],
+        **more,
+    )
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_energies_rise_to_the_reference_where_a_support_ends_in_a_facet(number):
+    # what is held shrinks to the part, in nested spaces: the energy under a load rises
+    rng = np.random.default_rng([SEED, 2, 100 + number])
+    end = rng.uniform(0.55, 0.9)
+    # where a cut comes out, the upper part is held by what the part reaches beyond it: at least
+    # three elements of the finest mesh
+    left, right = end - rng.uniform(0.13, 0.3), rng.uniform(0.3, 0.7)
+    slope = right - left
+    cut = [[-0.1, left - 0.1 * slope], [1.1, right + 0.1 * slope]]
+    cuts = [{"kind": "polyline", "points": cut}] if number % 2 else []
+    reference = {"size": 0.2, "levels": 3}
+    scene = held_to(f"x < 1e-6 and y < {end!r}", 2, (3, 6, 12, 24), cuts, reference=reference)
+    (finest,) = energies(scene, "reference", [1])
+    for solver in ("xfem", "virtual_node", "conforming"):
+        found = energies(scene, solver, range(4))
+        assert found == sorted(found)
+        assert found[-1] < finest
+        assert finest - found[-1] < 0.5 * (finest - found[0])
+
+
+def test_energies_rise_to_the_reference_where_a_support_ends_in_a_facet_in_space():
+    scene = held_to(
+        "z < 1e-6 and x < 0.61 and y > 0.23", 3, (2, 4, 8), reference={"size": 0.4, "levels": 3}
+    )
+    (finest,) = energies(scene, "reference", [1])
+    found = energies(scene, "xfem", range(3))
+    assert found == sorted(found)
+    assert found[-1] < finest
+    assert finest - found[-1] < 0.6 * (finest - found[0])
+
+
+def test_the_shift_of_an_end_is_reported_in_metres_and_in_elements():
+    scene = held_to("x < 1e-6 and y < 0.55", 2, (4, 8), reference={"size": 0.2, "levels": 3})
+    for solver in ("xfem", "subdivision", "conforming"):
+        for level, shift in enumerate((0.2, 0.075)):
+            solution = find_solver(solver).solve(scene, level, 0)
+            said = {r.unit: r.size for r in solution.regularisations if "support" in r.kind}
+            assert said == pytest.approx({"m": shift, "h": shift * 4 * 2**level})
+    held = find_solver("reference").solve(scene, 0, 0)
+    assert not [r for r in held.regularisations if "support" in r.kind]
+
+
+@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.heavy)])
+def test_the_reference_on_a_given_mesh_ends_supports_and_loads_where_they_end(tmp_path, d):
+    """Its energies rise under refinement to those of the same body meshed anew."""
+    import meshio
+
+    from reference.meshing import structured_tetrahedra, structured_triangles
+    from verify.scene import load_scene
+
+    count = {2: 4, 3: 2}[d]
+    make = structured_triangles if d == 2 else structured_tetrahedra
+    points, cells = make([0.0] * d, [1.0] * d, [count] * d)
+    kind = {2: "triangle", 3: "tetra"}[d]
+    place = np.pad(points, ((0, 0), (0, 3 - d)))
+    meshio.Mesh(place, [(kind, cells)]).write(tmp_path / "body.vtu")
+    plane = 'plane = "strain"' if d == 2 else ""
+    (tmp_path / "case.toml").write_text(f"""
+title = "t"
+requirement = "r"
+[geometry]
+kind = "file"
+file = "body.vtu"
+dimension = {d}
+[mesh]
+pattern = "given"
+[material]
+young = 1.0
+poisson = 0.3
+{plane}
+[[supports]]
+where = "x < 0.1"
+displacement = {[0.0] * d}
+[[loads]]
+kind = "traction"
+where = "x > 0.999999 and y < 0.63"
+traction = {[1.0, 0.5, 0.3][:d]}
+[reference]
+degree = 1
+""")
+    given = load_scene(tmp_path / "case.toml")
+    anew = scenes.scene(
+        (),
+        d,
+        supports=[{"where": "x < 0.1", "displacement": [0.0] * d}],
+        loads=[
+            {
+                "kind": "traction",
+                "where": "x > 0.999999 and y < 0.63",
+                "traction": [1.0, 0.5, 0.3][:d],
+            }
+        ],
+        reference={"size": 0.25, "levels": 3},
+    )
+    levels = range(4 if d == 2 else 3)
+    found, (finest,) = energies(given, "reference", levels), energies(anew, "reference", [1])
+    assert found == sorted(found)
+    assert found[-1] < finest
+    assert finest - found[-1] < 0.35 * (finest - found[0])
+    said = find_solver("reference").solve(given, 0, 0).regularisations
+    assert not [r for r in said if "support" in r.kind]

@@ -24,6 +24,7 @@ from reference.meshing import (
     structured_triangles,
 )
 from reference.meshing.edge_splitting import mesh_edges
+from reference.meshing.part_ends import split_at_part_ends
 from verify.errors import InputError
 from verify.scene import (
     Box,
@@ -105,13 +106,15 @@ def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
 def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
     """Make a level of the reference and give its size far from what is singular, m.
 
-    A given mesh is refined uniformly after the cuts are imprinted, and so is the scene's own where
-    the cut is what another solver realised on it; others are made anew, graded.
+    A given mesh is refined uniformly after the cuts are imprinted, and edges split where supports
+    and tractions end; so is the scene's own where the cut is what another solver realised on it.
+    Others are made anew, graded.
     """
     coarse = structure(scene, 0)
     realised = _realised(scene, coarse)
     if realised is not None or isinstance(scene.geometry, MeshFile):
         given = _imprinted(scene, coarse) if realised is None else realised[:3]
+        given = split_at_part_ends(scene, *given)
         return open_cut(*refine_uniformly(*given, times=level)), coarse.size / 2**level
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)
