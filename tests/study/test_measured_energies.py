@@ -17,6 +17,7 @@ from verify.assess.motion_account import motion_account
 from verify.compare.hooke import law_of
 from verify.compare.lumping import lumped_shares, lumping_range, nodal_weights
 from verify.compare.simplices import simplices
+from verify.conformance import scenes
 from verify.result import Verdict
 from verify.scene import Scene
 from verify.scene.loading import load_scene
@@ -164,3 +165,44 @@ def test_a_hidden_loss_of_three_thousandths_fails_the_prestrained_bar():
     assert found.verdicts[1].observed == pytest.approx(0.003, rel=0.1)
     assert not found.warnings  # it is below what is warned of, and named in the notes
     assert "kinetic by 0.003" in found.solves[1].notes["ledger"]
+
+
+def swinging(**changes):
+    """Give the scene of the suite that swings under its weight other parts."""
+    content = scenes.swinging().model_dump(mode="json", by_alias=True)
+    analysis = {**content["analysis"], **changes.pop("analysis", {})}
+    return Scene.model_validate(content | {"analysis": analysis} | changes)
+
+
+@pytest.mark.parametrize("kinematics, factor", [("linear", 1.0), ("corotational", 10.0)])
+def test_what_damping_takes_is_known_from_its_rate_at_the_output_times(kinematics, factor):
+    """Half as much kinetic energy again that hides in damping is seen; the true loss is kept."""
+    case = swinging(
+        analysis={"damping": [0.05, 0.03], "kinematics": kinematics},
+        loads=[{"kind": "gravity", "acceleration": [0.02 * factor, -0.01 * factor]}],
+    )
+    honest = XfemSolver().solve(case, 0, 0)
+    assert honest.ledger["damping"][-1] > 0.1 * np.ptp(honest.ledger["gravity"])
+    check = {**DRIFT, "at_most": 5e-3}  # outputs twenty to a period of the lowest mode
+    assert verdict_of(case, honest, check) is Verdict.PASS
+    found, _ = energies_of(case, honest)
+    mismatch = found["ledger_mismatch"]
+    assert mismatch.value <= mismatch.uncertainty + 1e-5
+    for part in ("damping", "work_of_supports", "kinetic"):
+        assert verdict_of(case, hidden(honest, 1.5, part), check) is Verdict.FAIL
+
+
+def test_the_work_of_supports_that_move_is_a_word_and_no_verdict_rests_on_it():
+    moved = {"where": "bottom", "displacement": [0.05, 0.0], "history": [[0.0, 0.0], [4.0, 1.0]]}
+    case = swinging(supports=[moved])
+    honest = XfemSolver().solve(case, 0, 0)
+    liar = hidden(honest, 1.5, "work_of_supports")
+    for one in (honest, liar):
+        assert verdict_of(case, one) is Verdict.UNDECIDED
+        found, notes = energies_of(case, one)
+        word = np.ptp(one.ledger["work_of_supports"])
+        assert found["energy_drift"].uncertainty > 0.9 * word / np.ptp(one.ledger["gravity"]) > 0.01
+        assert "is the solver's word" in notes["work_of_supports"]
+    held = swinging()
+    still = hidden(XfemSolver().solve(held, 0, 0), 1.5, "work_of_supports")
+    assert verdict_of(held, still) is Verdict.FAIL  # supports that stand still do no work

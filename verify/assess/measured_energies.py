@@ -145,8 +145,8 @@ def _damped(scene: Scene, solution: Solution, law: Law, inertia: Inertia) -> tup
     """Energy (t,) that Rayleigh damping took, and its half-width, J.
 
     Its rate is α v·Mv + β v·Kv, never negative, at the output times. Between them it is taken as a
-    line; the half-width is what a cubic spline through the same rates differs by, all of what a
-    line makes it with less than four.
+    cubic spline; the half-width is what lines between the same rates differ by, with less than four
+    output times all of it.
     """
     mass, stiffness = scene.analysis.damping
     rate = 2.0 * mass * inertia.kinetic
@@ -158,12 +158,16 @@ def _damped(scene: Scene, solution: Solution, law: Law, inertia: Inertia) -> tup
             for u, v in zip(solution.displacement, solution.velocity, strict=True)
         ])  # fmt: skip
     times = solution.times
-    steps = 0.5 * np.diff(times) * (rate[1:] + rate[:-1])
-    off = steps
+    lines = steps = _between(times, rate)
+    off = np.abs(lines)
     if len(times) > 3:
-        whole = CubicSpline(times, rate).antiderivative()
-        off = np.abs(steps - np.diff(whole(times)))
-    width = np.concatenate([[0.0], np.cumsum(off)]) + 2.0 * mass * np.concatenate(
-        [[0.0], np.cumsum(0.5 * np.diff(times) * (inertia.width[1:] + inertia.width[:-1]))]
-    )
-    return np.concatenate([[0.0], np.cumsum(steps)]), width
+        steps = np.diff(CubicSpline(times, rate).antiderivative()(times))
+        off = np.abs(steps - lines)
+    off += 2.0 * mass * _between(times, inertia.width)
+    return np.concatenate([[0.0], np.cumsum(steps)]), np.concatenate([[0.0], np.cumsum(off)])
+
+
+def _between(times: Array, rate: Array) -> Array:
+    """Integrals (t − 1,) of a rate that is a line between output times."""
+    steps: Array = 0.5 * np.diff(times) * (rate[1:] + rate[:-1])
+    return steps
