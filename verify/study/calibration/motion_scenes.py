@@ -53,7 +53,7 @@ def bar(random: Random) -> Content:
     at, strain = float(random.uniform(0.3, 0.7)), float(random.uniform(0.005, 0.02))
     run = float(random.uniform(0.7, 2.4)) * (min(at, 1 - at) if cut else _LENGTH)
     points = [float(random.uniform(*span)) for span in ((0.05, at - 0.05), (at + 0.05, 0.95))]
-    shares = random.uniform(0.3, 1.0, 4).tolist()
+    shares = random.choice([0.4, 0.6, 0.8, 1.0], 4, replace=False).tolist()  # output times
     sides = ["bottom", "top", *(["front", "back"] if dimension == 3 else [])]
     across = {"bottom": "yz"[dimension - 2], "top": "yz"[dimension - 2], "front": "y", "back": "y"}
     area = float(np.prod(upper[1:]))
@@ -65,7 +65,7 @@ def bar(random: Random) -> Content:
         "mesh": {"cells": [[8, *[1] * (dimension - 1)]]},
         "material": {"young": _YOUNG, "poisson": poisson, "density": _DENSITY,
                      **({"plane": "strain"} if dimension == 2 else {})},
-        "analysis": {"kind": "dynamic", "duration": run / speed, "outputs": 4},
+        "analysis": {"kind": "dynamic", "duration": run / speed, "outputs": 6},
         "supports": [
             {"where": "left", "components": ["x"], "displacement": [0.0]},
             *({"where": s, "components": [across[s]], "displacement": [0.0]} for s in sides),
@@ -115,13 +115,16 @@ def _across(at: float, upper: list[float]) -> Content:
     return {"kind": "polygon", "points": corners}
 
 
-def sudden_factor(pressure: float, poisson: float, time: float) -> float:
-    """K_I of a half-infinite crack a time (s) after a pressure begins to act on its faces, Pa √m.
+def sudden_factor(mode: str, stress: float, poisson: float, time: float) -> float:
+    """K of a half-infinite crack a time (s) after a stress begins to act on its faces, Pa √m.
 
-    L. B. Freund, Dynamic Fracture Mechanics (1990), section 2.5; plane strain, E = ρ = 1.
+    L. B. Freund, Dynamic Fracture Mechanics (1990), sections 2.4 to 2.6; plane strain, E = ρ = 1.
     """
-    speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
-    return 2 * pressure * sqrt((1 - 2 * poisson) * speed * time / np.pi) / (1 - poisson)
+    if mode == "I":
+        speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
+        return 2 * stress * sqrt((1 - 2 * poisson) * speed * time / np.pi) / (1 - poisson)
+    speed = sqrt(0.5 / (1 + poisson))
+    return 2 * stress * sqrt(2 * speed * time / np.pi / (1 - poisson))
 
 
 def sudden_crack(random: Random) -> Content:
@@ -130,19 +133,21 @@ def sudden_crack(random: Random) -> Content:
     Each end is that of a half-infinite crack until a pressure wave has come from the other one;
     the boundary is farther.
     """
-    poisson, angle = float(random.uniform(0.0, 0.4)), float(random.uniform(-45.0, 45.0))
+    poisson = float(random.uniform(0.0, 0.4))
+    angle = float(random.uniform(15.0, 45.0) * random.choice([-1.0, 1.0]))
     speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
     middle = np.array([1.5, 1.2]) + random.uniform(-0.1, 0.1, 2)
     ahead = 0.5 * np.array([cos(radians(angle)), sin(radians(angle))])
     duration = float(random.uniform(0.6, 0.95)) / speed
-    pressure = cos(radians(angle)) ** 2
+    normal, shear = cos(radians(angle)) ** 2, cos(radians(angle)) * sin(radians(angle))
     quantities, values = [], {}
     for end in ("start", "end"):
         for k, share in enumerate((float(random.choice([0.5, 0.75])), 1.0)):  # output times
-            name, time = f"K_I {k} at the {end}", share * duration
-            quantities.append({"kind": "stress_intensity", "name": name, "end": end, "mode": "I",
+            mode, time = str(random.choice(["I", "II"])), share * duration
+            name = f"K_{mode} {k} at the {end}"
+            quantities.append({"kind": "stress_intensity", "name": name, "end": end, "mode": mode,
                                "time": time})  # fmt: skip
-            values[name] = sudden_factor(pressure, poisson, time)
+            values[name] = sudden_factor(mode, normal if mode == "I" else shear, poisson, time)
     return {
         "title": "sudden crack",
         "requirement": "The stated uncertainty of the reference shall cover its true error.",
