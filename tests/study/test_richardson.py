@@ -251,4 +251,4 @@ def test_bounds_hold_for_the_limit_of_a_sequence_and_fall_with_the_level():
 @pytest.mark.parametrize("finest", [1.0, -1.0])
 def test_the_bound_of_the_finest_level_is_its_own_half_width(finest):
     metrics = {"u": {"values": [1.3, 1.1, finest], "uncertainty": 0.02}}
-    assert time_to_accuracy(LEVELS, metrics)["level 2"]["u"] == pytest.approx(0.02)
+    assert time_to_accuracy(LEVELS, metrics)["level 2"]["u"] == pytest.approx(0.02 / 0.98)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from verify.assess.changed_scenes import at_rest, with_kinematics
+from verify.assess.intervals import quotient_half_width
 from verify.assess.reference import compared_size, conforming_reference
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
@@ -112,18 +113,11 @@ def _differences(
         )
         if rich == 0.0:
             continue
-        found.append((asked.name, _relative(poor, poor_width, rich, width)))
+        share = quotient_half_width(poor - rich, poor_width + width, rich, width)
+        found.append((asked.name, (abs(poor - rich) / abs(rich), share)))
     if not found:
         raise UnsupportedSceneError("no quantity of the case is known of both")
     return sorted(found, key=lambda row: -row[1][0])
-
-
-def _relative(poor: float, poor_width: float, rich: float, width: float) -> tuple[float, float]:
-    """Difference over the richer value, and how much larger it can be: that one divides too."""
-    error, least = abs(poor - rich) / abs(rich), abs(rich) - width
-    if least <= 0.0:
-        return error, np.inf
-    return error, (abs(poor - rich) + poor_width + width) / least - error
 
 
 def _share(error: float, width: float) -> str:

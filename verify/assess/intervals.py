@@ -54,6 +54,12 @@ def error_interval(metric: Metric) -> Interval:
     return Interval(*metric.relative_distance())
 
 
+def quotient_half_width(part: float, width: float, whole: float, whole_width: float) -> float:
+    """Half-width of part/whole where both are uncertain; infinite where the whole may be 0."""
+    least = abs(whole) - whole_width
+    return (abs(part) + width) / least - abs(part / whole) if least > 0.0 else inf
+
+
 def reference_share(metric: Metric) -> float | None:
     """Half-width of the reference over the error that it judges.
 

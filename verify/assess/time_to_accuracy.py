@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
+from verify.assess.intervals import quotient_half_width
 from verify.solution import Solution
 
 
@@ -52,4 +53,5 @@ def _bound(
     here, finest = values[place], values[-1]
     if here is None or not finest:
         return None
-    return (abs(here - finest) + half_width) / abs(finest)
+    apart = here - finest
+    return abs(apart / finest) + quotient_half_width(apart, half_width, finest, half_width)

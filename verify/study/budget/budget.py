@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.assess.error_history import mean_over
+from verify.assess.intervals import quotient_half_width
 from verify.compare.body import AnyBody
 from verify.compare.error_norm import ErrorNorm, displacement_error, energy_error
 from verify.compare.hooke import Hooke, Law
@@ -252,12 +253,15 @@ def _of_norm(name: str, chain: Sequence[Answer], found: Distances) -> Budget:
 
 def _of_quantity(name: str, unit: str, chain: Sequence[Answer]) -> Budget:
     values = [answer.quantities[name] for answer in chain]
-    scale = abs(values[0][0])
+    whole, half = values[0]
+    scale = abs(whole) if abs(whole) > half else 0.0
 
     def part(source: str, a: tuple[float, float], b: tuple[float, float]) -> Part:
         if not scale:  # absolute values: how small they are is not known
             return Part(source, b[0] - a[0], a[1] + b[1])
-        return _part(source, (b[0] - a[0]) / scale, (a[1] + b[1]) / scale)
+        apart = b[0] - a[0]
+        width = quotient_half_width(apart, a[1] + b[1], whole, half)
+        return _part(source, apart / scale, width)
 
     parts = [
         part(answer.change, a, b)
@@ -266,7 +270,7 @@ def _of_quantity(name: str, unit: str, chain: Sequence[Answer]) -> Budget:
     total = part("total", values[0], values[-1])
     left = sum(p.value for p in parts) - total.value
     closes = bool(abs(left) <= 1e-12 * max(1.0, abs(total.value)))
-    notes = [] if values[0][0] else ["the quantity is zero in the user's problem: absolute values"]
+    notes = [] if scale else ["the quantity may be zero in the user's problem: absolute values"]
     return Budget(name, unit, scale or 1.0, parts, total, closes, notes)
 
 
