@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.inside_out import Orientation, place_text
 from reference.space import ConformingSpace
 from reference.strain_equations import StrainEquations
 from verify.scene import Material
@@ -17,7 +18,8 @@ Energy = Literal[
     "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
 ]
 _SMALLEST_STEP = 1e-4
-_MOST_STEPS = 100  # taken or refused: a path in smaller ones has met what no mesh resolves
+# of a path; one in smaller steps has met what no mesh resolves
+_MOST = {"accepted steps": 100, "refused steps": 50, "Newton iterations": 1000}
 _SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
 _FINER = 2.7  # steps of a second path: another, but no multiple of the first
 _SAME = 1e-6  # of the energy, between two paths
@@ -33,11 +35,11 @@ class LargeStrainSolve:
         At the nodes of the space, m; the same on every rank.
     strain_energy : float
         J; in the plane per metre of thickness.
-    smallest_jacobian : float
-        Least det F at the quadrature points.
-    inverted : float
-        Share of the body where det F is not positive: at most 1e-3 with the corotated energy,
-        with a pressure or not, none with the others.
+    orientation : Orientation
+        Least det F and where it is not positive: with the corotated energy, with a pressure or not,
+        in at most 1e-3 of the body around singular places; nowhere with the others.
+    method : str
+        Solvers of the nonlinear and of the linear systems.
     iterations : int
         Newton iterations in all steps together.
     steps : int
@@ -57,8 +59,8 @@ class LargeStrainSolve:
 
     displacement: Array
     strain_energy: float
-    smallest_jacobian: float
-    inverted: float
+    orientation: Orientation
+    method: str
     iterations: int
     steps: int
     refused_steps: list[str]
@@ -123,7 +125,7 @@ def solve_large_strain(
     least = min(one.strain_energy, two.strain_energy)
     if abs(one.strain_energy - two.strain_energy) <= _SAME * abs(least):
         # where cells are inside out the energy has kinks, and a tangent says little
-        if two.negative_modes and not two.inverted:
+        if two.negative_modes and not two.orientation.share:
             raise RuntimeError(
                 f"two paths end in an unstable equilibrium, of {found} with {two.negative_modes} "
                 "modes in which the energy falls; a stable one is expected. Supports or loads that "
@@ -166,18 +168,24 @@ def _follow(
         equations.solution.x.scatter_forward()
         refused.append(f"at {target:.4g}: {reason}")
         step *= 0.5
-        if step < _SMALLEST_STEP:
-            raise RuntimeError(f"no equilibrium beyond load factor {factor:.4g}: {refused[-1]}")
-        if steps + len(refused) >= _MOST_STEPS:
+        counts = (steps, len(refused), equations.iterations)
+        spent = any(count >= most for count, most in zip(counts, _MOST.values(), strict=True))
+        if spent or step < _SMALLEST_STEP:
+            state = equations.orientation()
+            of = ", ".join(
+                f"{n} of {m} {w}" for n, (w, m) in zip(counts, _MOST.items(), strict=True)
+            )
             raise RuntimeError(
-                f"no equilibrium beyond load factor {factor:.4g} in {_MOST_STEPS} steps, of which "
-                f"{len(refused)} were refused, the last {refused[-1]}. Edges held or pulled in "
-                "part, whose strains in compression have no bound, may lead there"
+                f"no equilibrium beyond load factor {factor:.4g}: {refused[-1]}. "
+                f"{'A limit of the path is reached' if spent else 'Steps get no smaller'}: {of}. "
+                f"Before that, det F is {state.least:.3g} or more, least at "
+                f"{place_text(state.place)}"
             )
     result = LargeStrainSolve(
         equations.displacement(),
         equations.energy(),
-        *equations.jacobian(),
+        equations.orientation(),
+        equations.method,
         equations.iterations,
         steps,
         refused,

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from reference.dolfinx_versions import take_whole_steps
 from reference.elasticity import mean_stiffness
+from reference.inside_out import OrientationCheck, place_text
 from reference.linear_solvers import (
     modes_not_positive,
     near_null_space,
@@ -31,9 +32,10 @@ _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the
 # whose own scale ‖K u‖ is nothing else
 _ROUND_OFF = 1e-14
 _GOOD_ENOUGH = 1e-8  # of the force scale, where round-off does not let the residual fall further
+_STAGNANT = 0.5  # of the residual of the iteration before, at round-off
+_DIVERGED = 1e4  # of the first residual or of the force scale
 _MOST_ITERATIONS = 25
-# share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
-# clamped corner its strains are unbounded, so that a well graded mesh always has such cells there
+# share of the body that may be inside out at singular places
 _INVERTED = {"corotated": 1e-3, "corotated_mixed": 1e-3}  # none with the others
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
@@ -60,6 +62,10 @@ class StrainEquations:
     Attributes
     ----------
     solution : dolfinx.fem.Function
+    orientation : OrientationCheck
+        Of the solution.
+    method : str
+        Solvers of the nonlinear and of the linear systems.
     iterations : int
         Newton's so far.
     """
@@ -110,11 +116,12 @@ class StrainEquations:
             tension = thickness * self._tension * mu
             tangent += tension * polar.across(ufl.TrialFunction(V), v) * polar.measure
         self._tangent = fem.form(tangent)
-        self._jacobian = fem.Expression(polar.J, quadrature_points(space))
+        self.orientation = OrientationCheck(space, unknowns, polar.J, quadrature_points(space))
         self._matrix: Any = petsc.create_matrix(self._tangent)
         self._vector = self.solution.x.petsc_vec.duplicate()
         self._increment = self._vector.duplicate()
         self._force = self._diagonal = 0.0
+        self._first_residual = self._residual_before = np.inf
         self._solver = self._newton()
         self._unproven = self._solver.getKSP().getType() == "preonly"
 
@@ -146,25 +153,58 @@ class StrainEquations:
         rests = bool(x.comm.tompi4py().allreduce(int(rests)) == x.comm.size)
         self._factor.value = np.asarray(target)
         self._predict(values[self._at])
-        # no step so small that it would count as converged: a line search that fails takes such
-        limit, solver = _TOLERANCE * self._force, self._solver
-        solver.setTolerances(atol=limit, rtol=0.0, stol=0.0, max_it=_MOST_ITERATIONS)
+        solver = self._solver
         solver.solve(None, x)
         self._take(x)
         self.iterations += solver.getIterationNumber()
         reason = solver.getConvergedReason()
-        lost = _ROUND_OFF * abs(self._diagonal) * float(np.linalg.norm(self.displacement()))
-        if reason <= 0 and not solver.getFunctionNorm() <= max(_GOOD_ENOUGH * self._force, lost):
+        if reason <= 0 and not solver.getFunctionNorm() <= self._round_off():
             from petsc4py import PETSc
 
             names = vars(PETSc.SNES.ConvergedReason)
             words = [n for n, value in names.items() if value == reason and n.isupper()]
             return f"SNES {words[0].lower() if words else reason}"
-        least, inverted = self.jacobian()
-        if not inverted <= self._most_inverted:
-            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
-            return f"{inverted:.2g} of the {part} turned inside out (least det F {least:.2g})"
+        if lost := self._inside_out():
+            return lost
         return self._imbalance(stored, before, moved, is_short or rests)
+
+    def _inside_out(self) -> str:
+        """Say where a state is turned inside out that must not be; or nothing."""
+        found = self.orientation()
+        if found.stray:
+            return (
+                f"{found.stray}, away from tips, corners and ends of supports: the body is turned "
+                "inside out there; expected det F > 0, so a smaller load or a finer mesh"
+            )
+        if found.share > self._most_inverted:
+            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
+            return (
+                f"{found.share:.2g} of the {part} is turned inside out, with a least det F of "
+                f"{found.least:.2g} at {place_text(found.place)}; at most {self._most_inverted:g} "
+                "may be"
+            )
+        return ""
+
+    def _judge(self, _snes: Any, iteration: int, norms: tuple[float, float, float]) -> Any:
+        """Give PETSc's reason to end the iterations: balance up to round-off, or divergence."""
+        from petsc4py import PETSc
+
+        reasons, residual, before = PETSc.SNES.ConvergedReason, norms[2], self._residual_before
+        self._residual_before = residual
+        if iteration == 0:
+            self._first_residual, before = residual, np.inf
+        if residual <= _TOLERANCE * self._force:
+            return reasons.CONVERGED_FNORM_ABS
+        if residual > _STAGNANT * before and residual <= self._round_off():
+            return reasons.CONVERGED_FNORM_ABS
+        if residual > _DIVERGED * max(self._first_residual, self._force):
+            return reasons.DIVERGED_DTOL
+        return reasons.ITERATING
+
+    def _round_off(self) -> float:
+        """Residual, in N, that may be left where round-off does not let it fall."""
+        lost = _ROUND_OFF * abs(self._diagonal) * float(np.linalg.norm(self.displacement()))
+        return max(_GOOD_ENOUGH * self._force, lost)
 
     def _imbalance(self, stored: float, before: Array, moved: Array, may_lose: bool) -> str:
         """Say that the energy is not what was stored and the work since a state; or nothing."""
@@ -217,23 +257,6 @@ class StrainEquations:
 
         comm = self._space.function_space.mesh.comm
         return float(comm.allreduce(float(np.real(fem.assemble_scalar(self._energy)))))
-
-    def jacobian(self) -> tuple[float, float]:
-        """Give the least det F, and the share of the body where it is not positive."""
-        from mpi4py import MPI
-
-        space = self._space
-        domain, d = space.function_space.mesh, space.mesh.cell_dimension
-        volumes = space.measures
-        here = np.flatnonzero(space.dolfinx_cell >= 0)
-        cell_of = np.empty(len(here), dtype=np.int64)
-        cell_of[space.dolfinx_cell[here]] = here
-        own = domain.topology.index_map(d).size_local
-        values = self._jacobian.eval(domain, np.arange(own, dtype=np.int32)).reshape(own, -1)
-        share = np.count_nonzero(~(values > 0), axis=1) / max(values.shape[1], 1)
-        inverted = domain.comm.allreduce(float(share @ volumes[cell_of[:own]]))
-        least = domain.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
-        return float(least), float(inverted / volumes.sum())
 
     def destroy(self) -> None:
         """Free what PETSc holds."""
@@ -327,9 +350,12 @@ class StrainEquations:
 
         space, matrix = self._space, self._matrix
         solver = PETSc.SNES().create(matrix.comm)
-        solver.setType("newtonls")  # with backtracking, unless told otherwise
-        if self._tension is not None:  # what is slack is overshot at first, and comes back from it
-            take_whole_steps(solver)
+        solver.setType("newtonls")
+        # Turned by the linear response, a slender part is stretched by the square of the angle: the
+        # residual rises by orders of magnitude before it falls, and a slack membrane is overshot.
+        take_whole_steps(solver)
+        solver.setTolerances(max_it=_MOST_ITERATIONS)
+        solver.setConvergenceTest(self._judge)
         solver.setFunction(self._assemble_residual, self._vector.duplicate())
         solver.setJacobian(self._assemble_tangent, matrix)
         linear = solver.getKSP()
@@ -340,12 +366,14 @@ class StrainEquations:
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
             linear.getPC().setFactorSolverType("mumps")
+            self.method = "PETSc SNES, MUMPS Cholesky"
             return solver
         matrix.setNearNullSpace(near_null_space(matrix, space))
         set_multigrid(linear)
         linear.setType("gmres")
         linear.setGMRESRestart(100)
         linear.setTolerances(rtol=_LINEAR, atol=0.0, max_it=400)
+        self.method = "PETSc SNES, GMRES with GAMG"
         return solver
 
 

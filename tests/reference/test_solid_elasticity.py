@@ -288,7 +288,7 @@ found = solve_large_strain(
     scene.material, space, constrained_values(scene, space, None)[0],
     lambda factor: constrained_values(scene, space, None, factor)[1],
     lambda v: load_form(scene, space, v, None))
-answer = [found.strain_energy, found.smallest_jacobian, float(np.linalg.norm(found.displacement))]
+answer = [found.strain_energy, found.orientation.least, float(np.linalg.norm(found.displacement))]
 """
 
 

@@ -12,6 +12,7 @@ from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_of
 from reference.fracture.pressure import MIXED
+from reference.inside_out import place_text
 from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.linear_system import linear_system
 from reference.meshing import ConformingMesh
@@ -254,11 +255,14 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             lambda v: load_form(scene, space, v, exact),
             "corotated_mixed" if pressure else "corotated",
         )
+    state = finite.orientation
     notes = {
         "unknowns": MIXED if pressure else "displacement",
-        "linear solver": "PETSc SNES, MUMPS Cholesky",
-        "smallest det F": f"{finite.smallest_jacobian:.3g}",
-        "area inside out": f"{finite.inverted:.1e}",
+        "linear solver": finite.method,
+        "smallest det F": f"{state.least:.3g}",
+        "smallest det F at": place_text(state.place),
+        "area inside out": f"{state.share:.1e}",
+        "inside out up to": f"{state.reach:.2g} m from a tip, a corner or the end of a support",
         "steps taken again": "; ".join(finite.refused_steps) or "none",
         "stability": _stability(finite),
     }
