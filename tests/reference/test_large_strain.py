@@ -1,10 +1,18 @@
 """Finite rotation and strain: patches, bending to half circles, loads that follow no rotation."""
 
+from functools import partial
+
 import numpy as np
 import pytest
+import scenes
 from large_bodies import lame, on_ends, rolled, solve, space_of, turn
 from reference_scenes import needs_fenicsx, polyline, square
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+from reference import strain_equations
+from reference.inside_out import singular_nodes
+from verify.assess.richardson import field_uncertainty
 from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx
@@ -112,3 +120,170 @@ def test_a_load_beyond_any_equilibrium_says_how_far_it_came_and_why():
     with pytest.raises(RuntimeError, match=r"no equilibrium beyond load factor 0\.\d+: at 0\.\d+"):
         # pressed to nothing and through itself
         solve(space, on_ends(space), lambda f: -1.5 * f * space.node_points * [0, 1])
+
+
+def elastica(load):
+    """Tip (x, y) of a cantilever of length 1 under the dead end load PL²/EI across it.
+
+    From θ'² = 2 PL²/EI (sin θ₁ − sin θ), θ₁ the angle of the tip (Bisshopp and Drucker, Quart.
+    Appl. Math. 3, 1945, 272), with m = (1 + sin θ₁)/2.
+    """
+
+    def parts(m):
+        begin = np.arcsin(1 / np.sqrt(2 * m))
+        return ellipk(m) - ellipkinc(begin, m), ellipe(m) - ellipeinc(begin, m)
+
+    root = np.sqrt(load)
+    m = brentq(lambda m: parts(m)[0] - root, 0.5 + 1e-15, 1 - 1e-15, xtol=1e-16)
+    return np.array([np.sqrt(2 * (2 * m - 1) / load), 1 - 2 / root * parts(m)[1]])
+
+
+def thin(load, slenderness, young=1.2e7):
+    """A strip of length 10 m and ν = 0, clamped on the left, under PL²/EI at its right end."""
+    height = 10.0 / slenderness
+    return scenes.scene(
+        [],
+        geometry={"kind": "rectangle", "lower": [0.0, 0.0], "upper": [10.0, height]},
+        mesh={"cells": [[slenderness, 2]]},
+        material={"young": young, "poisson": 0.0, "plane": "stress"},
+        analysis={"kinematics": "corotational"},
+        supports=[{"where": "left", "displacement": [0.0, 0.0]}],
+        loads=[
+            {"kind": "traction", "where": "right",
+             "traction": [0.0, load * young / slenderness**2 / 12]},
+        ],
+    )  # fmt: skip
+
+
+def tip(load, slenderness, level):
+    """Tip of that strip by the reference, over its length; the path must be short."""
+    found = find_solver("reference").solve(thin(load, slenderness), level, repetitions=0)
+    assert found.iterations["load steps"] <= 40
+    assert found.iterations["newton"] <= 400
+    end = np.argmin(np.linalg.norm(found.points - [10.0, 5.0 / slenderness], axis=1))
+    return (found.points[end] + found.displacement[0, end] - [0.0, 5.0 / slenderness]) / 10
+
+
+@pytest.mark.parametrize("load", [2.0, 3.0, 10.0])
+def test_the_tip_of_a_thin_strip_is_that_of_the_elastica_in_few_steps(load):
+    """Shear and stretch add PL²/EI (h/L)² times a number of order one."""
+    assert tip(load, 100, 0) == pytest.approx(elastica(load), abs=load * 1e-4)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("load", [2.0, 3.0, 10.0])
+def test_a_thin_strip_tends_to_the_elastica_like_the_square_of_its_thickness(load):
+    """Quarters to 5 %, which the next power may add; half-widths to a tenth of the difference."""
+    away = []
+    for slenderness in (25, 50, 100):
+        tips = np.array([tip(load, slenderness, level) for level in range(3)])
+        away.append(tips[-1] - elastica(load))
+        differences = np.linalg.norm(np.diff(tips, axis=0), axis=1).tolist()
+        width = field_uncertainty(differences, [4.0, 2.0, 1.0], 2.0).half_width
+        assert width <= 0.1 * np.linalg.norm(away[-1])
+    assert away[0] / away[1] == pytest.approx([4.0, 4.0], rel=0.05)
+    assert away[1] / away[2] == pytest.approx([4.0, 4.0], rel=0.05)
+
+
+def test_a_thin_inclined_flap_turns_in_few_steps():
+    """A strip at an odd angle, cut lengthwise from its end; the upper lip bears PL²/EI = 10."""
+    length, slenderness, angle = 10.0, 60, 2.2
+    height, (c, s) = 2 * length / slenderness, (np.cos(angle), np.sin(angle))
+    turned = np.array([[c, s], [-s, c]])
+    corners = np.array([[0, 0], [length, 0], [length, height], [0, height]]) @ turned
+    cut = np.array([[0.15 * length, 0.47 * height], [1.02 * length, 0.53 * height]]) @ turned
+    along, across = f"{c} * x + {s} * y", f"{-s} * x + {c} * y"
+    load = 10.0 / slenderness**2 / 12
+    scene = scenes.scene(
+        [polyline("cut", *cut.tolist())],
+        geometry={"kind": "polygon", "corners": corners.tolist()},
+        mesh={"pattern": "unstructured", "sizes": [height / 3]},
+        material={"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        analysis={"kinematics": "corotational"},
+        supports=[{"where": f"{along} < 1e-6", "displacement": [0.0, 0.0]}],
+        loads=[
+            {"kind": "traction", "traction": [-s * load, c * load],
+             "where": f"{along} > {length - 1e-6} and {across} > {0.53 * height}"},
+        ],
+    )  # fmt: skip
+    found = find_solver("reference").solve(scene, 0, repetitions=0)
+    assert np.abs(found.displacement).max() > 0.5 * length
+    assert found.iterations["load steps"] <= 40
+    assert found.iterations["newton"] <= 400
+
+
+def end_load(force, length, v):
+    """Dead load at the end x = length of a body."""
+    import ufl
+
+    x = ufl.SpatialCoordinate(ufl.domain.extract_unique_domain(v))
+    at_end = ufl.conditional(ufl.gt(x[0], length * (1 - 1e-9)), 1.0, 0.0)
+    return at_end * ufl.inner(ufl.as_vector(force), v) * ufl.ds
+
+
+def slender_block(**parameters):
+    """A block of 1 × 0.03 × 0.03 under a dead load askew at its end, PL²/EI = 6, ν = 0."""
+    space = space_of(2, (16, 1, 1), upper=(1.0, 0.03, 0.03))
+    across = 6.0 * 0.03**2 / 12 * np.array([0.0, 0.8, 0.6])
+    held = space.node_points[:, 0] < 1e-12
+    still = np.zeros_like(space.node_points)
+    load = partial(end_load, across, 1.0)
+    found = solve(space, held, lambda _: still, poisson=0.0, load=load, **parameters)
+    end = space.node_points[:, 0] > 1 - 1e-12
+    return found, found.displacement[end].mean(axis=0)
+
+
+def test_a_slender_block_turns_in_few_steps_along_its_load():
+    """Its section has no axis of its own: the plane of the elastica is that of the load."""
+    found, moved = slender_block()
+    assert found.steps <= 40
+    assert found.iterations <= 400
+    plane = moved @ np.array([[1.0, 0.0], [0.0, 0.8], [0.0, 0.6]])
+    assert moved @ [0.0, 0.6, -0.8] == pytest.approx(0.0, abs=1e-3)
+    # shear and stretch: of the order of PL²/EI (h/L)², and the error of the coarse mesh
+    assert plane == pytest.approx(elastica(6.0) - [1.0, 0.0], abs=6 * 0.03**2)
+    slowly, _ = slender_block(first_step=0.1)
+    assert slowly.steps > found.steps
+    assert found.strain_energy == pytest.approx(slowly.strain_energy, rel=1e-9)
+
+
+def test_the_record_names_the_solver_that_ran(monkeypatch):
+    assert slender_block()[0].method == "PETSc SNES, MUMPS Cholesky"
+    monkeypatch.setattr(strain_equations, "_MOST_DIRECT", 0)
+    space = space_of(1, (3, 3, 3))
+    found = solve(space, on_ends(space), lambda f: 0.1 * f * space.node_points * [0, 1, 0])
+    assert found.method == "PETSc SNES, GMRES with GAMG"
+
+
+def test_a_body_turned_inside_out_away_from_singular_places_is_refused_with_the_place():
+    """A traction of twice Young's modulus on a thirtieth of a smooth edge folds what is below."""
+    scene = square(
+        mesh={"cells": [[64, 8]]},
+        material={"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        supports=[{"where": "bottom", "displacement": [0, 0]}],
+        loads=[
+            {"kind": "traction", "where": "y > 1 - 1e-9 and x > 0.4837 and x < 0.5173",
+             "traction": [0.2, -2.0]},
+        ],
+        analysis={"kinematics": "corotational"},
+        reference={"size": 0.1},
+    )  # fmt: skip
+    with pytest.raises(RuntimeError, match=r"det F is -\S+ at \(0\.5\d*, 0\.9\d*\), away"):
+        find_solver("reference").solve(scene, 0, repetitions=0)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_singular_places_are_tips_and_ends_of_supports(d):
+    """Of an edge cut, and of a support over half of a face, in the plane and in space."""
+    line, plane = (
+        [(-1, 0.5), (0.5, 0.5)],
+        [(-1, 0.5, -1), (0.5, 0.5, -1), (0.5, 0.5, 2), (-1, 0.5, 2)],
+    )
+    space = space_of(1, (4,) * d, cuts=[line if d == 2 else plane])
+    x, y = space.node_points.T[:2]
+    held = np.repeat((y == 0.0) & (x <= 0.5), d)
+    nodes = singular_nodes(space, np.flatnonzero(held).astype(np.int32))
+    places = np.unique(space.node_points[nodes][:, :2], axis=0).tolist()
+    # the support ends at the free faces beside it too: in space all along them
+    beside = [[0.0, 0.0]] if d == 2 else [[0.0, 0.0], [0.25, 0.0]]
+    assert places == [*beside, [0.5, 0.0], [0.5, 0.5]]
