@@ -84,13 +84,14 @@ class OrientationCheck:
         space, own = self._space, self._own
         domain = space.function_space.mesh
         cells = np.arange(len(own), dtype=np.int32)
-        values = self._determinant.eval(domain, cells).reshape(len(own), -1)
+        found = self._determinant.eval(domain, cells)
+        values = np.asarray(found, dtype=float).reshape(len(own), -1)
         least = values.min(axis=1, initial=np.inf)
         share = np.count_nonzero(~(values > 0), axis=1) / max(values.shape[1], 1)
         out = np.flatnonzero(share)
         away = self._distances(own[out])
         stray = out[away > ZONE * float(np.ptp(space.node_points, axis=0).max())]
-        found = domain.comm.allgather(
+        all_ranks = domain.comm.allgather(
             (
                 self._worst(least, np.arange(len(own))),
                 self._worst(least, stray),
@@ -98,7 +99,7 @@ class OrientationCheck:
                 float(away.max(initial=0.0)),
             )
         )
-        worst, strays, shares, reaches = zip(*found, strict=True)
+        worst, strays, shares, reaches = zip(*all_ranks, strict=True)
         value, place = min(worst)
         lost, where = min(strays)
         whole = float(space.measures.sum())
