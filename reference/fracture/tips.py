@@ -81,6 +81,8 @@ def no_tip(scene: Scene, name: str, end: End) -> str | None:
     # where more than its own end ends, branches meet
     if ending > 1 or min(away)[0] <= touching:
         return f"{said} it meets another cut"
+    if any(f.distance(point[None])[0] <= touching for f in plane_interfaces(scene)):
+        return f"{said} it is on an interface between materials"
     return None
 
 

@@ -1,5 +1,6 @@
 """Placement of cuts: in the body, as expected, not on each other; and of what lies on them."""
 
+from collections.abc import Callable
 from itertools import combinations
 from typing import Any
 
@@ -110,8 +111,16 @@ def _common_arc(a: ArcCut, b: ArcCut) -> float:
     return length if length > tolerance else 0.0
 
 
-def check_points(scene: SceneTables) -> None:
-    """Raise ValueError if a quantity is asked for where there is no material, or two values."""
+def check_points(
+    scene: SceneTables, size: float | None = None, holds: Callable[[Array], bool] | None = None
+) -> None:
+    """Raise ValueError if a quantity is asked for where there is no material, or two values.
+
+    Of a body from a mesh file its `size`, m, must be given, and whether it `holds` a point (d,).
+    """
+    size = _body_size(scene) if size is None else size
+    if size is None:
+        return
     for i, asked in enumerate(scene.quantities):
         if isinstance(asked, PartQuantity) and asked.point is None:
             continue
@@ -126,15 +135,12 @@ def check_points(scene: SceneTables) -> None:
         else:
             continue
         where = f"{place} ({', '.join(f'{x:.6g}' for x in point)})"
-        _check_point(scene, asked, point, where)
+        if not (holds(point) if holds else _holds(scene, point, _TOLERANCE * size)):
+            raise ValueError(f"{where}, which is not in the body")
+        _check_cuts_at(scene, asked, point, where, size)
 
 
-def _check_point(scene: SceneTables, asked: Any, point: Array, where: str) -> None:
-    size = _body_size(scene)
-    if size is None:
-        return
-    if not _holds(scene, point, _TOLERANCE * size):
-        raise ValueError(f"{where}, which is not in the body")
+def _check_cuts_at(scene: SceneTables, asked: Any, point: Array, where: str, size: float) -> None:
     near = {name: d for name, d in _cut_distances(scene, point).items() if d <= _TOLERANCE * size}
     if isinstance(asked, PartQuantity) and near:
         raise ValueError(f"{where} lies on cut '{next(iter(near))}', between two parts")

@@ -1,0 +1,155 @@
+"""Cuts that no mesh follows, and cuts and places that are not in a body from a mesh file."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.runner.exact_samples import holds
+from verify.scene import Box, Polygon, Rectangle, Scene
+from verify.scene.cut_placement import check_points
+from verify.scene.planar import inner_parts
+from verify.scene.spatial import area_inside, rim_edges
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
+
+Array = NDArray[np.float64]
+
+_SHORTEST = 1e-4  # of the body: the reference puts one facet on what is shorter, and cannot open it
+_ALONG = 40  # samples of a line inside the bounding box of the body
+_NEAR = 1e-6  # of the body: on its boundary, not inside
+_METRES = 100.0  # times the body: a cut as large is not in metres, or the body is not
+
+
+def check_cuts_can_be_meshed(scene: Scene) -> None:
+    """Raise `InputError` where cuts are too short, or too close to each other or the boundary.
+
+    A cut that runs along the boundary for a part of its way is as close to it as can be.
+    """
+    from reference.meshing.features import plane_features
+    from reference.meshing.separation import check_separation
+
+    body, where = scene.geometry, str(scene.file or scene.name)
+    if not isinstance(body, Rectangle | Polygon | Box):
+        return
+    corners = np.array([body.lower, body.upper]) if isinstance(body, Box) else body.outline()
+    size = float(np.ptp(corners, axis=0).max())
+    for i, cut in enumerate(scene.final_cuts):
+        extent = _extent_inside(cut, corners)
+        if extent < _SHORTEST * size:
+            raise InputError(
+                f"cuts[{i}] ('{cut.name}'): is {extent:.3g} m long inside a body of {size:.3g} m; "
+                f"expected at least {_SHORTEST * size:.3g} m",
+                where,
+            )
+    if not isinstance(body, Box):
+        check_separation(plane_features(scene), size, where)
+
+
+def _extent_inside(cut: Any, corners: Array) -> float:
+    """Length of a cut inside a polygon (k, 2), or root of its area in a box (2, 3), m."""
+    if cut.dimension == 3:
+        return float(area_inside(cut.surface(), *corners) ** 0.5)
+    parts = inner_parts(cut.vertices(), corners)
+    return float(sum(np.linalg.norm(end - start) for start, end in parts))
+
+
+def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
+    """Raise `InputError` if cuts or quantities do not lie in the mesh of a body as they should.
+
+    As `verify.scene.cut_placement` holds them against bodies that the case itself describes; of
+    a membrane only whether a cut reaches it at all is known.
+    """
+    where = str(scene.file or scene.name)
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    size = float((high - low).max())
+    for i, cut in enumerate(scene.final_cuts):
+        place = f"cuts[{i}] ('{cut.name}')"
+        lines, corners, closed = _rim(cut)
+        if (corners.min(axis=0) > high).any() or (corners.max(axis=0) < low).any():
+            raise InputError(f"{place}: lies outside the body{_unit(corners, size)}", where)
+        if scene.cell_dimension < scene.dimension:
+            continue
+        inner, outer = _sides(mesh, lines, low, high, size)
+        kind = "through" if not inner else "edge" if outer else "inner"
+        misses = kind == "through" and not holds(mesh, corners).any()
+        if misses and not _parts(mesh, scene, i):
+            raise InputError(
+                f"{place}: lies outside the body or along its boundary; it cuts nothing"
+                f"{_unit(corners, size)}",
+                where,
+            )
+        if cut.expected and cut.expected != kind and not closed:
+            raise InputError(f"{place}: expected '{cut.expected}' but it is '{kind}'", where)
+    if scene.cell_dimension == scene.dimension:
+        steps = _NEAR * size * np.vstack([np.eye(mesh.space), -np.eye(mesh.space)])
+        try:
+            check_points(scene, size, lambda point: bool(holds(mesh, point + steps).any()))
+        except ValueError as error:
+            raise InputError(str(error), where) from None
+
+
+def _parts(mesh: SimplexMesh, scene: Scene, i: int) -> bool:
+    """Whether a cut whose rim is outside the body goes through a cell of it."""
+    try:
+        return len(cut_mesh(mesh, [cuts_of(scene, mesh.extent)[i]]).cells) > len(mesh.cells)
+    except XfemError:  # it meets the mesh
+        return True
+
+
+def _unit(corners: Array, size: float) -> str:
+    extent = float(np.abs(corners).max())
+    if extent < _METRES * size:
+        return ""
+    return f"; its coordinates reach {extent:.3g}, the body {size:.3g} m: expected both in metres"
+
+
+def _rim(cut: Any) -> tuple[Array, Array, bool]:
+    """Lines (r, 2, d) or ends (k, 1, d) at which a cut ends, its points, and whether it has none.
+
+    The ends of a cut in the plane are points, its rim in space is made of lines.
+    """
+    if cut.dimension == 3:
+        surface = cut.surface()
+        rim = rim_edges(surface)
+        return rim, surface[0], len(rim) == 0
+    line = cut.vertices()
+    closed = bool(np.array_equal(line[0], line[-1]))
+    return line[[0, -1]][:, None], line, closed
+
+
+def _sides(mesh: SimplexMesh, lines: Array, low: Array, high: Array, size: float) -> Any:
+    """Whether some points of the rim are inside the body, and whether some are not."""
+    if lines.shape[1] == 1:
+        inside = [_strictly(mesh, lines[:, 0], size)]
+        return bool(np.any(inside)), not bool(np.all(inside))
+    points, outer = [np.zeros((0, mesh.space))], False
+    for a, b in lines:
+        begin, end = _clipped(a, b, low, high)
+        outer |= begin > 0.0 or end < 1.0
+        if end > begin:
+            share = np.linspace(begin, end, max(3, _ALONG // (1 + len(lines) // 8)))[:, None]
+            points.append(a + share * (b - a))
+    found = _strictly(mesh, np.concatenate(points), size)
+    return bool(found.any()), outer or not bool(found.all())
+
+
+def _strictly(mesh: SimplexMesh, points: Array, size: float) -> NDArray[np.bool_]:
+    inside = np.ones(len(points), dtype=bool)
+    for step in _NEAR * size * np.vstack([np.eye(mesh.space), -np.eye(mesh.space)]):
+        inside &= holds(mesh, points + step)
+    return inside
+
+
+def _clipped(a: Array, b: Array, low: Array, high: Array) -> tuple[float, float]:
+    """Shares of a line between which it runs inside a box; the second is less if nowhere."""
+    way = np.where(b == a, 1e-300, b - a)
+    with np.errstate(over="ignore"):
+        one, other = (low - a) / way, (high - a) / way
+    return (
+        max(0.0, float(np.minimum(one, other).max())),
+        min(1.0, float(np.maximum(one, other).min())),
+    )
