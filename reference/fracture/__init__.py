@@ -6,6 +6,7 @@ They are computed from a `verify.solution.Solution` alone, so from any solver's.
 from reference.fracture.domain import DomainError
 from reference.fracture.front import CircularFront, Front, FrontCoordinates, StraightFront
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
+from reference.fracture.fronts import front_at, front_reach
 from reference.fracture.intensity import StressIntensity, stress_intensity
 from reference.fracture.tips import Tip, no_tip, tips
 
@@ -18,7 +19,9 @@ __all__ = [
     "StraightFront",
     "StressIntensity",
     "Tip",
+    "front_at",
     "front_intensity",
+    "front_reach",
     "no_tip",
     "stress_intensity",
     "tips",

@@ -100,8 +100,12 @@ def front_intensity(
     away = np.hypot(at.ahead, at.across)
     centres, width = _stations(front, stations)
     on = away <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
+    along = at.along[place[solution.cells[:, :4]]]
+    beside = np.ones(len(along), dtype=bool)
+    if not front.closed:  # hats are zero beyond its ends
+        beside = (along.max(axis=1) > 0.0) & (along.min(axis=1) < front.length)
     for radius in radii:
-        _check_fit(solution, place, away, radius, fitted)
+        _check_fit(solution, away[place[solution.cells[beside, :4]]], radius, fitted)
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
     nodes = place[solution.cells[within, :4]]
     force = net_force(solution, material, body_force, drag, step)
@@ -153,10 +157,8 @@ def _mean_length(front: Front, along: Array, weight: Array) -> float:
     return float(np.sum(0.5 * (w[1:] + w[:-1]) * np.diff(s)))
 
 
-def _check_fit(
-    solution: Solution, place: NDArray[np.int64], away: Array, radius: float, fitted: bool
-) -> None:
-    corner = away[place[solution.cells[:, :4]]]
+def _check_fit(solution: Solution, corner: Array, radius: float, fitted: bool) -> None:
+    """Compare a radius with the distances (c, 4) of corners of cells from the front."""
     touching = corner.min(axis=1) <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
     if not fitted:  # what reaches from within a quarter of the radius may hold the front
         touching = corner.min(axis=1) <= 0.25 * radius

@@ -1,5 +1,6 @@
 """Element sizes: uniform, or graded to the singular points of the scene."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -56,6 +57,9 @@ class Grading:
         In space: whether to grade to fronts, kinks and junctions of the cuts and to the edges
         where supports end. With exponent ⅔, where quadratic elements reach order 3 in energy
         around an edge, the unknowns grow by no more than h⁻³ (but for a logarithm).
+    fronts : sequence of (Front, float)
+        In space: fronts that a domain must fit around, each with the radius of its smallest, m.
+        There elements are as large as `share` of that radius, farther off of the distance.
     way : float, optional
         Element size along cuts that a blade makes on its way, m: the tip is everywhere there once.
         Elements grow by half of their distance from them.
@@ -69,6 +73,7 @@ class Grading:
     clear: Array | None = None
     share: float = 1 / 3
     curves: bool = False
+    fronts: Sequence[tuple[Any, float]] = ()
     way: float | None = None
 
     @property

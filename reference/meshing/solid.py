@@ -1,6 +1,7 @@
 """Meshes of boxes that conform to cut surfaces (gmsh, OpenCASCADE kernel, HXT)."""
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,8 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             graded = []
             if grading.curves:
                 graded = [*cut.singular, *_clamped(gmsh, scene, cut, lower, scale)]
-            _set_sizes(gmsh, grading, graded, cut.faces if grading.way else [], scale)
+            way = cut.faces if grading.way else []
+            _set_sizes(gmsh, grading, graded, way, lower, scale)
             gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
             gmsh.model.mesh.generate(3)
             points, cells, number = simplices(gmsh, 3)
@@ -76,9 +78,14 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
 
 
 def _set_sizes(
-    gmsh: ModuleType, grading: Grading, curves: list[int], way: list[int], scale: float
+    gmsh: ModuleType,
+    grading: Grading,
+    curves: list[int],
+    way: list[int],
+    origin: Array,
+    scale: float,
 ) -> None:
-    """Set the sizes around curves, and along faces that a blade makes on its way."""
+    """Set the sizes around curves and fronts, and along faces that a blade makes on its way."""
     size, radius, smallest = (
         value / scale for value in (grading.size, grading.radius, grading.smallest)
     )
@@ -93,9 +100,17 @@ def _set_sizes(
         law = f"{size:.17g}*(F{distance}/{radius:.17g})^{grading.exponent:.17g} + {smallest:.17g}"
         field.setString(graded, "F", law)
         terms.append(graded)
+    # factors of several modes or places have one round front
+    fronts = {(_distance(front, origin, scale), start / scale) for front, start in grading.fronts}
+    for distance_text, start in sorted(fronts):
+        around, least = field.add("MathEval"), grading.share * start
+        away = f"({distance_text})*{grading.share:.17g}"
+        field.setString(around, "F", f"0.5*({least:.17g} + {away} + abs({least:.17g} - {away}))")
+        terms.append(around)
+        smallest = min(smallest, least)
     if way and grading.way is not None:
         near = grading.way / scale
-        smallest = min(smallest, near) if curves else near
+        smallest = min(smallest, near) if curves or grading.fronts else near
         distance, graded = field.add("Distance"), field.add("MathEval")
         field.setNumbers(distance, "SurfacesList", way)
         field.setNumber(distance, "Sampling", min(_MOST_SAMPLES, 20 + 2 / near))
@@ -107,6 +122,22 @@ def _set_sizes(
         field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5 if terms else size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def _distance(front: Any, origin: Array, scale: float) -> str:
+    """Write the distance to a front, straight or round, as a gmsh expression."""
+    start = (np.asarray(front.centre if front.closed else front.start) - origin) / scale
+    off = [f"({name}-({at:.17g}))" for name, at in zip("xyz", start, strict=True)]
+    axis = np.asarray(front.normal if front.closed else np.subtract(front.end, front.start))
+    unit = axis / np.linalg.norm(axis)
+    along = "(" + "+".join(f"{o}*({u:.17g})" for o, u in zip(off, unit, strict=True)) + ")"
+    squared = "(" + "+".join(f"{o}^2" for o in off) + ")"
+    if front.closed:
+        in_plane = f"sqrt(abs({squared}-{along}^2))"
+        return f"sqrt(({in_plane}-{front.radius / scale:.17g})^2+{along}^2)"
+    length = front.length / scale
+    foot = f"(0.5*({length:.17g}+abs({along})-abs({along}-{length:.17g})))"  # clipped to it
+    return f"sqrt(abs({squared}-2*{along}*{foot}+{foot}^2))"
 
 
 def _add_lines(gmsh: ModuleType, segments: Array) -> list[int]:

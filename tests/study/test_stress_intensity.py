@@ -1,5 +1,6 @@
 """Stress-intensity factors as quantities of interest, in the plane and along fronts."""
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -19,6 +20,7 @@ from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solution import Solution
 from verify.solvers import find_solver
+from verify.solvers.conforming_meshes import reference_mesh
 
 ASKED = [
     {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}
@@ -298,3 +300,72 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field():
     assert values == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
     exact = exact_of(scene)
     assert [exact_intensity(scene, exact, q) for q in scene.quantities] == [1.0, 0.6, -0.8]
+
+
+def test_a_polygon_whose_faces_bear_a_shear_has_the_factors_of_the_field_that_frees_them():
+    """A uniform stress beside the field of the front loads the faces, and has no factor."""
+    modes = [{"mode": mode} for mode in ("II", "III")]
+    free = straight(10, *modes)
+    cut = free.cuts[0].model_dump()
+    shear = np.array([0.3, -0.2, 0.25])
+    # corners in the other order: the positive side is below, where the outer normal is z
+    loads = [{"kind": "cut_faces", "traction": shear.tolist()}]
+    scene = straight(10, *modes, cuts=[cut | {"points": cut["points"][::-1]}], loads=loads)
+    solution = sampled(free, 10)
+    stress = np.zeros((3, 3))
+    stress[2], stress[:, 2] = shear, shear
+    young, poisson = scene.material.young, scene.material.poisson
+    strain = ((1 + poisson) * stress - poisson * np.trace(stress) * np.eye(3)) / young
+    loaded = replace(solution, displacement=solution.displacement + solution.points @ strain)
+    given = [solution_intensity(free, solution, asked) for asked in free.quantities]
+    found = [solution_intensity(scene, loaded, asked) for asked in scene.quantities]
+    # seen from below the upper face slides the other way, and so does the front run
+    assert found == pytest.approx([-given[0], given[1]], abs=1e-9)
+
+
+def fronts_in_general_position(rng):
+    """A penny, or a polygon through the body, anywhere in a box with default sizes."""
+    normal = rng.standard_normal(3)
+    first, second, normal = np.linalg.svd(normal[None])[2][[1, 2, 0]]
+    if rng.random() < 0.5:
+        radius = rng.uniform(0.15, 0.8)
+        room = 1.9 - radius
+        centre = rng.uniform(-0.6, 0.6, 3) * room
+        point = centre + radius * (np.cos(1.0) * first + np.sin(1.0) * second)
+        return {"kind": "disc", "centre": centre.tolist(), "normal": normal.tolist(),
+                "radius": radius}, point  # fmt: skip
+    centre, (a, b) = rng.uniform(-0.4, 0.4, 3), rng.uniform(0.3, 0.9, 2)
+    corners = [centre + i * a * first + j * b * second
+               for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
+    return {"kind": "polygon", "points": [c.tolist() for c in corners]}, centre + a * first
+
+
+@pytest.mark.fenicsx
+def test_a_domain_fits_around_any_front_on_the_first_level_of_a_reference_of_default_size():
+    rng = np.random.default_rng(11)
+    for _ in range(4):
+        cut, point = fronts_in_general_position(rng)
+        asked = {"kind": "stress_intensity", "name": "K", "point": point.tolist()}
+        scene = scenes.scene([cut], d=3, geometry=scenes.box([2.0] * 3, [-2.0] * 3),
+                             quantities=[asked])  # fmt: skip
+        mesh, _ = reference_mesh(scene, 0)
+        still = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))
+        assert solution_intensity(scene, still, scene.quantities[0]) == 0.0
+        assert len(mesh.cells) < 40_000
+
+
+@pytest.mark.fenicsx
+def test_a_small_penny_has_its_factors_on_the_first_level_of_a_reference_of_default_size():
+    """An eighth of the body wide; second-order elements of h/a = 0.22: a few per cent."""
+    small = {"a": 0.5, "centre": [0.07, -0.04, 0.03], "normal": [0.36, -0.48, 0.8]}
+    content = load_scene("curved/penny").model_dump(mode="json", by_alias=True)
+    content["cuts"][0]["radius"] = content["exact"]["parameters"]["a"] = small["a"]
+    point = 0.5 * (np.array(front_point(90.0)) + small["centre"])
+    asked = [{"mode": mode, "point": point.tolist()} for mode in ("I", "III")]
+    scene = penny(*asked, cuts=content["cuts"], exact=content["exact"])
+    found = find_solver("reference").solve(scene, 0, repetitions=0)
+    # 2 p √(a/π) and 4 (1 − ν)/(2 − ν) τ √(a/π): tension 0.64 and pressure 0.5, shear 0.48
+    root = np.sqrt(small["a"] / np.pi)
+    stated = [2 * 1.14 * root, 4 * 0.7 / 1.7 * 0.48 * root]
+    values = [solution_intensity(scene, found, one) for one in scene.quantities]
+    assert np.abs(values) == pytest.approx(stated, rel=0.08)

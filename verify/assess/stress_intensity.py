@@ -16,6 +16,7 @@ from verify.scene import (
     DiscCut,
     Gravity,
     Material,
+    PolygonCut,
     PolylineCut,
     Scene,
     ToolPathCut,
@@ -69,7 +70,9 @@ def _face_loads(scene: Scene, asked: StressIntensityQuantity) -> list[CutFaces]:
 
 def _is_plane(scene: Scene, name: str) -> bool:
     cut = next(cut for cut in scene.final_cuts if cut.name == name)
-    return isinstance(cut, DiscCut) or (isinstance(cut, PolylineCut) and len(cut.points) == 2)
+    if isinstance(cut, PolylineCut):
+        return len(cut.points) == 2
+    return isinstance(cut, DiscCut | PolygonCut)
 
 
 def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
@@ -185,6 +188,8 @@ def _normal(scene: Scene, name: str) -> Array:
     cut = next(cut for cut in scene.final_cuts if cut.name == name)
     if isinstance(cut, DiscCut):
         return cut.axes()[2]
+    if isinstance(cut, PolygonCut):
+        return cut.normal
     assert isinstance(cut, PolylineCut)
     along = np.subtract(cut.points[1], cut.points[0])
     return np.array([-along[1], along[0]]) / np.linalg.norm(along)

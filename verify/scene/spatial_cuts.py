@@ -72,6 +72,13 @@ class PolygonCut(_SpatialCut):
         corners = np.array(self.points, dtype=float)
         return corners, ear_clipping(corners)
 
+    @property
+    def normal(self) -> Array:
+        """Unit normal (3,), to the positive side: that from which the corners run anticlockwise."""
+        corners = np.array(self.points, dtype=float)
+        area = np.sum(np.cross(corners, np.roll(corners, -1, axis=0)), axis=0)
+        return np.asarray(area / np.linalg.norm(area))
+
     def edge_of(self, point: Array) -> tuple[Array, Array]:
         """Start and end (3,) of the edge nearest to a point (3,)."""
         corners = np.array(self.points, dtype=float)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.fracture import Front, front_at
 from reference.meshing import (
     ConformingMesh,
     Grading,
@@ -38,10 +39,13 @@ from verify.scene import (
     ToolPathCut,
     read_mesh,
 )
+from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.cuts import Cut
 
 Array = NDArray[np.float64]
 _WAY = {2: 1 / 16, 3: 1 / 2}  # size of elements along the way of a blade, over that far away
+# of the smallest domain at a front: cells that begin within a quarter of it must end inside
+_FRONT_SHARE = 0.45
 Cells = NDArray[np.int64]
 
 
@@ -137,7 +141,21 @@ def _solid_grading(scene: Scene) -> Grading:
     size = scene.reference.size or extent / 4
     way = _way(scene, size)  # where the front has been everywhere, its last place is nothing apart
     curves = way is None
-    return Grading(size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=curves, way=way)
+    return Grading(
+        size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=curves, way=way,
+        fronts=_asked_fronts(scene), share=_FRONT_SHARE,
+    )  # fmt: skip
+
+
+def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
+    """Fronts at which the scene asks for factors, each with the radius of its smallest domain."""
+    asked = [
+        q
+        for q in scene.quantities
+        if isinstance(q, StressIntensityQuantity) and q.point is not None
+    ]
+    found = [front_at(scene, one) for one in asked]
+    return [(front, float(radii.min())) for front, radii in found if radii.min() > 0.0]
 
 
 def _way(scene: Scene, size: float) -> float | None:
