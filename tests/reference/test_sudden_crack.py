@@ -1,0 +1,74 @@
+"""Closed forms of a crack that is loaded suddenly, against other ways to the same numbers."""
+
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+
+from reference.exact.hooke import Hooke
+from reference.exact.sudden_crack import sudden_intensity, sudden_slip
+from verify.assess.quantities import Measured
+from verify.assess.reference import conforming_reference
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.scene import load_scene
+from verify.solvers import find_solver
+
+LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
+TIME = 0.9
+WAVE = np.sqrt(0.2)
+
+
+def test_the_slip_near_the_tip_is_that_of_the_factor():
+    """K_III = (μ/4) √(2π/r) times the jump, to the order r/ct."""
+    r = 1e-8
+    found = 0.25 * LAW.shear * np.sqrt(2 * np.pi / r) * sudden_slip(1.3, LAW, r, TIME)
+    assert found == pytest.approx(sudden_intensity("III", 1.3, LAW, TIME), rel=1e-7)
+
+
+def test_factors_are_those_of_wiener_and_hopf_in_slownesses():
+    a, b = np.sqrt(2.0 / 1.5), 1 / WAVE
+    rayleigh = b**4 / (2 * (b**2 - a**2))
+    split = {"I": rayleigh / a, "II": rayleigh / b, "III": b}  # F₊(0)²
+    for mode, squared in split.items():
+        expected = 2 * np.sqrt(2 * TIME / np.pi / squared)
+        assert sudden_intensity(mode, 1.0, LAW, TIME) == pytest.approx(expected, rel=1e-12)
+    nu = 0.7 / 2.2  # in mode I as Freund prints it
+    printed = 2 * np.sqrt((1 - 2 * nu) / a * TIME / np.pi) / (1 - nu)
+    assert sudden_intensity("I", 1.0, LAW, TIME) == pytest.approx(printed, rel=1e-12)
+
+
+def faces_by_differences(n):
+    """Distances (n,) behind the tip, jumps (n,), time: leapfrog for the half above the crack.
+
+    A square of 1.2 m around the tip, farther than waves go; ahead of the tip the half is held.
+    """
+    h, reach = 0.6 / n, WAVE * TIME
+    assert reach < 0.6
+    x = (np.arange(-n, n) + 0.5) * h
+    step = 0.5 * h / WAVE
+    count = round(TIME / step)
+    old = new = np.zeros((2 * n, n))
+    for k in range(count):
+        flux_x = np.diff(new, axis=0, prepend=new[:1], append=new[-1:])
+        across = np.diff(new, axis=1, append=new[:, -1:])
+        # values lie in the middle of cells: half a cell to what is held, −τ/μ on the free face
+        below = np.where(x > 0.0, 2.0 * new[:, 0], -h / LAW.shear)
+        flux_y = np.concatenate([below[:, None], across], axis=1)
+        change = np.diff(flux_x, axis=0) + np.diff(flux_y, axis=1)
+        # from rest: half of the change in the first step
+        old, new = new, 2 * new - old + (0.25 if k else 0.125) * change
+    behind = x < 0.0
+    face = new[behind, 0] + 0.5 * h / LAW.shear
+    return -x[behind], 2 * face, count * step
+
+
+def test_the_slip_is_that_of_finite_differences():
+    """Singular at the tip, so of first order in h: off by the tip's shift, a share of a cell."""
+    off = []
+    for n in (60, 120):
+        r, jump, time = faces_by_differences(n)
+        expected = np.array([sudden_slip(1.0, LAW, one, time) for one in r])
+        far = r > 0.1
+        off.append(np.abs(jump - expected)[far].max() / expected.max())
+    assert off[1] < 0.6 * off[0]
+    assert off[1] < 0.01
