@@ -2,16 +2,9 @@
 
 import numpy as np
 import pytest
-from reference_scenes import needs_fenicsx
 
 from reference.exact.hooke import Hooke
 from reference.exact.sudden_crack import sudden_intensity, sudden_slip
-from verify.assess.quantities import Measured
-from verify.assess.reference import conforming_reference
-from verify.compare.body import body_of
-from verify.compare.hooke import law_of
-from verify.scene import load_scene
-from verify.solvers import find_solver
 
 LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
 TIME = 0.9
