@@ -7,7 +7,7 @@ from verify.scene import Polygon, Rectangle, Scene, Traction
 from verify.scene.part_pieces import pieces_on_part
 
 Array = NDArray[np.float64]
-_SAME = 1e-6  # of the body's size: an end closer than that to a corner counts as the corner
+_SAME = 1e-5  # of the body's size: an end closer than that to a corner counts as the corner
 
 
 def divided_outline(scene: Scene) -> Array:

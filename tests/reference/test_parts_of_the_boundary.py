@@ -5,8 +5,11 @@ import pytest
 import scenes
 from reference_scenes import needs_fenicsx
 
+from verify.assess.rates import shifted_ends
 from verify.exchange import problem_of
 from verify.methods.catalogue import METHODS
+from verify.regularisation import Regularisation
+from verify.result import SolveRecord, Status
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.cuts_of_scene import cuts_of
@@ -86,6 +89,7 @@ class Drawn:
             loads=[
                 {"kind": "traction", "where": self.where, "traction": TRACTION[: self.d].tolist()}
             ],
+            reference={"size": 0.5},
         )
 
     def work(self, gradient, shift, side=0):
@@ -133,12 +137,13 @@ def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degr
     from reference.elasticity import load_form
     from reference.nodal_algebra import nodal_forces
     from reference.space import conforming_space
-    from verify.solvers.conforming_meshes import peer_mesh
+    from verify.solvers.conforming_meshes import peer_mesh, reference_mesh
 
     drawn = Drawn(d, number)
     scene = drawn.scene(cells)
-    for level in range(len(cells)):
-        space = conforming_space(peer_mesh(scene, level, "imprinted"), degree)
+    meshes = [peer_mesh(scene, level, "imprinted") for level in range(len(cells))]
+    for mesh in (*meshes, reference_mesh(scene, 0)[0]):
+        space = conforming_space(mesh, degree)
         form = load_form(scene, space, ufl.TestFunction(space.function_space), None)
         forces = nodal_forces(form, space).reshape(-1, d)
         drawn.check(forces, space.node_points, space.beside_nodes())
@@ -225,6 +230,17 @@ def test_the_shift_of_an_end_is_reported_in_metres_and_in_elements():
             assert said == pytest.approx({"m": shift, "h": shift * 4 * 2**level})
     held = find_solver("reference").solve(scene, 0, 0)
     assert not [r for r in held.regularisations if "support" in r.kind]
+
+
+def test_levels_on_which_an_end_shifts_have_no_order():
+    def solved(size, *shifts):
+        kind = "support holds more than its part, to the edge of a facet"
+        moved = [Regularisation(kind, 3, shift, unit) for shift, unit in shifts]
+        return SolveRecord("case", "xfem", 0, Status.SOLVED, size=size, regularisations=moved)
+
+    ended = [solved(0.2, (0.1, "m"), (0.5, "h")), solved(0.1)]
+    assert shifted_ends(ended) == "supports hold 0.5, 0 h beyond where their parts end"
+    assert not shifted_ends([solved(0.2), solved(0.1)])
 
 
 @pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.heavy)])

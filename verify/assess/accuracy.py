@@ -16,7 +16,7 @@ from verify.assess.intervals import error_interval
 from verify.assess.motion_account import motion_account
 from verify.assess.part_account import motion_history, part_metrics, part_records
 from verify.assess.quantities import Measured, unit_of
-from verify.assess.rates import observed_rate
+from verify.assess.rates import observed_rate, shifted_ends
 from verify.assess.reference import (
     OTHER,
     ExactField,
@@ -357,5 +357,6 @@ def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
                 values, widths = [e.value for e in errors], [e.high - e.value for e in errors]
                 rate = observed_rate(solver, name, sizes, values, widths)
                 mixed = name in {*ERROR_NAMES, *fields} and are_mixed(own)
-                rates.append(replace(rate, order=None, reason=MIXED) if mixed else rate)
+                reason = (MIXED if mixed else "") or shifted_ends(own)
+                rates.append(replace(rate, order=None, reason=reason) if reason else rate)
     return rates

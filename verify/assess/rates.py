@@ -5,7 +5,9 @@ from dataclasses import replace
 from itertools import pairwise
 from math import log
 
-from verify.result import Rate
+from verify.regularisation import Regularisation
+from verify.result import Rate, SolveRecord
+from verify.scene.held_facets import END_OF_SUPPORT
 
 # Relative errors below this are round-off of a direct solver on 1e5 unknowns.
 ROUND_OFF = 1e-11
@@ -82,3 +84,21 @@ def observed_rate(
         return replace(without(f"slowing: slopes {shown}"), uncertainty=spread)
     what = "rising" if all(b > a for a, b in pairwise(slopes)) else "oscillating"
     return without(f"{what}: slopes {shown}, so that the last says little about the next")
+
+
+def shifted_ends(records: Sequence[SolveRecord]) -> str:
+    """Say why levels are no series, if on one of them a support ends inside a facet; else empty.
+
+    What is held then differs from the part by a length that jumps from level to level.
+    """
+    shifts = [
+        max((r.size or 0.0 for r in one.regularisations if _is_shift(r)), default=0.0)
+        for one in records
+    ]
+    if not any(shifts):
+        return ""
+    return f"supports hold {', '.join(f'{s:.2g}' for s in shifts)} h beyond where their parts end"
+
+
+def _is_shift(entry: Regularisation) -> bool:
+    return entry.kind == END_OF_SUPPORT and entry.unit == "h"
