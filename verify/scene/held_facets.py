@@ -49,6 +49,7 @@ def held_facets(
     corners: Array,
     boundary: Array | None = None,
     facet: Ints | None = None,
+    depth: Array | None = None,
 ) -> HeldFacets:
     """Find the facets that a support on the part `where` holds.
 
@@ -59,6 +60,8 @@ def held_facets(
     facet : (q,) int array, optional
         Where a cut divides facets, and `corners` are simplices in them: number of the facet, and
         of its side of the cut. What lies on each side is held for itself.
+    depth : (q,) array, optional
+        How far a part must at least reach into what lies on a side, m.
     """
     boundary = corners if boundary is None else boundary
     facet = np.arange(len(corners)) if facet is None else facet
@@ -70,11 +73,13 @@ def held_facets(
     lengths = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(k)]
     of_facet = np.bincount(facet, measure)
     covered = np.bincount(facet, measure * pieces.covered(len(corners)))
-    reach = np.zeros(len(of_facet))
+    reach, least = np.zeros(len(of_facet)), np.full(len(of_facet), _DEPTH * size)
     np.maximum.at(reach, facet, np.max(lengths, axis=0))
-    least = np.minimum(_DEPTH * size * reach ** (k - 2), 0.5 * of_facet)
+    if depth is not None:
+        np.maximum.at(least, facet, depth)
+    least = np.minimum(least * reach ** (k - 2), 0.5 * of_facet)
     held = (covered > 0.0) & (covered >= least)
-    ended = np.flatnonzero(held & (covered < (1.0 - _COVERED) * of_facet))
+    ended = np.flatnonzero(held & (of_facet - covered > np.maximum(least, _COVERED * of_facet)))
     beyond = [
         _reach(corners[facet == one], pieces.places(corners)[facet[pieces.facet] == one])
         for one in ended
