@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.form_cache import guard_form_cache
 from verify.errors import InputError
 
 OLDEST = (0, 9)  # before, vectors and expressions are others
@@ -20,7 +21,7 @@ def import_dolfinx() -> ModuleType:
     ImportError
         With its ``name`` set, if DOLFINx is not installed.
     InputError
-        If it is older than `OLDEST`.
+        If it is older than `OLDEST`, or compiled forms have no folder that can be written.
     """
     try:
         import_module("dolfinx_solver")
@@ -33,6 +34,7 @@ def import_dolfinx() -> ModuleType:
         raise InputError(
             f"DOLFINx {dolfinx.__version__} is too old: the reference needs {oldest} or newer"
         )
+    guard_form_cache()
     return dolfinx
 
 

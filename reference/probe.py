@@ -6,11 +6,14 @@ may crash or hang instead of failing.
 
 import json
 import sys
+import tempfile
+import warnings
 from collections.abc import Callable
 
 import numpy as np
 
 from reference.dolfinx_versions import import_dolfinx
+from reference.form_cache import guard_form_cache
 
 # direct solvers, preconditioners and orderings that PETSc may have been built with
 _PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", "hdf5")
@@ -54,20 +57,27 @@ def _mpi() -> str:
 
 
 def _forms() -> str:
-    """Compile forms and assemble them: needs a C compiler, Python's headers, PETSc's library."""
+    """Compile forms anew and assemble them: needs a C compiler, Python.h, PETSc's library."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _compiled(folder)
+
+
+def _compiled(folder: str) -> str:
     import_dolfinx()
     import ufl
     from dolfinx import fem, mesh
     from dolfinx.fem.petsc import assemble_matrix  # looks for the library when it is imported
     from mpi4py import MPI
 
+    anew = {"cache_dir": folder}
     square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
     x = ufl.SpatialCoordinate(square)
-    value = fem.assemble_scalar(fem.form(6.0 * x[0] * ufl.dx(square)))
+    value = fem.assemble_scalar(fem.form(6.0 * x[0] * ufl.dx(square), jit_options=anew))
     if abs(value - 3.0) > 1e-12:
         raise RuntimeError(f"the integral of 6x over the unit square came out as {value}")
     V = fem.functionspace(square, ("Lagrange", 1))
-    mass = assemble_matrix(fem.form(ufl.TrialFunction(V) * ufl.TestFunction(V) * ufl.dx))
+    product = ufl.TrialFunction(V) * ufl.TestFunction(V) * ufl.dx
+    mass = assemble_matrix(fem.form(product, jit_options=anew))
     mass.assemble()
     ones = mass.createVecRight()
     ones.set(1.0)
@@ -75,6 +85,16 @@ def _forms() -> str:
     if abs(area - 1.0) > 1e-12:
         raise RuntimeError(f"the area of the unit square by its mass matrix came out as {area}")
     return "compiled, assembled, right"
+
+
+def _cache() -> str:
+    """Where compiled forms are kept; in a folder of temporary files, the reason."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        import_dolfinx()
+        folder = guard_form_cache()
+    reasons = [str(one.message) for one in said if issubclass(one.category, RuntimeWarning)]
+    return reasons[0] if reasons else str(folder)
 
 
 def _gmsh() -> str:
@@ -97,6 +117,7 @@ PROBES: dict[str, Callable[[], str]] = {
     "slepc": _slepc,
     "mpi": _mpi,
     "forms": _forms,
+    "cache": _cache,
     "gmsh": _gmsh,
 }
 

@@ -115,10 +115,18 @@ def examine() -> list[Finding]:
         _tried("PETSc", _probe("petsc"), f"{_FENICSX} (both have MUMPS and real numbers)"),
         _tried("SLEPc", _probe("slepc"), f"{_FENICSX}; only eigenfrequencies need it", False),
         _tried("MPI", _probe("mpi"), _FENICSX),
-        _tried("DOLFINx forms", _probe("forms"), _compiler_line()),
+        *examine_forms(),
         _tried("off-screen VTK", _script(_PICTURE), "apt-get install -y libegl1 (or libosmesa6)"),
     ]
     return found
+
+
+def examine_forms() -> tuple[Finding, Finding]:
+    """Try the compiler of forms, and the folder that keeps them."""
+    return (
+        _tried("DOLFINx forms", _probe("forms"), _compiler_line()),
+        _tried("cache of forms", _probe("cache"), _FENICSX),
+    )
 
 
 def _python() -> Finding:
@@ -170,7 +178,7 @@ def _tried(name: str, arguments: list[str], cure: str, needed: bool = True) -> F
         crash = f"crashes (signal {-done.returncode})"
         return Finding(name, False, crash, needed, cure)
     text = lines[-1].strip() if lines else f"exit code {done.returncode}"
-    return Finding(name, False, text, needed, _apt_line(text) or cure)
+    return Finding(name, False, text, needed, _apt_line(text) or _cache_line(text) or cure)
 
 
 def _last_json(text: str) -> str | None:
@@ -186,3 +194,8 @@ def _apt_line(text: str) -> str:
     match = re.search(r"(lib\S+\.so[.\d]*): cannot open shared object file", text)
     package = DEBIAN_PACKAGES.get(match.group(1)) if match else None
     return f"apt-get install -y {package}" if package else ""
+
+
+def _cache_line(text: str) -> str:
+    cure = "set XDG_CACHE_HOME, or TMPDIR, to a folder that can be written"
+    return cure if "cannot be written" in text else ""
