@@ -23,6 +23,8 @@ from verify.scene import Scene
 from verify.scene.loading import load_scene
 from verify.solution import Solution
 from verify.solvers.xfem import XfemSolver
+from verify.study.energy import account_findings
+from verify.study.measured_scenes import AT_MOST, Measurement
 
 D = 0.003 / 0.46  # 1/s: takes 2 D ∫T dt, of a bar that has half of its energy in motion
 DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
@@ -206,3 +208,18 @@ def test_the_work_of_supports_that_move_is_a_word_and_no_verdict_rests_on_it():
     held = swinging()
     still = hidden(XfemSolver().solve(held, 0, 0), 1.5, "work_of_supports")
     assert verdict_of(held, still) is Verdict.FAIL  # supports that stand still do no work
+
+
+@pytest.mark.parametrize("rows, verdict", [
+    ([(0.004, 0.009), (0.002, 0.002)], Verdict.PASS),
+    ([(0.02, 0.02), (0.004, 0.05)], Verdict.FAIL),  # the first is above the limit for certain
+    ([(0.004, 0.05), (0.001, 0.001)], Verdict.UNDECIDED),
+])  # fmt: skip
+def test_a_study_knows_the_intervals_of_energies(rows, verdict):
+    own = [
+        Measurement("a case", float(row), "a", name, "", value)
+        for row, values in enumerate(rows)
+        for name, value in zip(("energy_drift", AT_MOST), values, strict=True)
+    ]
+    (found,) = account_findings("a case", own)
+    assert found.verdict is verdict

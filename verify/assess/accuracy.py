@@ -126,7 +126,10 @@ def assess_accuracy(
         solves=measured,
         rates=rates,
         verdicts=[],
-        notices=[*unavailable_quantities(scene, measured), *ledger_notices(measured)],
+        notices=[
+            *unavailable_quantities(scene, measured),
+            *ledger_notices([r for r in measured if r.solver != REFERENCE]),
+        ],
         row=asdict(scene.row) if scene.row else None,
     )
 

@@ -8,6 +8,7 @@ from verify.errors import InputError
 from verify.result import Verdict
 from verify.scene import Scene, scene_content
 from verify.study.measured_scenes import (
+    AT_MOST,
     MeasuredStudy,
     Measurement,
     Variant,
@@ -79,7 +80,14 @@ def account_findings(topic: str, own: Sequence[Measurement]) -> Iterator[Finding
         others = [f"{name} {found[0]:.2g}" for name in _BESIDE if (found := _worst(own, name))]
         text = f"The energy {grade}: {value:.3g} of the energy in play{at}"
         text += f" ({', '.join(others)})." if others else "."
-        verdict = Verdict.PASS if value <= _DRIFT else Verdict.FAIL
+        tops = {m.size: m.value or 0.0 for m in own if m.quantity == AT_MOST}
+        values = {m.size: m.value or 0.0 for m in own if m.quantity == "energy_drift"}
+        most = max([*tops.values(), value])
+        least = max(2 * v - tops.get(size, v) for size, v in values.items())
+        verdict = Verdict.PASS if most <= _DRIFT else Verdict.FAIL
+        if least <= _DRIFT < most:
+            verdict = Verdict.UNDECIDED
+            text += f" Its interval reaches up to {most:.2g}."
         yield Finding(topic, text, f"at most {_DRIFT:g} over the run", verdict)
     for name in dict.fromkeys(m.quantity for m in own if m.quantity.startswith("deviation of")):
         found, limit = _worst(own, name), min(m.limit or 0.0 for m in own if m.quantity == name)
