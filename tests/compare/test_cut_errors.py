@@ -79,8 +79,8 @@ def test_a_tooth_inside_an_element_is_in_the_error(solver):
     record, found, solution = judged(TOOTH, 8, solver)
     expected, area = integrated(TOOTH, solution)
     assert 0.13 < expected < 0.16
-    assert found.norm.relative == pytest.approx(expected, rel=0.02)
-    assert record.cut.swept == pytest.approx(area, rel=0.03)
+    assert found.norm.relative == pytest.approx(expected, rel=0.03)
+    assert record.cut.swept == pytest.approx(area, rel=0.06)
     assert not record.cut.continued
     assert record.cut.lateral > 0.1
     assert record.cut.errors["displacement_l2"] < 1e-10  # as it was judged before

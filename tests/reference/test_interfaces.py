@@ -120,3 +120,19 @@ def test_xfem_and_conforming_meshes_find_the_same_equilibrium_of_layers() -> Non
     xfem, conforming = (find_solver(n).solve(one, 0, 0).ledger["strain"] for n in PAIR)
     assert conforming[0] == pytest.approx(xfem[0], rel=0.02)
     assert conforming[0] <= xfem[0] * (1 + 1e-12)
+
+
+def test_every_solver_states_the_cells_that_an_interface_crosses() -> None:
+    """A material is one per cell: halves of cells of the wrong one are no property of the cut."""
+    one = scene(
+        [{"where": "2 * y > x + 0.31", "young": 6.0}],
+        cuts=[{"kind": "polyline", "points": [[0.31, -0.1], [0.52, 0.9]]}],
+        supports=[*HELD, {"where": "top", "displacement": [0.03, 0.05]}],
+    )
+    for name in ("xfem", "conforming", "virtual_node", "snapping"):
+        found = find_solver(name).solve(one, 0, 0)
+        (said,) = [r for r in found.regularisations if "interface" in r.kind]
+        assert said.count >= 10
+        # the line crosses two triangles of each box that it passes through, in one of five rows
+        assert said.size is not None
+        assert 0.2 < said.size < 0.5

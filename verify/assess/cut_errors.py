@@ -13,6 +13,7 @@ from verify.compare.cut_deviation import cut_record
 from verify.compare.errors import Rules
 from verify.compare.locate import ROUND_OFF
 from verify.cut_record import CutRecord
+from verify.regularisation import Regularisation
 from verify.result import CUT, SolveRecord
 from verify.solution import Solution
 
@@ -33,9 +34,9 @@ def with_cut(record: SolveRecord, one: Measured, rules: Rules) -> SolveRecord:
     if other is not None:
         swept = rule.weights[one.motion.differs(other, rule.points)].sum()
         cut = replace(cut, swept=float(swept))
-    said = _said(cut, ROUND_OFF * one.body.size)
-    notes = {**record.notes, CUT: said} if said else record.notes
-    return replace(record, cut=cut, notes=notes)
+    said, done = _said(cut, ROUND_OFF * one.body.size)
+    notes = {**record.notes, CUT: "; ".join(said)} if said else record.notes
+    return replace(record, cut=cut, notes=notes, regularisations=[*record.regularisations, *done])
 
 
 def with_other_errors(
@@ -57,20 +58,23 @@ def are_mixed(records: Sequence[SolveRecord]) -> bool:
     return len({cut.continued for cut in differing}) > 1
 
 
-def _said(cut: CutRecord, same: float) -> str:
-    unit = "m" if cut.dimension == 2 else "m²"
-    of_ends = same if cut.dimension == 2 else 1e-9 * cut.element**2
-    said = []
+def _said(cut: CutRecord, same: float) -> tuple[list[str], list[Regularisation]]:
+    """Say where a cut is not as asked; what is more than facets is stated as any change is."""
+    said, done = [], []
     if cut.lateral > same:
         how = "with" if cut.continued else "without"
         said.append(
             f"up to {cut.lateral:.3g} m ({cut.lateral / cut.element:.2g} of an element) beside the "
             f"cut as asked: errors are {how} continuation across it"
         )
+    if not cut.continued:
+        done.append(Regularisation("cut beside where it was asked", 1, cut.lateral, "m"))
     if cut.under_resolved:
         assert cut.radius is not None
         said.append(f"under-resolved: radius {cut.radius / cut.element:.2g} elements")
+    unit, least = ("m", same) if cut.dimension == 2 else ("m²", 1e-9 * cut.element**2)
     for what, amount in (("missing", cut.missing), ("too much", cut.surplus)):
-        if amount > of_ends:
+        if amount > least:
             said.append(f"{amount:.3g} {unit} of it {what}")
-    return "; ".join(said)
+            done.append(Regularisation(f"cut {what} at ends", 1, amount, unit))
+    return said, done

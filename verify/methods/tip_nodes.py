@@ -81,15 +81,12 @@ class TipNodes(NamedTuple):
         number, the others follow.
     cuts : list of EndingCut
         The cuts as they end at nodes of `mesh`, to be applied by the tip rule "inside".
-    asked : (k, 2) float array
-        Where each of these ends was asked for, in metres.
     moved : (k,) float array
-        Distance of each of them from there, in metres.
+        Distance of each of these ends from where it was asked for, in metres.
     """
 
     mesh: SimplexMesh
     cuts: list[EndingCut]
-    asked: Floats
     moved: Floats
 
 
@@ -146,8 +143,7 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
         EndingCut(cut, places, nodes, levels[:, k])
         for k, (cut, places) in enumerate(zip(cuts, ends, strict=True))
     ]
-    asked = np.array(division.asked).reshape(-1, 2)
-    return TipNodes(divided, ending, asked, np.array(division.moved))
+    return TipNodes(divided, ending, np.array(division.moved))
 
 
 def _met(mesh: SimplexMesh, cut: Cut, values: Floats) -> tuple[Bools, list[_Chord]]:
@@ -200,7 +196,6 @@ class _Division:
         self._places: list[Floats] = []
         self._more: list[Ints] = []
         self._from: list[tuple[int, Floats]] = []
-        self.asked: list[Floats] = []
         self.moved: list[float] = []
         self._inner = np.ones(len(mesh.points), dtype=bool)
         cell, opposite = mesh.boundary_facets.T
@@ -240,7 +235,6 @@ class _Division:
             return None
         at, cells = best
         self._taken[cells] = True
-        self.asked.append(chord.end @ corners)
         self.moved.append(float(np.linalg.norm((at - chord.end) @ corners)))
         if (at > 0.0).sum() == 1:
             return np.asarray(corners[at.argmax()])

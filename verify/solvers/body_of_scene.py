@@ -12,10 +12,8 @@ from verify.scene import (
     Polygon,
     Rectangle,
     Scene,
-    crossed_by_interfaces,
     read_mesh,
 )
-from verify.solution import Regularisation
 from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -103,15 +101,3 @@ def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
     if material.is_uniform:
         return material.young, material.poisson, material.density
     return material.at(points)
-
-
-def across_interfaces(scene: Scene, mesh: SimplexMesh) -> list[Regularisation]:
-    """State the cells that lie across an interface and are of the material at their centroid."""
-    if scene.material.is_uniform:
-        return []
-    crossed = crossed_by_interfaces(scene.material, mesh.points, mesh.cells)
-    if not crossed.any():
-        return []
-    share = float(mesh.measures[crossed].sum() / mesh.measures.sum())
-    kind = "cell across an interface, of the material at its centroid"
-    return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]

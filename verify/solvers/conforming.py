@@ -23,6 +23,7 @@ from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
+from verify.solvers.across_interfaces import across_interfaces
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
 from verify.solvers.interface import check_choices
@@ -323,7 +324,11 @@ def _solution(
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
-        regularisations=[*_specks(mesh), *support_ends(scene, space, size)],
+        regularisations=[
+            *_specks(mesh),
+            *support_ends(scene, space, size),
+            *across_interfaces(scene, mesh.points, mesh.cells),
+        ],
         ledger=result.ledger,
         mass=None if result.velocity is None else CONSISTENT,
         unknowns=result.displacement[0].size,

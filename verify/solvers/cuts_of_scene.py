@@ -1,6 +1,5 @@
 """Cuts of a scene as the level sets of the compact XFEM solver."""
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,17 +32,6 @@ def cuts_of(scene: Scene, size: float) -> list[Cut]:
     return [_cut(cut, size) for cut in scene.cuts]
 
 
-@dataclass(frozen=True)
-class EndNodes(Regularisation):
-    """Ends of cuts that were made nodes, with the places (k, 2) where they were asked for, m."""
-
-    asked: Array
-
-    def plain(self) -> Regularisation:
-        """Return the record without the places."""
-        return Regularisation(self.kind, self.count, self.size, self.unit)
-
-
 class ToCut(NamedTuple):
     """What the library is to cut, by what, by which rule, and what was done for that."""
 
@@ -69,7 +57,7 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
         )
     nodes = with_tip_nodes(mesh, cuts)
     kind, largest = "end of a cut made a node", float(nodes.moved.max(initial=0.0))
-    said = EndNodes(kind, len(nodes.moved), largest, "m", nodes.asked)
+    said = Regularisation(kind, len(nodes.moved), largest, "m")
     return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said] if len(nodes.moved) else [])
 
 

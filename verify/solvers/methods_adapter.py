@@ -19,8 +19,8 @@ from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Regularisation, Solution
+from verify.solvers.across_interfaces import across_interfaces
 from verify.solvers.body_of_scene import (
-    across_interfaces,
     background_mesh,
     density_of,
     material_of,
@@ -317,7 +317,8 @@ def _solution(scene: Scene, name: str, done: Repeated[_Answer]) -> Solution:
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
-    regularisations += [*done.answer.further, *across_interfaces(scene, body.phantom.mesh)]
+    mesh = body.phantom.mesh
+    regularisations += [*done.answer.further, *across_interfaces(scene, mesh.points, mesh.cells)]
     regularisations += support_ends(scene, body.phantom, done.size)
     if done.answer.left_out:
         kind = "spring that the fit would make negative left out"

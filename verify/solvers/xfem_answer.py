@@ -3,17 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import Polygon, PolylineCut, Rectangle, Scene
-from verify.scene.planar import distance_to_outline, inside_polygon
+from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import across_interfaces
-from verify.solvers.cuts_of_scene import EndNodes
+from verify.solvers.across_interfaces import across_interfaces
 from verify.solvers.runs import Answer, Repeated, solution_on
 from verify.solvers.supports_of_scene import support_ends
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
-from verify.xfem.subdivision import Subdivision, subdivide
+from verify.xfem.subdivision import subdivide
 
 
 def solution_of(scene: Scene, done: Repeated[Answer], notes: dict[str, str]) -> Solution:
@@ -27,21 +25,14 @@ def solution_of(scene: Scene, done: Repeated[Answer], notes: dict[str, str]) -> 
         Choices of the solver, beside those of the answer.
     """
     phantom, body = done.answer.phantom, subdivide(done.answer.phantom)
-    further, made_nodes = [], np.empty((0, 2))
-    for one in done.answer.further:
-        if isinstance(one, EndNodes):
-            further.append(one.plain())
-            made_nodes = np.concatenate([made_nodes, one.asked])
-        else:
-            further.append(one)
     return solution_on(
         body,
         done,
         _side_labels(phantom.label[body.cell_piece]),
         [
-            *_regularisations(scene, phantom, body, made_nodes),
-            *further,
-            *across_interfaces(scene, phantom.mesh),
+            *_regularisations(phantom),
+            *done.answer.further,
+            *across_interfaces(scene, phantom.mesh.points, phantom.mesh.cells),
             *support_ends(scene, phantom, done.size),
         ],
         notes,
@@ -92,9 +83,7 @@ def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
     return sides
 
 
-def _regularisations(
-    scene: Scene, phantom: PhantomMesh, body: Subdivision, made_nodes: NDArray[np.float64]
-) -> list[Regularisation]:
+def _regularisations(phantom: PhantomMesh) -> list[Regularisation]:
     """Report what the solver moved or left out, each with its size."""
     entries = []
     if phantom.snapped:
@@ -103,40 +92,4 @@ def _regularisations(
         entries.append(
             Regularisation("piece without volume left out", phantom.dropped, 0.0, "volume fraction")
         )
-    moved = _moved_ends(scene, body, made_nodes)
-    if moved:
-        kind = "end of a cut moved to an element edge"
-        entries.append(Regularisation(kind, len(moved), max(moved), "m"))
     return entries
-
-
-def _moved_ends(scene: Scene, body: Subdivision, made_nodes: NDArray[np.float64]) -> list[float]:
-    """Distance of each inner end of a cut to the realised cut, m; ends on it do not count.
-
-    Nor do those that were made nodes (k, 2), which are reported as such.
-    """
-    if not isinstance(scene.geometry, Rectangle | Polygon):
-        return []
-    outline = scene.geometry.outline()
-    tolerance = 1e-9 * float(np.ptp(outline, axis=0).max())
-    open_cuts = [
-        cut.vertices()[[0, -1]]
-        for cut in scene.cuts
-        if isinstance(cut, PolylineCut) and cut.points[0] != cut.points[-1]
-    ]
-    if not open_cuts:
-        return []
-    ends = np.concatenate(open_cuts)
-    apart = np.linalg.norm(made_nodes[:, None] - ends, axis=2)
-    moved = []
-    for end in np.delete(ends, apart.argmin(axis=1), axis=0):
-        inner = inside_polygon(end[None], outline)[0]
-        if not inner or distance_to_outline(end[None], outline)[0] <= tolerance:
-            continue
-        if len(body.cut_facets) == 0:
-            moved.append(float("inf"))
-            continue
-        to_facets = np.linalg.norm(body.cut_facets - end, axis=2).min()
-        if to_facets > tolerance:
-            moved.append(float(to_facets))
-    return moved
