@@ -21,12 +21,12 @@ class CutRecord:
     element : float
         Largest longest edge of the cells at the realised cut, m.
     limit : float
-        Lateral deviation up to which fields are continued across the realised cut, m.
+        Lateral deviation of a facet up to which fields are continued across it, m.
     radius : float or None
         Least radius of curvature of the cuts as asked, m; None if all are straight or plane.
     errors : dict of str to float
-        Relative errors that are not judged, by metric: without continuation if those judged are
-        with it, and the reverse. Empty where both are the same.
+        Relative errors that are not judged, by metric: without any continuation if those judged
+        are with it everywhere, else with it everywhere. Empty where both are the same.
     """
 
     dimension: int
@@ -47,7 +47,7 @@ class CutRecord:
 
     @property
     def continued(self) -> bool:
-        """Whether what is judged is continued across the realised cut."""
+        """Whether what is judged is continued across all of the realised cut."""
         return self.lateral <= self.limit
 
     @property

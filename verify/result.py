@@ -173,11 +173,6 @@ class SolveRecord:
     # where the realised cut is; None of a body without cuts, or in older results
     cut: CutRecord | None = None
 
-    @property
-    def continued(self) -> bool:
-        """Whether its field is continued across its realised cut where it is judged."""
-        return self.cut is None or self.cut.continued
-
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""
         return next((metric for metric in self.metrics if metric.name == name), None)

@@ -8,7 +8,7 @@ from cut_meshes import grid, scene, solution
 from solid_meshes import cube_grid, solid_scene
 
 from verify.compare.body import body_of
-from verify.compare.cut_deviation import LIMIT, cut_record
+from verify.compare.cut_deviation import LIMIT, realised_cut
 from verify.compare.integration import cut_rules
 
 SEEDS = range(12)
@@ -22,7 +22,7 @@ def record(cuts, facets, size=0.1):
     body = body_of((solid_scene if space else scene)(cuts))
     points, cells = cube_grid(n, n, n) if space else grid(n, n)
     given = solution(points, cells, 0 * points, cut_facets=facets)
-    return cut_record(given, body, cut_rules(body, size, 1)[0])
+    return realised_cut(given, body, cut_rules(body, size, 1)[0]).record
 
 
 def line(points, name="cut"):

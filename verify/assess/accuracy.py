@@ -33,6 +33,7 @@ from verify.compare.errors import Rules
 from verify.compare.hooke import Law, law_of
 from verify.compare.integration import spread_of
 from verify.compare.locate import ROUND_OFF
+from verify.compare.motion import SolutionMotion
 from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
@@ -235,6 +236,7 @@ def _measure(
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
     scene = one.scene
     assert scene is not None
+    record, other = with_cut(record, one, rules)
     if defect := _defect(scene, one):
         return _noted(record, _named(scene, defect))
     covered = one.coverage
@@ -242,7 +244,6 @@ def _measure(
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
     if (off := one.motion.off_surface) > ROUND_OFF * one.body.size:
         record = _noted(record, {"surface": f"up to {off:.3g} m off the surface of the scene"})
-    record = with_cut(record, one, rules)
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)
@@ -264,7 +265,7 @@ def _measure(
         without = _named(scene, missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
     elif not own:
-        errors, why, record = _errors(one, reference, rules, record)
+        errors, why, record = _errors(one, reference, rules, record, other)
         metrics, notes = errors + metrics, notes | why
     return _noted(replace(record, metrics=metrics), notes)
 
@@ -304,7 +305,11 @@ def _quantities(
 
 
 def _errors(
-    one: Measured, reference: Reference, rules: Rules, record: SolveRecord
+    one: Measured,
+    reference: Reference,
+    rules: Rules,
+    record: SolveRecord,
+    other: SolutionMotion | None,
 ) -> tuple[list[Metric], dict[str, str], SolveRecord]:
     assert one.scene is not None
     times = compared_times(one.scene, one.solution)
@@ -326,7 +331,7 @@ def _errors(
         # the scale is as uncertain as the reference: (1 + value), to first order
         width = known * (1 + value) + found.integration_error
         metrics.append(Metric(name, value, "1", None, width, reference.source))
-    record = with_other_errors(record, one, reference, times, rules)
+    record = with_other_errors(record, other, reference.motion, times, rules, one.law)
     return metrics, notes, replace(record, series=history.series())
 
 

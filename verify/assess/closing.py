@@ -18,6 +18,7 @@ import numpy as np
 from verify.assess.openings import Contestant, largest_opening_time, opening_profiles
 from verify.assess.reference import size_of
 from verify.compare.body import AnyBody, body_of
+from verify.compare.cut_deviation import continued_where
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch
 from verify.errors import InputError, UnsupportedSceneError
@@ -184,12 +185,13 @@ def _contestants(
         sizes = [size_of(levels[level]) for level in names]
         order = levels[names[-1]].order
         shown.append(Contestant(REFERENCE, names[-1], motions[-1], motions[:-1], sizes, order))
-    good = {(s.solver, s.level): s.continued for s in result.solves if s.metrics}
+    good = {(s.solver, s.level): s.cut for s in result.solves if s.metrics}
     for name, own in solutions.items():
         usable = [level for level in own if (name, level) in good]
         if name != REFERENCE and usable:
             finest = max(usable)
-            motion = SolutionMotion(own[finest], body, continued=good[name, finest])
+            where = continued_where(own[finest], body, good[name, finest])
+            motion = SolutionMotion(own[finest], body, continued=where)
             shown.append(Contestant(name, finest, motion))
     return shown
 

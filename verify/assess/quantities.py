@@ -1,21 +1,19 @@
 """Quantities of interest of a scene, measured on one solution."""
 
-from functools import cached_property
-
 import numpy as np
 
 from verify.assess.blade_intensity import blade_intensity
 from verify.assess.part_quantity import part_quantity, part_unit
 from verify.assess.stress_intensity import solution_intensity
 from verify.compare.body import AnyBody
+from verify.compare.cut_deviation import RealisedCut
 from verify.compare.hooke import Law
-from verify.compare.locate import ROUND_OFF, Field
+from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
 from verify.compare.opening import opening, point_displacement
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
-from verify.cut_record import CutRecord
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import (
@@ -41,30 +39,24 @@ class Measured:
     law : Law
     scene : Scene, optional
         Only stress-intensity factors and numbers of parts need it.
-    cut : CutRecord, optional
-        Of its realised cut: says whether its field is continued across that.
+    cut : RealisedCut, optional
+        Says where its field is continued across that.
     """
 
     def __init__(
         self, solution: Solution, body: AnyBody, law: Law, scene: Scene | None = None,
-        cut: CutRecord | None = None,
+        cut: RealisedCut | None = None,
     ) -> None:  # fmt: skip
         self.solution, self.body, self.law, self.scene = solution, body, law, scene
         self.cut = cut
-        self.motion = self._field_over_time(cut is None or cut.continued)
+        self.motion = SolutionMotion(solution, body, continued=True if cut is None else cut)
 
-    def _field_over_time(self, continued: bool) -> SolutionMotion:
+    def continued(self, everywhere: bool) -> SolutionMotion:
+        """Field over time with continuation across all of the realised cut, or without any."""
         # sides are asked as far as the cuts are apart; within the limit that is known from facets
-        beyond = self.cut is not None and not self.cut.continued
-        deviation = self.cut.lateral if self.cut is not None and beyond else 0.0
-        return SolutionMotion(self.solution, self.body, deviation, continued)
-
-    @cached_property
-    def other_motion(self) -> SolutionMotion | None:
-        """Field without continuation if `motion` is with it, and the reverse; None if the same."""
-        if self.cut is None or self.cut.lateral <= ROUND_OFF * self.body.size:
-            return None
-        return self._field_over_time(not self.cut.continued)
+        far = self.cut is not None and not self.cut.record.continued
+        deviation = self.cut.record.lateral if self.cut is not None and far else 0.0
+        return SolutionMotion(self.solution, self.body, deviation, everywhere)
 
     @property
     def field(self) -> Field:

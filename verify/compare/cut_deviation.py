@@ -5,6 +5,8 @@ belongs to the cut that it is nearest to. A point whose nearest point is a free 
 there something is missing, or too much. All other distances are lateral deviations.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -16,6 +18,7 @@ from verify.compare.cell_tree import build_cell_tree
 from verify.compare.curves import Arc
 from verify.compare.cut_line import CutRule
 from verify.compare.facet_kernels import distance_to_segments, nearest_segments
+from verify.compare.integration import cut_rules
 from verify.compare.locate import ROUND_OFF
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_kernels import nearest_triangles
@@ -29,6 +32,7 @@ from verify.solution import Solution
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 # Over the longest edge D of an element: what the linear interpolant of the distance from an arc of
 # radius 2D may be off by (docs/theory/judgement.md, "Where the cut is").
@@ -36,11 +40,37 @@ LIMIT = {2: 1 / 12, 3: 3 / 32}
 _ORDER = {2: 8, 3: 3}  # of the rule on segments and on triangles
 # Of its distance from a point of the realised cut: a place this close to that cut was cut there.
 _AT = 0.1
-_STEP = 1e-6  # of the body's size: a place this far inside its surface is inside
+_STEP = 1e-6  # of sizes: a place this far inside a body is inside it, a thinner facet none
 
 
-def cut_record(solution: Solution, body: AnyBody, rule: CutRule) -> CutRecord | None:
-    """Measure a realised cut, without what is swept; None of a body without cuts.
+@dataclass(frozen=True)
+class RealisedCut:
+    """A realised cut, and how far it is from the cut as asked.
+
+    Parameters
+    ----------
+    record : CutRecord
+        Without what is swept.
+    facets : (f, k, d) array
+    beyond : (f,) bool array
+        Facets at which the lateral deviation is above the limit.
+    """
+
+    record: CutRecord
+    facets: Array
+    beyond: Flags
+
+    def beyond_at(self, points: Array) -> Flags:
+        """Whether the facets nearest to points (n, d) lie beyond the limit (n,)."""
+        if self.record.continued or not len(points):
+            return np.zeros(len(points), dtype=bool)
+        return np.asarray(
+            self.beyond[_nearest_facets(points, self.facets, _STEP * self.record.element)[2]]
+        )
+
+
+def realised_cut(solution: Solution, body: AnyBody, rule: CutRule) -> RealisedCut:
+    """Measure the realised cut of a body with cuts.
 
     Parameters
     ----------
@@ -49,8 +79,6 @@ def cut_record(solution: Solution, body: AnyBody, rule: CutRule) -> CutRecord | 
     rule : CutRule
         On its cuts as asked. Between its points nothing is seen.
     """
-    if not body.has_cuts:
-        return None
     same = ROUND_OFF * body.size
     _, number = welded(solution.cut_facets, same)
     distinct = (np.diff(np.sort(number, axis=1), axis=1) > 0).all(axis=1)
@@ -60,13 +88,19 @@ def cut_record(solution: Solution, body: AnyBody, rule: CutRule) -> CutRecord | 
     d, element = solution.cell_dimension, _element(solution, facets)
     limit = LIMIT[d] * element
     forth, back, missing, surplus = [0.0], [0.0], 0.0, 0.0
+    beyond = np.zeros(len(facets), dtype=bool)
     for k, cut in enumerate(body.cuts):
-        points, weights, own = rule.points[mine[k]], rule.weights[mine[k]], facets[theirs[k]]
-        away, end = _to_realised(points, rule.normals[mine[k]], own, body, same)
+        rows = np.flatnonzero(theirs[k])
+        points, weights, own = rule.points[mine[k]], rule.weights[mine[k]], facets[rows]
+        away, end, nearest = _to_realised(points, rule.normals[mine[k]], own, body, same)
         missing += float(weights[end].sum())
         forth.append(float(away[~end].max(initial=0.0)))
+        beyond[rows[nearest[~end & (away > limit)]]] = True
+
         points, weights = points_in(own, _ORDER[facets.shape[1]])
-        points = np.concatenate([points, probes[theirs[k]].reshape(-1, points.shape[1])])
+        of_facet = np.repeat(rows, len(points) // max(len(rows), 1))
+        of_facet = np.concatenate([of_facet, np.repeat(rows, probes.shape[1])])
+        points = np.concatenate([points, probes[rows].reshape(-1, points.shape[1])])
         away, foot, end = _to_asked(points, body, cut, same)
         # beside a place where the cut was made as asked it was made once more
         far = np.flatnonzero(~end & (away > limit))
@@ -75,7 +109,18 @@ def cut_record(solution: Solution, body: AnyBody, rule: CutRule) -> CutRecord | 
             end[far] = there <= _AT * away[far]
         surplus += float(weights[end[: len(weights)]].sum())
         back.append(float(away[~end].max(initial=0.0)))
-    return CutRecord(d, max(forth), max(back), missing, surplus, 0.0, element, limit, _radius(body))
+        beyond[of_facet[~end & (away > limit)]] = True
+    found = max(forth), max(back), missing, surplus, 0.0, element, limit, _radius(body)
+    return RealisedCut(CutRecord(d, *found), facets, beyond)
+
+
+def continued_where(
+    solution: Solution, body: AnyBody, record: CutRecord | None
+) -> bool | RealisedCut:
+    """Where a field is continued across its realised cut, of which the record is known."""
+    if record is None or record.continued:
+        return True
+    return realised_cut(solution, body, cut_rules(body, record.element, 1)[0])
 
 
 def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
@@ -102,27 +147,25 @@ def _of_cuts(body: AnyBody, places: Array, same: float) -> Flags:
 
 def _to_realised(
     points: Array, normals: Array | None, facets: Array, body: AnyBody, same: float
-) -> tuple[Array, Flags]:
-    """Distances (n,) of points of a cut as asked from facets, and whether these end there (n,)."""
+) -> tuple[Array, Flags, Ints]:
+    """Distances (n,) of points from facets, whether these end there (n,), and the nearest (n,)."""
     if not len(facets):
-        return np.full(len(points), np.inf), np.ones(len(points), dtype=bool)
+        nowhere = np.full(len(points), np.inf), np.ones(len(points), dtype=bool)
+        return *nowhere, np.zeros(len(points), dtype=np.int64)
     free = _free_faces(facets, body, same)
-    if facets.shape[1] == 3:
-        away, to_face = _to_triangles(points, facets, same), free
-    else:
-        away, foot = nearest_segments(points, *_ends(facets))
-        to_face = np.repeat(free, 2, axis=1)
+    away, foot, nearest = _nearest_facets(points, facets, same)
+    to_face = free if facets.shape[1] == 3 else np.repeat(free, 2, axis=1)
     end = distance_to_segments(points, *_ends(to_face)) <= away + same
     if isinstance(body, MembraneBody) and normals is not None:  # the surfaces may be apart
         away = np.abs(np.sum((points - foot) * normals, axis=1))
-    return away, end
+    return away, end, nearest
 
 
 def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Array, Array, Flags]:
     """Distances (n,) of points from a cut as asked, feet (n, d), and whether it ends there (n,)."""
     if isinstance(body, MembraneBody):
         ends = body.lines[cut].ends
-        away, foot = nearest_segments(points, *_ends(ends))
+        away, foot, _ = nearest_segments(points, *_ends(ends))
     else:
         pieces = body.cuts[cut]
         feet = np.array([piece.foot(points) for piece in pieces])
@@ -161,19 +204,21 @@ def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
     return np.asarray(free[within])
 
 
-def _to_triangles(points: Array, triangles: Array, same: float) -> Array:
-    """Distance (n,) of points (n, 3) from the nearest of triangles (f, 3, 3)."""
-    corners = np.ascontiguousarray(triangles[heights(triangles) > same])
+def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, Array, Ints]:
+    """Distance (n,) of points (n, d), the foot (n, d) on segments, and the nearest facet (n,)."""
+    if facets.shape[1] == 2:
+        return nearest_segments(np.ascontiguousarray(points), *_ends(facets))
+    thick = np.flatnonzero(heights(facets) > same)
+    corners = np.ascontiguousarray(facets[thick])
     shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
     no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
-    return np.asarray(
-        nearest_triangles(
-            np.ascontiguousarray(points), np.zeros((0, 3)), no_sides[0],
-            tree.over(corners, shape.normals),
-            np.ascontiguousarray(triangle_frames(corners)[:, 2]), no_sides[1], same,
-        )[1]
+    found, away = nearest_triangles(
+        np.ascontiguousarray(points), np.zeros((0, 3)), no_sides[0],
+        tree.over(corners, shape.normals),
+        np.ascontiguousarray(triangle_frames(corners)[:, 2]), no_sides[1], same,
     )  # fmt: skip
+    return away, points, thick[found]
 
 
 def _element(solution: Solution, facets: Array) -> float:

@@ -12,21 +12,24 @@ def distance_to_segments(points: _Floats, starts: _Floats, ends: _Floats) -> _Fl
     return nearest_segments(points, starts, ends)[0]
 
 
-def nearest_segments(points: _Floats, starts: _Floats, ends: _Floats) -> tuple[_Floats, _Floats]:
-    """Distance (n,) of points (n, d) to the nearest of segments (k, d)–(k, d), and its foot (n, d).
+def nearest_segments(
+    points: _Floats, starts: _Floats, ends: _Floats
+) -> tuple[_Floats, _Floats, NDArray[np.int64]]:
+    """Distance (n,) of points (n, d) to the nearest segment, its foot (n, d), and which it is (n,).
 
-    Without any segment the distance is infinite, and the foot the point.
+    Without any segment the distance is infinite, the foot the point, and the segment −1.
     """
     distance, foot = np.empty(len(points)), np.array(points, dtype=float)
-    _nearest(points, starts, ends, distance, foot)
-    return distance, foot
+    which = np.empty(len(points), dtype=np.int64)
+    _nearest(points, starts, ends, distance, foot, which)
+    return distance, foot, which
 
 
 @njit(cache=True)
-def _nearest(points, starts, ends, distance, foot):
+def _nearest(points, starts, ends, distance, foot, which):
     n, d = points.shape
     for i in range(n):
-        best, where, share = np.inf, -1, 0.0
+        best, share, which[i] = np.inf, 0.0, -1
         for k in range(starts.shape[0]):
             along, length2 = 0.0, 0.0
             for c in range(d):
@@ -38,8 +41,8 @@ def _nearest(points, starts, ends, distance, foot):
             for c in range(d):
                 away2 += (points[i, c] - (1 - t) * starts[k, c] - t * ends[k, c]) ** 2
             if away2 < best:
-                best, where, share = away2, k, t
-        distance[i] = np.sqrt(best)
-        if where >= 0:
+                best, which[i], share = away2, k, t
+        distance[i], k = np.sqrt(best), which[i]
+        if k >= 0:
             for c in range(d):
-                foot[i, c] = (1 - share) * starts[where, c] + share * ends[where, c]
+                foot[i, c] = (1 - share) * starts[k, c] + share * ends[k, c]

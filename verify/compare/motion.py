@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
+from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import Field, SolutionField
 from verify.compare.realised import field_of
 from verify.errors import InputError
@@ -77,7 +78,11 @@ class SolutionMotion:
     """
 
     def __init__(
-        self, solution: Solution, body: AnyBody, deviation: float = 0.0, continued: bool = True
+        self,
+        solution: Solution,
+        body: AnyBody,
+        deviation: float = 0.0,
+        continued: bool | RealisedCut = True,
     ) -> None:
         self.solution = solution
         self._field = field_of(solution, body, deviation=deviation, continued=continued)

@@ -2,7 +2,8 @@
 
 Between the cut as asked and the cut as realised, the cell that holds a point lies on the wrong
 side. There the field is continued from the nearest cell on the right side of the realised cut,
-where that is a matter of facets (`CutRecord.continued`); else it stands as it was stored.
+where that is a matter of facets; beside facets beyond the limit (`RealisedCut`) it stands as it was
+stored.
 Where a solver has no cut at all (ahead of a tip that it moved back), nothing is changed: the field
 there is what the solver says it is, and the error is real.
 """
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody
 from verify.compare.cell_sides import sides_of_cells
+from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_field import MembraneField
@@ -27,19 +29,21 @@ def field_of(
     body: AnyBody,
     step: int = -1,
     deviation: float = 0.0,
-    continued: bool = True,
+    continued: bool | RealisedCut = True,
 ) -> SolutionField:
     """Make the field of a solution, with the sides of the cuts of `body` as asked.
 
     `deviation` in m is that of another solution's cut, if the field is asked on that one's sides,
     or what is known of its own. Unless it is `continued`, the field is that of the cell that holds
-    a point, whatever its side.
+    a point, whatever its side; with a `RealisedCut`, beside facets beyond the limit (of a membrane
+    everywhere, if there are any).
     """
+    cut = continued if isinstance(continued, RealisedCut) else None
     if isinstance(body, MembraneBody):
-        return MembraneField(solution, body, step, continued)
+        return MembraneField(solution, body, step, cut.record.continued if cut else bool(continued))
     if not len(solution.cut_facets) or not body.has_cuts or not continued:
         return SolutionField(solution, step)
-    return SidedField(solution, body, step, deviation)
+    return SidedField(solution, body, step, deviation, cut)
 
 
 def cut_deviation(solution: Solution, body: AnyBody) -> float:
@@ -68,12 +72,20 @@ class SidedField(SolutionField):
         Output time that is evaluated; default the last.
     deviation : float
         How far from the cuts as asked sides matter at least, m.
+    cut : RealisedCut, optional
+        Beside its facets beyond the limit sides do not count.
     """
 
     def __init__(
-        self, solution: Solution, body: AnyBody, step: int = -1, deviation: float = 0.0
+        self,
+        solution: Solution,
+        body: AnyBody,
+        step: int = -1,
+        deviation: float = 0.0,
+        cut: RealisedCut | None = None,
     ) -> None:
         super().__init__(solution, step)
+        self._cut = cut
         self._cuts, self._size = asked_cuts(body), body.size
         same = ROUND_OFF * body.size
         self._reach = 2.0 * max(cut_deviation(solution, body), deviation, same)
@@ -88,6 +100,8 @@ class SidedField(SolutionField):
         reach = np.full(len(self._centres), self._reach)
         asked = asked_sides(self._cuts, self._centres, reach, self._size)
         right = (asked * self._sides >= 0).all(axis=1)
+        if self._cut is not None:
+            right |= self._cut.beyond_at(self._centres)
         at = np.array(cells, copy=True)
         wrong = np.flatnonzero(~right[at])
         for sides in np.unique(self._sides[at[wrong]], axis=0):
@@ -102,4 +116,8 @@ class SidedField(SolutionField):
         """Sides (n, c) of the cuts as asked on which `near` lies, of points close to these."""
         side = points if near is None else np.asarray(near, dtype=float)
         reach = self._reach + np.linalg.norm(side - points, axis=1)
-        return asked_sides(self._cuts, side, reach, self._size)
+        wanted = asked_sides(self._cuts, side, reach, self._size)
+        if self._cut is not None:
+            near_cut = np.flatnonzero(wanted.any(axis=1))
+            wanted[near_cut[self._cut.beyond_at(points[near_cut])]] = 0
+        return wanted

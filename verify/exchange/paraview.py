@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from verify.compare.body import body_of
 from verify.compare.locate import SolutionField
 from verify.compare.stress import strain_and_stress
+from verify.cut_record import CutRecord
 from verify.errors import InputError
 from verify.json_files import read_json
 from verify.report.bodies import read_stored
@@ -88,7 +89,7 @@ def export_fields(
             own = None if solve.solver == REFERENCE else truth
             with asked_place(out):
                 place = out / entry.folder.name / name
-                written.append(_write_series(scene, solution, own, place, solve.continued))
+                written.append(_write_series(scene, solution, own, place, solve.cut))
     if not written:
         asked = f"{', '.join(solvers) or 'any solver'}, level {'any' if level is None else level}"
         raise InputError(f"holds no stored solution of {asked}", str(run))
@@ -122,13 +123,14 @@ def _truth(run: Path, entry: CaseEntry, scene: Scene, judged: Sequence[Solution]
 
 
 def _write_series(
-    scene: Scene, solution: Solution, truth: Truth | None, place: Path, continued: bool
+    scene: Scene, solution: Solution, truth: Truth | None, place: Path, cut: CutRecord | None
 ) -> Path:
     """Write the mesh and fields of each output time, and the collection that names the times."""
     place.mkdir(parents=True, exist_ok=True)
     steps = range(len(solution.times))
-    body = body_of(scene) if continued else None
-    error = None if truth is None else nodal_differences(solution, truth, body, steps)
+    error = None
+    if truth is not None:
+        error = nodal_differences(solution, truth, body_of(scene), steps, cut)
     collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     entries = ElementTree.SubElement(collection, "Collection")
     field = SolutionField(solution)

@@ -178,7 +178,7 @@ def cuts_table(result: CaseResult) -> Table | None:
         if cut is None or CUT not in solve.notes:
             continue
         of_ends, of_swept = ("m", "m²") if cut.dimension == 2 else ("m²", "m³")
-        judged = f"{'with' if cut.continued else 'without'} continuation"
+        judged = f"{'with' if cut.continued else 'partly without'} continuation"
         judged += ", under-resolved" if cut.under_resolved else ""
         rows.append(
             [

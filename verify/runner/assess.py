@@ -175,7 +175,7 @@ def _error_pictures(
     body = body_of(scene)
     judged = [own[max(own)] for solver, own in solutions.items() if solver != REFERENCE]
     truth = truth_of(scene, solutions.get(REFERENCE, {}), judged, exact)
-    continued = {(solve.solver, solve.level): solve.continued for solve in result.solves}
+    cuts = {(solve.solver, solve.level): solve.cut for solve in result.solves}
     pictures: dict[str, Path] = {}
     for solver, own in solutions.items():
         if solver == REFERENCE or truth is None:
@@ -183,8 +183,8 @@ def _error_pictures(
         path = folder / f"error_field_{folder_name(solver)}.vtu"
         try:
             finest = own[max(own)]
-            sides = body if continued[solver, max(own)] else None
-            write_error_field(finest, truth(float(finest.times[-1])), path, sides)
+            cut = cuts[solver, max(own)]
+            write_error_field(finest, truth(float(finest.times[-1])), path, body, cut)
         except Exception:  # a solution that cannot be drawn costs nobody else a picture
             traceback.print_exc()
             continue

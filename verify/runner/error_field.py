@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody, body_of
+from verify.compare.cut_deviation import continued_where
 from verify.compare.locate import Field, SolutionField
 from verify.compare.motion import ExactMotion
 from verify.compare.realised import cut_deviation, field_of
 from verify.compare.simplices import simplices
+from verify.cut_record import CutRecord
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
@@ -58,8 +60,9 @@ def truth_of(
 
 
 def nodal_differences(
-    solution: Solution, truth: Truth, body: AnyBody | None = None, steps: Sequence[int] = (-1,)
-) -> Array:
+    solution: Solution, truth: Truth, body: AnyBody | None = None, steps: Sequence[int] = (-1,),
+    cut: CutRecord | None = None,
+) -> Array:  # fmt: skip
     """Displacement of a solution less the true one, at its nodes, m.
 
     Both fields are taken a hundredth of the way from the node to the centre of its largest cell,
@@ -72,9 +75,11 @@ def nodal_differences(
         The reference or exact field at a time, s.
     body : Body, SolidBody or MembraneBody, optional
         Its cuts as asked: where they are not as realised, the truth is asked on the side of the
-        solution's cell. Without it nothing is continued across the cut.
+        solution's cell.
     steps : sequence of int
         Output times that are looked at; default the last.
+    cut : CutRecord, optional
+        Of its realised cut: beside facets beyond its limit that side is the one as realised.
 
     Returns
     -------
@@ -89,7 +94,9 @@ def nodal_differences(
     used = owner >= 0
     centre = shape.corners.mean(axis=1)[owner[used]]
     inside = points[used] + _INTO_CELL * (centre - points[used])
-    field = SolutionField(solution) if body is None else field_of(solution, body)
+    field = SolutionField(solution)
+    if body is not None:
+        field = field_of(solution, body, continued=continued_where(solution, body, cut))
     beside = field.inner_points(owner[used])
     difference = np.zeros((len(steps), *points.shape))
     for k, step in enumerate(steps):
@@ -99,14 +106,17 @@ def nodal_differences(
     return difference
 
 
-def nodal_error(solution: Solution, truth: Field, body: AnyBody | None = None) -> Array:
+def nodal_error(
+    solution: Solution, truth: Field, body: AnyBody | None = None, cut: CutRecord | None = None
+) -> Array:
     """Magnitude (n,) of the displacement error at the last output time, as `nodal_differences`."""
-    return np.linalg.norm(nodal_differences(solution, lambda _: truth, body)[0], axis=1)
+    return np.linalg.norm(nodal_differences(solution, lambda _: truth, body, cut=cut)[0], axis=1)
 
 
 def write_error_field(
-    solution: Solution, truth: Field, path: Path, body: AnyBody | None = None
-) -> None:
+    solution: Solution, truth: Field, path: Path, body: AnyBody | None = None,
+    cut: CutRecord | None = None,
+) -> None:  # fmt: skip
     """Write the mesh of `solution` with point data ``error`` (m) and ``displacement`` (m)."""
     import meshio
 
@@ -117,7 +127,7 @@ def write_error_field(
     mesh = meshio.Mesh(
         points,
         [(solution.cell_type, solution.cells)],
-        point_data={"error": nodal_error(solution, truth, body), "displacement": displacement},
+        point_data={"error": nodal_error(solution, truth, body, cut), "displacement": displacement},
     )
     with whole_file(path) as partial:
         mesh.write(partial, file_format="vtu")
