@@ -16,6 +16,7 @@ from verify.compare.body import AnyBody
 from verify.compare.cell_sides import sides_of_cells
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import ROUND_OFF, SolutionField
+from verify.compare.locate_kernels import find_cells
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_field import MembraneField
 from verify.compare.sides import asked_cuts, asked_sides
@@ -118,6 +119,18 @@ class SidedField(SolutionField):
         reach = self._reach + np.linalg.norm(side - points, axis=1)
         wanted = asked_sides(self._cuts, side, reach, self._size)
         if self._cut is not None:
-            near_cut = np.flatnonzero(wanted.any(axis=1))
-            wanted[near_cut[self._cut.beyond_at(points[near_cut])]] = 0
+            rows = np.flatnonzero(wanted.any(axis=1))
+            rows = rows[self._cut.beyond_at(points[rows])]
+            wanted[rows[self._in_material(points[rows])]] = 0
         return wanted
+
+    def _in_material(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points (n, d) lie in a cell: in a hole that a method left nothing is stored."""
+        free, sides = (np.zeros((len(a), 0), dtype=np.int8) for a in (points, self._cells))
+        tolerance = ROUND_OFF * self.scale
+        at = find_cells(
+            np.ascontiguousarray(points), points[:0], free, self._searched, sides, tolerance
+        )
+        off = points[:, None] - np.roll(self.shape.corners[at], -1, axis=1)
+        height = np.sum(self.shape.normals[at] * off, axis=2)
+        return np.asarray(height.min(axis=1, initial=np.inf) >= -tolerance)
