@@ -9,6 +9,7 @@ from typing import Any
 from verify.cli.cost_text import case_lines, costs_of, memory_line
 from verify.errors import InputError
 from verify.printable import one_line
+from verify.runner.body_size import body_text, coincident_nodes
 from verify.runner.checking import check_scene
 from verify.runner.cost import LevelCost
 from verify.runner.options import Options
@@ -28,11 +29,13 @@ def execute(arguments: argparse.Namespace) -> int:
                 print(f"verify: error: {row['error']}", file=sys.stderr)
             else:
                 print(f"{row['file']}: ok ({row['title']})")
+                if row["body"]:
+                    print(f"  body: {row['body']}")
                 costs = [LevelCost(**one) for one in row["cost"]]
                 for line in case_lines(costs):
                     print(f"  {line}")
-                if hopeless := memory_line(costs):
-                    print(f"verify: {row['file']}: {hopeless}", file=sys.stderr)
+                for warning in filter(None, [memory_line(costs), row["warning"]]):
+                    print(f"verify: {row['file']}: warning: {warning}", file=sys.stderr)
     if not arguments.json and not cache_folder().exists():  # nothing was ever run here
         print("which suite first: `verify run -k demo` (a minute) shows that all works here")
     return 2 if any(row["error"] for row in rows) else 0
@@ -44,7 +47,15 @@ def _row(file: str, options: Options) -> dict[str, Any]:
         for scene in scenes:
             check_scene(scene)
     except InputError as error:
-        return {"file": file, "title": None, "error": one_line(error), "cost": []}
+        error_row = {"title": None, "error": one_line(error), "body": "", "warning": ""}
+        return {"file": file, **error_row, "cost": []}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
     cost = [asdict(one) for scene in scenes for one in costs_of(scene, options)]
-    return {"file": file, "title": f"{scenes[0].title}{rows}", "error": None, "cost": cost}
+    return {
+        "file": file,
+        "title": f"{scenes[0].title}{rows}",
+        "error": None,
+        "body": body_text(scenes[0]),
+        "warning": coincident_nodes(scenes[0]),
+        "cost": cost,
+    }

@@ -39,7 +39,7 @@ def memory_line(costs: Iterable[LevelCost]) -> str:
     for row in costs:
         if row.memory > _HOPELESS * available:
             return (
-                f"warning: level {row.level} of {row.solver} would take about "
+                f"level {row.level} of {row.solver} would take about "
                 f"{memory_text(row.memory)}, and this machine has {memory_text(available)}; "
                 "expected mesh sizes in metres that fit the body"
             )

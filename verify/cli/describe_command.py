@@ -5,6 +5,8 @@ import json
 import textwrap
 from typing import Any
 
+from verify.errors import InputError
+from verify.runner.body_size import body_text
 from verify.scene import Scene, load_scene, scene_hash
 
 
@@ -22,7 +24,7 @@ def description(scene: Scene) -> str:
     """Return the case in words: requirement, body, cuts, supports, loads, what is judged."""
     parts: list[tuple[str, list[str]]] = [
         ("tags", [", ".join(scene.tags)] if scene.tags else []),
-        ("body", [_keys(scene.geometry)]),
+        ("body", [_keys(scene.geometry), *filter(None, [_size(scene)])]),
         ("material", [_keys(scene.material)]),
         ("mesh", [_mesh(scene)]),
         ("cuts", [f"{cut.name}: {_keys(cut, 'name', 'opens_at')}" for cut in scene.cuts]),
@@ -54,6 +56,13 @@ def description(scene: Scene) -> str:
                 )
             )
     return "\n".join(lines)
+
+
+def _size(scene: Scene) -> str:
+    try:
+        return body_text(scene)
+    except (InputError, OSError) as error:  # a case is described without its mesh file, too
+        return str(error)
 
 
 def _demand(check: Any) -> str:

@@ -124,7 +124,7 @@ def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
         assert coarse is not None
         nodes, size = coarse[0] * 2.0 ** (scene.cell_dimension * level), coarse[1] / 2**level
     elif isinstance(body, Rectangle | Box | Polygon):
-        extent = _volume(scene) ** (1 / scene.dimension)
+        extent = volume_of(scene) ** (1 / scene.dimension)
         size = scene.reference.size or extent / _FINENESS[scene.dimension]
         size /= 2**level
         nodes = _GRADED[scene.dimension] * _nodes(scene, size)
@@ -135,12 +135,12 @@ def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
 
 def _nodes(scene: Scene, size: float) -> float:
     """Nodes of an unstructured mesh: of equilateral cells, and half of those on its boundary."""
-    d, volume = scene.dimension, _volume(scene)
+    d, volume = scene.dimension, volume_of(scene)
     inside = (_PER_AREA if d == 2 else _PER_VOLUME) * volume / size**d
     return float(inside + d * volume ** ((d - 1) / d) / size ** (d - 1))
 
 
-def _volume(scene: Scene) -> float:
+def volume_of(scene: Scene) -> float:
     """Area or volume of a rectangle, a box or a polygon."""
     body = scene.geometry
     if isinstance(body, Box):

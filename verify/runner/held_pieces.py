@@ -1,6 +1,7 @@
 """Pieces that nothing holds, found before a run: all solvers find them, after their work."""
 
 from verify.errors import InputError
+from verify.runner.body_size import coincident_nodes
 from verify.runner.cost import mesh_of_level
 from verify.scene import Equilibrium, Scene
 from verify.solvers.body_of_scene import background_mesh
@@ -34,7 +35,9 @@ def check_pieces_are_held(scene: Scene, exact: object) -> None:
         phantom, _ = join_specks(phantom, supports_of(scene, phantom, exact))
         check_bodies(phantom, supports_of(scene, phantom, exact))
     except UnsupportedBodyError as error:
-        raise InputError(f"supports: {error}", str(scene.file or scene.name)) from None
+        apart = coincident_nodes(scene)
+        text = f"supports: {error}{f' ({apart})' if apart else ''}"
+        raise InputError(text, str(scene.file or scene.name)) from None
     except XfemError:
         return  # no fault of the scene: another method may cut this mesh
 

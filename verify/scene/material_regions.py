@@ -26,7 +26,7 @@ def check_material_regions(scene: SceneTables) -> None:
         if region.density is not None and scene.material.density is None:
             raise ValueError(f"{place}.density: material.density is missing")
     if scene.material.regions:
-        _check_not_empty(scene, _samples(scene))
+        _check_not_empty(scene, points_of_body(scene))
 
 
 def check_regions_of_mesh(scene: SceneTables, points: Array, cells: NDArray[np.int64]) -> None:
@@ -49,7 +49,7 @@ def _check_not_empty(scene: SceneTables, points: Array) -> None:
         raise ValueError("material.regions: they cover the body; [material] is that of no part")
 
 
-def _samples(scene: SceneTables) -> Array:
+def points_of_body(scene: SceneTables) -> Array:
     """Points (n, d) all over the body; none of a body that only its mesh file knows."""
     body, d = scene.geometry, scene.dimension
     if isinstance(body, Rectangle | Polygon):

@@ -10,6 +10,7 @@ from verify.scene.loading import mesh_path
 from verify.scene.scene import Scene
 
 _SIMPLEX = {2: "triangle", 3: "tetra"}
+_PLANE = 1e-9  # of a plane body: what its z coordinates may differ by, as round-off
 _BELOW = {2: {"vertex", "line"}, 3: {"vertex", "line", "triangle"}}  # parts, which are not used
 
 
@@ -44,8 +45,10 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if strange or _SIMPLEX[k] not in kinds:
         found = ", ".join(sorted(strange or kinds)) or "no cells"
         raise InputError(f"not simplicial: has {found}; expected {_SIMPLEX[k]}s", str(path))
-    if d == 2 and mesh.points.shape[1] == 3 and np.ptp(mesh.points[:, 2]) > 0:
-        raise InputError("not plane: its z coordinates differ", str(path))
+    if d == 2 and mesh.points.shape[1] == 3:
+        *sides, height = np.ptp(mesh.points, axis=0)
+        if height > _PLANE * max(sides):
+            raise InputError(f"not plane: its z coordinates differ by {height:.3g} m", str(path))
     points = np.ascontiguousarray(mesh.points[:, :d], dtype=float)
     cells = mesh.cells_dict[_SIMPLEX[k]].astype(np.int64)
     if cells.min() < 0 or cells.max() >= len(points):

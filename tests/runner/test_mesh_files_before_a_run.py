@@ -1,0 +1,102 @@
+"""What `check` says of mesh files: size and mass, nodes written twice, why one is not read."""
+
+import json
+import warnings
+
+import meshio
+import numpy as np
+import pytest
+from case_texts import cut_text, support_text
+
+from verify.cli import main
+from verify.xfem.structured_meshes import box_mesh
+
+TEXT = (
+    'title = "t"\nrequirement = "r"\n[geometry]\nkind = "file"\nfile = "{file}"\ndimension = 3\n'
+    '[mesh]\npattern = "given"\n[material]\nyoung = 1e4\npoisson = 0.3\ndensity = 1000.0\n'
+    + support_text("x < 0.1", [0, 0, 0])
+    + support_text("x > {far}", [0, 0, 0])
+)
+BOX = box_mesh((4, 3, 2), (0.0, 0.0, 0.0), (2.0, 1.0, 1.0))
+
+
+def _checked(folder, capsys, points, cells, far=1.9):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        meshio.Mesh(points, [("tetra", cells)]).write(folder / "body.vtu")
+    (folder / "case.toml").write_text(TEXT.format(file="body.vtu", far=far))
+    code = main(["check", str(folder / "case.toml")])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def _torn(share):
+    """The box with the nodes at x = 1 below a share of its height written twice, 1e-8 apart."""
+    at = np.flatnonzero((np.abs(BOX.points[:, 0] - 1.0) < 1e-9) & (BOX.points[:, 2] <= share))
+    number = np.arange(len(BOX.points))
+    number[at] = len(BOX.points) + np.arange(len(at))
+    right = BOX.points[BOX.cells].mean(axis=1)[:, 0] > 1.0
+    cells = np.where(right[:, None], number[BOX.cells], BOX.cells)
+    return np.vstack([BOX.points, BOX.points[at] + 1e-8]), cells, len(at)
+
+
+def test_size_and_mass_are_said(tmp_path, capsys):
+    code, out, err = _checked(tmp_path, capsys, BOX.points, BOX.cells)
+    assert (code, err) == (0, "")
+    assert "body: 2 × 1 × 1 m, 60 nodes, 144 cells, 2 m³, 2e+03 kg" in out
+    # millimetres are seen
+    out = _checked(tmp_path, capsys, 1000 * BOX.points, BOX.cells, far=1999)[1]
+    assert "body: 2e+03 × 1e+03 × 1e+03 m" in out
+    assert main(["check", "--json", str(tmp_path / "case.toml")]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["body"].endswith("2e+09 m³, 2e+12 kg")
+
+
+def test_nodes_that_are_written_twice_are_counted_and_placed(tmp_path, capsys):
+    points, cells, count = _torn(0.6)
+    code, out, err = _checked(tmp_path, capsys, points, cells)
+    assert code == 0
+    assert f"warning: {count} pairs of nodes of 'body.vtu' lie within 2e-06 m of each other" in err
+    assert "one at (1, 0, 0)" in err
+    # written apart all over, and one half not held: that is why
+    points, cells, count = _torn(1.0)
+    code, _, err = _checked(tmp_path, capsys, points, cells, far="1.9 and x < 0.05 or x < 0.09")
+    assert code == 2
+    assert "can move as a rigid body" in err
+    assert f"{count} pairs of nodes" in err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        (
+            "a.vtk",
+            "version https://git-lfs.github.com/spec/v1\n",
+            "Illegal VTK header",
+        ),
+        (
+            "b.vtk",
+            "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n",
+            "(not POLYDATA)",
+        ),
+    ],
+)
+def test_the_reason_of_meshio_is_said(tmp_path, capsys, name, text, said):
+    (tmp_path / name).write_text(text)
+    (tmp_path / "case.toml").write_text(TEXT.format(file=name, far=1.9))
+    assert main(["check", str(tmp_path / "case.toml")]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "SystemExit" not in err
+
+
+def test_a_plane_mesh_may_be_off_its_plane_by_round_off(tmp_path, capsys):
+    points = np.array([[0, 0, 0], [1, 0, 1e-17], [1, 1, 0], [0, 1, -1e-16]], dtype=float)
+    cells = np.array([[0, 1, 2], [0, 2, 3]])
+    text = TEXT.format(file="body.vtu", far=0.9).replace("dimension = 3", "dimension = 2")
+    text = text.replace("[material]\n", '[material]\nplane = "strain"\n').replace("0, 0, 0", "0, 0")
+    text = text.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0]") + cut_text([-0.1, 0.4], [1.1, 0.5])
+    (tmp_path / "case.toml").write_text(text)
+    for height, code in ((1.0, 0), (1e9, 2)):
+        meshio.Mesh(points * [1, 1, height], [("triangle", cells)]).write(tmp_path / "body.vtu")
+        assert main(["check", str(tmp_path / "case.toml")]) == code
+    assert "z coordinates differ by 1.1e-07 m" in capsys.readouterr().err

@@ -1,0 +1,66 @@
+"""Size and mass of a body, and nodes of its mesh file that coincide: to be read before a run."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from verify.runner.cost import volume_of
+from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
+from verify.scene.material_regions import points_of_body
+
+_CLOSE = 1e-6  # of the body: nodes that were written apart and meant to be one
+
+
+def body_text(scene: Scene) -> str:
+    """Say extent, volume and mass of a body, of a mesh file its nodes and cells too.
+
+    Empty for a body that is meshed elsewhere (a skin).
+
+    Raises
+    ------
+    InputError, ValueError
+        If the mesh file is bad.
+    """
+    body, d = scene.geometry, scene.dimension
+    mesh = ""
+    if isinstance(body, MeshFile):
+        # not at the top: commands that only read cases load no numba
+        from verify.xfem.mesh import SimplexMesh
+
+        grid = SimplexMesh(*read_mesh(scene))
+        sides, places, volumes = np.ptp(grid.points, axis=0), grid.points[grid.cells], grid.measures
+        places = places.mean(axis=1)
+        mesh = f", {len(grid.points)} nodes, {len(grid.cells)} cells"
+    elif isinstance(body, Rectangle | Polygon | Box):
+        corners = [body.lower, body.upper] if isinstance(body, Box) else body.outline()
+        sides, places = np.ptp(corners, axis=0), points_of_body(scene)
+        volumes = np.full(len(places), volume_of(scene) / len(places))
+    else:
+        return ""
+    extent = " × ".join(f"{side:.3g}" for side in sides)
+    power = "²" if scene.cell_dimension == 2 else "³"
+    mass = ""
+    if scene.material.density is not None:
+        weights = volumes * scene.material.at(places).density * (scene.material.thickness or 1.0)
+        mass = f", {weights.sum():.3g} kg{' per m of thickness' if d == 2 else ''}"
+    return f"{extent} m{mesh}, {volumes.sum():.3g} m{power}{mass}"
+
+
+def coincident_nodes(scene: Scene) -> str:
+    """Warn of nodes on the boundary of a mesh file that coincide and are not joined, or say ""."""
+    if not isinstance(scene.geometry, MeshFile):
+        return ""
+    points, cells = read_mesh(scene)
+    corners = cells.shape[1]
+    facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)])
+    distinct, count = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
+    outer = points[np.unique(distinct[count == 1])]
+    near = _CLOSE * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(outer).query_pairs(near, output_type="ndarray") if len(outer) else outer
+    if not len(pairs):
+        return ""
+    at = ", ".join(f"{x:.6g}" for x in outer[pairs[:, 0].min()])
+    return (
+        f"{len(pairs)} pairs of nodes of '{scene.geometry.file}' lie within {near:.2g} m "
+        f"of each other and are not joined, one at ({at}): the body is apart there; merge them if "
+        "it is not meant to be"
+    )
