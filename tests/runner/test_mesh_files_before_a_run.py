@@ -53,7 +53,7 @@ def test_size_and_mass_are_said(tmp_path, capsys):
 
 def test_nodes_that_are_written_twice_are_counted_and_placed(tmp_path, capsys):
     points, cells, count = _torn(0.6)
-    code, out, err = _checked(tmp_path, capsys, points, cells)
+    code, _, err = _checked(tmp_path, capsys, points, cells)
     assert code == 0
     assert f"warning: {count} pairs of nodes of 'body.vtu' lie within 2e-06 m of each other" in err
     assert "one at (1, 0, 0)" in err

@@ -3,11 +3,20 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from verify.runner.cost import volume_of
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.material_regions import points_of_body
 
 _CLOSE = 1e-6  # of the body: nodes that were written apart and meant to be one
+
+
+def volume_of(scene: Scene) -> float:
+    """Area or volume of a rectangle, a box or a polygon."""
+    body = scene.geometry
+    if isinstance(body, Box):
+        return float(np.prod(np.subtract(body.upper, body.lower)))
+    assert isinstance(body, Rectangle | Polygon)
+    x, y = body.outline().T
+    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
 def body_text(scene: Scene) -> str:

@@ -13,6 +13,7 @@ from math import ceil, prod, sqrt
 import numpy as np
 
 from reference.moduli import wave_speed
+from verify.runner.body_size import volume_of
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import solver_in
@@ -138,16 +139,6 @@ def _nodes(scene: Scene, size: float) -> float:
     d, volume = scene.dimension, volume_of(scene)
     inside = (_PER_AREA if d == 2 else _PER_VOLUME) * volume / size**d
     return float(inside + d * volume ** ((d - 1) / d) / size ** (d - 1))
-
-
-def volume_of(scene: Scene) -> float:
-    """Area or volume of a rectangle, a box or a polygon."""
-    body = scene.geometry
-    if isinstance(body, Box):
-        return float(np.prod(np.subtract(body.upper, body.lower)))
-    assert isinstance(body, Rectangle | Polygon)
-    x, y = body.outline().T
-    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
 def _steps(scene: Scene, size: float, halved: int) -> float:
