@@ -1,7 +1,6 @@
 """Size and mass of a body, and nodes of its mesh file that coincide: to be read before a run."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.material_regions import points_of_body
@@ -32,7 +31,7 @@ def body_text(scene: Scene) -> str:
     body, d = scene.geometry, scene.dimension
     mesh = ""
     if isinstance(body, MeshFile):
-        # not at the top: commands that only read cases load no numba
+        # commands that only read cases shall not load numba, nor scipy below
         from verify.xfem.mesh import SimplexMesh
 
         grid = SimplexMesh(*read_mesh(scene))
@@ -58,6 +57,8 @@ def coincident_nodes(scene: Scene) -> str:
     """Warn of nodes on the boundary of a mesh file that coincide and are not joined, or say ""."""
     if not isinstance(scene.geometry, MeshFile):
         return ""
+    from scipy.spatial import cKDTree
+
     points, cells = read_mesh(scene)
     corners = cells.shape[1]
     facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)])
