@@ -1,12 +1,17 @@
 """A part of the boundary is the same part on every mesh, for every solver and for the reference."""
 
+import importlib
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scenes
 from reference_scenes import needs_fenicsx
 
 from verify.assess.rates import shifted_ends
-from verify.exchange import problem_of
+from verify.exchange import export_case, problem_of
+from verify.foreign.records import PROGRAMS
 from verify.methods.catalogue import METHODS
 from verify.regularisation import Regularisation
 from verify.result import SolveRecord, Status
@@ -147,6 +152,51 @@ def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degr
         form = load_form(scene, space, ufl.TestFunction(space.function_space), None)
         forces = nodal_forces(form, space).reshape(-1, d)
         drawn.check(forces, space.node_points, space.beside_nodes())
+
+
+@pytest.fixture
+def program(monkeypatch):
+    """Modules of the programs that cut elements themselves."""
+    monkeypatch.syspath_prepend(str(PROGRAMS))
+    yield SimpleNamespace(
+        body=importlib.import_module("cut_body"), files=importlib.import_module("exchange_files")
+    )
+    for name in ("cut_body", "split_cells", "exchange_files"):
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.parametrize("number", (1, 3))
+@pytest.mark.parametrize("d", (2, 3))
+def test_a_program_that_cuts_elements_loads_and_holds_each_side_for_itself(
+    d, number, program, tmp_path
+):
+    drawn = Drawn(d, number)
+    scene = drawn.scene([3])
+    side = " + ".join(f"({a!r})*{x}" for a, x in zip(drawn.across.tolist(), "xyz", strict=False))
+    # the side of the cut on which there is something of the part
+    below = drawn.work(np.zeros((d, d)), np.eye(d)[0], -1) != 0.0
+    end = f"{side} {'<' if below else '>'} {float(drawn.offset)!r}"
+    support = {"where": f"{drawn.where} and {end}"}
+    held_side = scene.supports[0].model_copy(update=support)
+    scene = scene.model_copy(update={"supports": [held_side]})
+    export_case(scene, tmp_path, [0])
+    case = program.files.Case(tmp_path, 0)
+    body = program.body.CutBody(case)
+    sign = np.sign(body.phi @ (case.points @ drawn.across - drawn.offset))
+    near = np.zeros((body.count, d))
+    for s, way in enumerate((-1, 1)):  # a value beyond the cut belongs to the other side
+        moved = case.points - drawn.across * (case.points @ drawn.across - drawn.offset)[:, None]
+        beyond = body.phi * way < 0
+        shown = np.where(beyond[:, None], moved + 0.1 * sign * way * drawn.across, case.points)
+        near[body.group[s]] = np.where(
+            (body.group[0] != body.group[1])[:, None], shown, case.points
+        )
+    place = np.zeros((body.count, d))
+    place[body.group] = case.points
+    drawn.check(program.body.forces(case, body), place, near)
+    held, _ = program.body.prescribed(case, body)
+    assert held.any()
+    assert ((near[held.any(axis=1)] @ drawn.across < drawn.offset) == below).all()
 
 
 PARTED = {

@@ -207,6 +207,7 @@ def _held(entry: HeldNodes) -> dict[str, Any]:
         **in_time,
         "nodes": entry.nodes,
         "components": entry.components,
+        "ended": [{"facet": facet, "corners": corners} for facet, corners in entry.ended],
         "values": entry.values,
         "across": [
             {"node": node, "side_point": side, "values": values}
@@ -222,8 +223,12 @@ def _load(load: Load, corners: int) -> dict[str, Any]:
         content["history"] = load.history
     if not on_cells:
         content["facets"] = load.simplices
-    if load.uniform is not None:
+    if load.uniform is not None and load.corners is None:
         return {**content, "uniform": load.uniform}
+    if load.corners is not None:
+        content |= {"corners": load.corners}
+    if load.uniform is not None:
+        content |= {"value": load.uniform}
     return {**content, "points": load.points, "weights": load.weights, "values": load.values}
 
 

@@ -20,7 +20,8 @@ from verify.scene import (
     Support,
     Traction,
 )
-from verify.scene.part_pieces import Pieces
+from verify.scene.held_facets import HeldFacets
+from verify.scene.part_pieces import Pieces, pieces_on_part
 from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary
@@ -110,7 +111,8 @@ def _at_every_time(scene: Scene, exact: ExactSolution | None) -> str | None:
 def _held(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any) -> HeldNodes:
     """Find the nodes that a support holds, each on its own side of the cuts."""
     support, points = scene.supports[i], boundary.points
-    nodes, _ = boundary.held(scene, support.where, f"supports[{i}].where")
+    nodes, by = boundary.held(scene, support.where, f"supports[{i}].where")
+    ended = [] if conforming else _ended(boundary, by, scene, support.where)
     field = exact if support.displacement == "exact" else None
     near = None
     if conforming:  # a node on the cut belongs to the side of its own cells
@@ -124,7 +126,18 @@ def _held(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any
     across = []
     if field is not None and not conforming:
         across = _across(boundary, nodes, support, values, field)
-    return HeldNodes(nodes, components, values, across, support)
+    return HeldNodes(nodes, components, values, across, ended, support)
+
+
+def _ended(
+    boundary: Boundary, by: HeldFacets, scene: Scene, where: str
+) -> list[tuple[NDArray[np.int64], Array]]:
+    """Facets in which a part ends, and the simplices of each that lie on it."""
+    if not len(by.ended):
+        return []
+    pieces = pieces_on_part(scene.geometry, where, boundary.places)
+    places = pieces.places(boundary.places)
+    return [(boundary.corners[facet], places[pieces.facet == facet]) for facet in by.ended]
 
 
 def _across(
@@ -173,10 +186,11 @@ def _load(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any
         values = values.reshape(points.shape)
     else:  # one, or one for each cell
         values = np.broadcast_to(uniform[..., None, :], points.shape)
-        whole = bool((pieces.share > 1.0 - _WHOLE).all())
-        uniform = uniform if uniform.ndim == 1 and whole else None
+        uniform = uniform if uniform.ndim == 1 else None
     history = None if isinstance(load, Gravity) else load.history
-    return Load(simplices, uniform, points, measured, values, barycentric, history)
+    ends = bool((pieces.share < 1.0 - _WHOLE).any())
+    loaded = pieces.barycentric @ corners if ends else None
+    return Load(simplices, uniform, points, measured, values, barycentric, history, loaded)
 
 
 def _centroids(boundary: Boundary, cells: NDArray[np.int64]) -> Array:

@@ -33,6 +33,9 @@ class HeldNodes:
     across : list of (node, side point (d,), values)
         Background mesh only: for a node of a boundary facet that a cut crosses, the value of the
         prescribed field on the other side of the cut, continued to the node.
+    ended : list of (nodes of a facet, corners (r, d, d) of simplices, m)
+        Facets in which the part ends, and what of each lies on it: where a cut crosses one, a side
+        is held if that lies on it.
     support : Support, optional
         What the scene says: its ``values(points, factor)`` are those of a factor in time.
     """
@@ -41,6 +44,7 @@ class HeldNodes:
     components: tuple[int, ...]
     values: Array
     across: list[tuple[int, Array, Array]] = field(default_factory=list)
+    ended: list[tuple[NDArray[np.int64], Array]] = field(default_factory=list)
     support: Support | None = None
 
 
@@ -54,11 +58,13 @@ class Load:
         Nodes of the facets or cells that are loaded; a facet in which the load ends is there once
         for each of the simplices that are loaded of it.
     uniform : (d,) array or None
-        Its value, if it is the same everywhere and facets are loaded as a whole.
+        Its value, if it is the same everywhere.
     points, weights, values : (k, q, d), (k, q), (k, q, d) arrays
         Its values at quadrature points; the weights contain the measure.
     barycentric : (k, q, corners) array
         The quadrature points in each facet or cell.
+    corners : (k, corners, d) array, optional
+        Of what is loaded, m; None if that is all of each facet or cell.
     history : list of (time, factor), optional
         By what the load is multiplied in time; see `verify.scene.history`.
     """
@@ -70,6 +76,7 @@ class Load:
     values: Array
     barycentric: Array
     history: list[tuple[float, float]] | None = None
+    corners: Array | None = None
 
 
 @dataclass(frozen=True)

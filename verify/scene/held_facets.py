@@ -32,14 +32,14 @@ class HeldFacets:
     Attributes
     ----------
     held : (q,) bool array
-    ended : int
-        How many of them the part ends in.
+    ended : (e,) int array
+        Those of them in which the part ends.
     shift : float
         How far the farthest point that is held is from the part, m.
     """
 
     held: NDArray[np.bool_]
-    ended: int
+    ended: Ints
     shift: float
 
 
@@ -84,12 +84,15 @@ def held_facets(
         _reach(corners[facet == one], pieces.places(corners)[facet[pieces.facet] == one])
         for one in ended
     ]
-    return HeldFacets(held[facet], len(ended), max(beyond, default=0.0))
+    return HeldFacets(held[facet], ended, max(beyond, default=0.0))
 
 
 def shifted_ends(found: list[HeldFacets], size: float) -> list[Regularisation]:
     """Report by how much supports hold more than their parts; `size` is that of the elements, m."""
-    count, shift = sum(one.ended for one in found), max((one.shift for one in found), default=0.0)
+    count, shift = (
+        sum(len(one.ended) for one in found),
+        max((one.shift for one in found), default=0.0),
+    )
     if not count:
         return []
     return [

@@ -248,7 +248,7 @@ def prescribed(case, body, time=0.0):
         chosen = {(node, 0 if body.phi[node] < 0 else 1): values[node] for node in alone}
         for facet in reached:
             for s, sign in enumerate((-1, 1)):
-                if (sign * body.phi[facet] > 0).any():
+                if _reaches(case, body, facet, support, sign):
                     chosen |= {(node, s): values[node] for node in facet}
         for entry in support["across"]:
             node, point = entry["node"], np.array(entry["side_point"])[None]
@@ -266,6 +266,20 @@ def prescribed(case, body, time=0.0):
     return held, value
 
 
+def _reaches(case, body, facet, support, sign):
+    """Whether a support holds a facet on a side: all of it does, or the part that it has of it."""
+    level = body.phi[facet]
+    parts = [one["corners"] for one in support.get("ended", []) if set(one["facet"]) == set(facet)]
+    if not parts or (sign * level >= 0).all():
+        return (sign * level > 0).any()
+    at = np.concatenate([np.reshape(part, (-1, case.dimension)) for part in parts])
+    straight = all(
+        len(cut["points"]) == 2 or cut["kind"] == "polygon" for cut in case.content["cuts"]
+    )
+    depth = (1e-5 if straight else 0.1) * case.problem["size"]
+    return (sign * barycentric(case.points[facet], at) @ level).max() > depth
+
+
 def forces(case, body, loads=None):
     """Return the forces (groups, d) of the tractions, of all of them or of some `loads`."""
     force = np.zeros((body.count, case.dimension))
@@ -275,11 +289,13 @@ def forces(case, body, loads=None):
         facets = np.array(load["facets"])
         values = body.phi[facets]
         crossed = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-        if "uniform" not in load and crossed.any():
+        value = np.array(load.get("uniform", load.get("value", [])))
+        if not len(value) and crossed.any():
             raise RefusedError("loads in formulas on facets that a cut crosses are not offered")
         for row, facet in enumerate(facets):
             if crossed[row]:
-                _split_traction(case, body, facet, np.array(load["uniform"]), force)
+                piece = np.array(load["corners"][row]) if "corners" in load else case.points[facet]
+                _split_traction(case, body, facet, piece, value, force)
                 continue
             groups = body.group[0 if values[row].min() < 0 else 1, facet]
             if "uniform" in load:
@@ -292,12 +308,19 @@ def forces(case, body, loads=None):
     return force
 
 
-def _split_traction(case, body, facet, traction, force):
-    corners = case.points[facet]
-    ends, _, side = split_cells(np.arange(len(facet))[None], body.phi[facet])
-    for piece, s in zip(place(ends, corners, body.phi[facet]), side, strict=True):
-        shape = barycentric(corners, piece).mean(axis=0)
-        force[body.group[s, facet]] += measure(piece) * shape[:, None] * traction
+def _split_traction(case, body, facet, piece, traction, force):
+    """Add the forces of a traction on a simplex in a facet, each side on its own values."""
+    corners, phi = case.points[facet], body.phi[facet]
+    level = barycentric(corners, piece) @ phi
+    level[np.abs(level) < 1e-9 * np.abs(phi).max()] = 0.0
+    if level.min() >= 0 or level.max() <= 0:
+        parts, side = [piece], [int(level.max() > 0)]
+    else:
+        ends, _, side = split_cells(np.arange(len(facet))[None], level)
+        parts = place(ends, piece, level)
+    for part, s in zip(parts, side, strict=True):
+        shape = barycentric(corners, part).mean(axis=0)
+        force[body.group[s, facet]] += measure(part) * shape[:, None] * traction
 
 
 def measure(corners):
