@@ -92,6 +92,32 @@ def test_a_comparison_with_the_sides_swapped_fails():
     assert result.solves[-1].metric("jump_l2").value > 1.5
 
 
+def test_ratios_alone_pass_with_a_warning_of_errors_above_100_per_cent():
+    ratio = {"check": "ratio", "metric": "jump_l2", "at_most": 2.0}
+    solvers = {"xfem": LEVELS, "conforming": LEVELS}
+    result = assess([ratio], solvers, Cubic(height, swapped=True))
+    assert [v.verdict for v in result.verdicts] == [Verdict.PASS]
+    assert {(n.about, n.solver) for n in result.warnings} == {
+        ("jump_l2", "xfem"), ("jump_l2", "conforming")
+    }  # fmt: skip
+    assert "an error of 2" in result.warnings[0].text  # twice the jump: 200 %
+    # a check that judges the error itself says it, and where errors are small nothing is said
+    bound = {"check": "error", "metric": "jump_l2", "at_most": 0.05}
+    assert not assess([ratio, bound], solvers, Cubic(height, swapped=True)).warnings
+    assert not assess([ratio], solvers, EXACT).warnings
+
+
+def test_strains_of_a_body_in_millimetres_are_told_to_be_absurd():
+    one = LEVELS[0]
+    small, large = (
+        assess([], {"xfem": {0: replace(one, displacement=factor * one.displacement)}}, EXACT)
+        for factor in (1.0, 1e3)
+    )
+    assert not small.warnings
+    assert [n.about for n in large.warnings] == ["strain"]
+    assert "expected lengths in m" in large.warnings[0].text
+
+
 BOUND = {"check": "error", "metric": "energy_norm", "at_most": 0.06}
 
 
