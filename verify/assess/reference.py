@@ -227,7 +227,7 @@ def conforming_reference(
     order = counted_order(scene, solutions[-1])
     falls = error_fall(scene, solutions, sizes, body)
     norms, entries = _field_norms(scene, measured, sizes, order, size, falls)
-    field_order = entries["energy_norm"]["order"]
+    field_order = entries["energy_norm"]["order"] or 0.0
     second = [Measured(s, body, law, scene) for _, s in sorted((others or {}).items())]
     metrics: dict[str, Any] = {}
     quantities: dict[str, tuple[float, float]] = {}
@@ -276,7 +276,7 @@ def known_quantity(
     measured: Sequence[Measured],
     values: list[float],
     sizes: list[float],
-    field_order: float | None = None,
+    field_order: float = inf,
     falls: float = inf,
 ) -> Extrapolation:
     """Judge a quantity from its levels; a value at a place by what lies around it.
@@ -288,8 +288,8 @@ def known_quantity(
         Levels, coarse to fine.
     values, sizes : list of float
         The quantity on each of them, and their element sizes, m.
-    field_order : float, optional
-        Observed order of the field in the energy norm.
+    field_order : float
+        Observed order of the field in the energy norm; 0 if there is none.
     falls : float
         See `verify.assess.richardson.extrapolate`.
     """
@@ -303,8 +303,7 @@ def known_quantity(
     if isinstance(asked, MaximumDisplacementQuantity):
         return extrapolate(values, sizes, order + 1, falls)
     # functionals of a Galerkin solution converge with twice the order of its field
-    own = order if field_order is None else min(max(field_order, _LEAST), order)
-    return extrapolate(values, sizes, 2 * own, falls)
+    return extrapolate(values, sizes, 2 * min(max(field_order, _LEAST), order), falls)
 
 
 def _round_off(asked: Quantity, measured: Measured) -> float:

@@ -80,7 +80,7 @@ def families(quick: bool) -> list[Family]:
         Family("arc through", arc_through, (3, 7), n),
         Family("arc crack", curved_crack, (3, 5), n),
         Family("bar in motion", bar, (8, 12), n, degrees=(2,)),
-        Family("sudden crack", sudden_crack, (5, 7), n, degrees=(2,)),
+        Family("sudden crack", sudden_crack, (4, 5), n, degrees=(2,)),
     ]
     if quick:
         return found
