@@ -21,7 +21,8 @@ from verify.threads import ONE_THREAD
 DRAWING = "verify.report.drawing"
 PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 LONGEST_REQUEST = 1 << 17  # bytes, most of them the environment
-_LOADING_SECONDS, _ENDING_SECONDS = 120.0, 0.2
+# until a process to fork from answers: where nothing runs yet, and where others wait to be watched
+_LOADING_SECONDS, _WATCHED_SECONDS, _ENDING_SECONDS = 120.0, 10.0, 0.2
 
 
 class Forked:
@@ -69,8 +70,7 @@ class _Parent:
 
     def __init__(self, kind: str) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.settimeout(_LOADING_SECONDS)
-        self._forked = False
+        self.has_forked = False
         module = ["verify.runner.warm_parent", str(theirs.fileno()), kind]
         with theirs:
             self._process = subprocess.Popen(
@@ -84,12 +84,13 @@ class _Parent:
                 start_new_session=True,
             )
 
-    def fork(self, request: bytes, log: int) -> Forked:
-        """Have a process forked, with its output in `log`; `OSError` if there is no parent."""
+    def fork(self, request: bytes, log: int, seconds: float) -> Forked:
+        """Have a process forked, with its output in `log`; `OSError` if none answers in time."""
+        self._socket.settimeout(seconds)
         status, theirs = os.pipe()
         try:
             socket.send_fds(self._socket, [request], [log, theirs])
-            self._forked = True
+            self.has_forked = True
             if not (said := self._socket.recv(64)):
                 raise BrokenPipeError("the warm parent has gone")
         except OSError:
@@ -103,7 +104,7 @@ class _Parent:
         """End it, and what it has forked with it."""
         self._socket.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_ENDING_SECONDS if self._forked else 0.0)
+            self._process.wait(_ENDING_SECONDS if self.has_forked else 0.0)
         self._process.kill()
         self._process.wait()
 
@@ -170,8 +171,9 @@ def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) 
     request = json.dumps({**said, "environment": dict(environment)}).encode()
     if parent is None or len(request) > LONGEST_REQUEST:
         return None
+    others = any(one.has_forked for one in parents.values() if one is not None)
     try:
-        return parent.fork(request, log)
+        return parent.fork(request, log, _WATCHED_SECONDS if others else _LOADING_SECONDS)
     except (OSError, ValueError):
         parents[_kind(module)] = None
         parent.close()

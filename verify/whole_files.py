@@ -95,12 +95,12 @@ def asked_place(path: Path) -> Iterator[None]:
     InputError
         If it cannot be written there and can be elsewhere.
     OSError
-        If the disk fails, or is full (`DISK_FAILURES`).
+        If the disk fails, or is full (`DISK_FAILURES` without a disk that is read-only).
     """
     try:
         yield
     except OSError as error:
-        if error.errno in DISK_FAILURES:
+        if error.errno in DISK_FAILURES and error.errno != errno.EROFS:
             raise
         raise InputError(f"cannot be written ({error.strerror})", str(path)) from None
 

@@ -200,3 +200,11 @@ def test_nothing_is_said_of_what_is_soon_done(capsys):
     with said_to_wait(sys.stderr, "a little thing"):
         time.sleep(0.1)
     assert capsys.readouterr().err == ""
+
+
+def test_solvers_without_a_word_are_listed(capsys):
+    assert main(["solvers"]) == 0
+    listed = capsys.readouterr().out
+    assert main(["solvers", "list"]) == 0
+    assert capsys.readouterr().out == listed
+    assert "xfem" in listed

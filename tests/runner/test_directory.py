@@ -1,5 +1,6 @@
 """Directories of runs: locks, stopped and finished runs, damage, a disk that fills."""
 
+import errno
 import json
 import os
 import shutil
@@ -203,3 +204,15 @@ def test_a_damaged_solution_or_record_is_solved_again(verify):
     verify(*command, COUNT_SOLVES=str(solves))
     assert count(solves) == 5
     assert vtu.read_bytes() != bytes(changed)
+
+
+def test_a_directory_on_a_disk_that_is_read_only_is_bad_input(tmp_path, monkeypatch):
+    """Nothing has begun: nothing is finished, and the same command would not resume it."""
+
+    def mkdir(self, **_):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(self))
+
+    monkeypatch.setattr(Path, "mkdir", mkdir)
+    wanted = "out: cannot be written .Read-only file system.; give --out a folder that can be"
+    with pytest.raises(InputError, match=wanted), claimed(tmp_path / "out", IDENTITY):
+        pass

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import scenes
 
 from verify.runner import fingerprint
 
@@ -34,3 +35,11 @@ def test_a_program_that_changes_is_run_again(read):
 def test_what_makes_a_solver_fast_can_change_its_answer(read):
     assert "verify/accelerated/cholesky.py" in read("xfem")
     assert "verify/accelerated/cholesky.py" not in read("conforming")
+
+
+def test_what_a_case_expects_of_a_cut_is_no_physics():
+    """A reference is found again when the word changes, and not when the cut does."""
+    cut = {"kind": "polyline", "points": [[-0.1, 0.5], [0.5, 0.52]]}
+    given = [cut, {**cut, "expected": "edge"}, {**cut, "points": [[-0.1, 0.5], [0.5, 0.53]]}]
+    plain, expecting, other = (fingerprint.physics_digest(scenes.scene([one])) for one in given)
+    assert plain == expecting != other

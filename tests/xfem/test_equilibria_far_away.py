@@ -9,11 +9,16 @@ from scipy.special import ellipe, ellipk
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
+from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.static_newton import collapsed_cells
+from verify.xfem.static_newton import Newton, NotInEquilibriumError, collapsed_cells
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
 
 YOUNG = 1e4
 
@@ -117,3 +122,43 @@ def test_a_strip_is_as_wide_as_hooke_says_until_nothing_is_left_of_its_width(str
     assert found.energy == pytest.approx(float(energy), rel=1e-9)
     assert np.ptp(found.displacement[:, 1] + X[:, 1]) == pytest.approx(left, abs=1e-6)
     assert len(collapsed_cells(force, found.displacement, 1e-3)) == (0 if left else len(v.cells))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_ghost_penalty_is_part_of_the_equilibrium(dim) -> None:
+    """Inclined cut with slivers: the linear answer under a tiny load, balance under a large one."""
+    mesh = rectangle_mesh((7, 5)) if dim == 2 else box_mesh((4, 3, 3))
+    phantom = cut_mesh(mesh, [Plane([0.4, 0.4999, 0.5][:dim], [0.13, 1.0, 0.07][:dim])])
+    stuff = isotropic(1.0, 0.3, "plane strain" if dim == 2 else "solid")
+    ghost = GhostPenalty(phantom, stuff)
+    fixed = np.repeat(phantom.node_points[:, :1] == 0.0, dim, axis=1)
+    held = Supports.none(phantom).prescribe(phantom, mesh.points[:, 0] == 0.0)
+    force = InternalForce(phantom, stuff, ghost=ghost)
+    load = body_force(phantom, [0.3, -1.0, 0.2][:dim])
+    tiny = static_equilibrium(force, fixed, load=1e-9 * load).displacement
+    linear = solve_static(phantom, stuff, held, 1e-9 * load, ghost=ghost).displacement
+    assert tiny == pytest.approx(linear, abs=1e-6 * np.abs(linear).max())
+    far = static_equilibrium(force, fixed, load=0.05 * load).displacement
+    internal, _ = force.evaluate(far)
+    assert np.abs(far).max() > 0.1
+    assert np.abs(internal - 0.05 * load)[~fixed].max() < 1e-9 * np.abs(internal).max()
+
+
+def test_a_place_from_which_no_correction_leads_is_left_at_once(monkeypatch) -> None:
+    """It was solved for 60 times over, five tangents each."""
+    phantom = cut_mesh(rectangle_mesh((2, 2)), [])
+    newton = Newton(InternalForce(phantom, material(2)), phantom.node_points[:, :1] == [0.0, 0.0])
+    tried = []
+
+    def solve(place, change, rotational, least=0.0):
+        tried.append(rotational)
+        if change is None and rotational == 1.0:
+            raise SingularStiffnessError(None)
+        return np.zeros_like(place.displacement)
+
+    monkeypatch.setattr(newton, "_solve", solve)
+    monkeypatch.setattr(newton, "_share_downhill", lambda *_: 0.0)
+    still = np.zeros_like(phantom.node_points)
+    with pytest.raises(NotInEquilibriumError, match="where no correction lowers the potential"):
+        newton.solve(still, still, np.ones_like(still))
+    assert len(tried) <= 6

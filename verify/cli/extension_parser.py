@@ -126,7 +126,8 @@ def _add_solvers(add: Add) -> None:
         "data folder; its packages are locked by their hashes. Exit code 2 if an installation\n"
         "fails; nothing of it is left then.",
     )
-    actions = command.add_subparsers(metavar="ACTION", dest="action", required=True)
+    command.set_defaults(action="list", json=False)
+    actions = command.add_subparsers(metavar="ACTION", dest="action", help="default: list")
     add_json(add_action(actions.add_parser, "list", "say which there are, and which are here"))
     action = add_action(actions.add_parser, "install", "install one from its locked packages")
     action.add_argument("name", metavar="NAME", help="name of the solver")

@@ -73,10 +73,13 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
     found = _contents(root)
     if found - {".lock", "run.json.partial"} and "run.json" not in found:
         raise InputError("not empty and not a run; give --out a new directory", str(root))
-    with asked_place(root):
-        root.mkdir(parents=True, exist_ok=True)
-        # inheritable would let an orphaned solver keep the lock; Python's default is not to
-        lock = os.open(root / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        with asked_place(root):
+            root.mkdir(parents=True, exist_ok=True)
+            # inheritable would let an orphaned solver keep the lock; Python's default is not to
+            lock = os.open(root / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    except InputError as error:
+        raise InputError(f"{error}; give --out a folder that can be") from None
     try:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

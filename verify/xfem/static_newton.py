@@ -53,7 +53,8 @@ class Newton:
 
     def __init__(self, force: InternalForce, fixed: Bools) -> None:
         self._force, self._fixed = force, fixed
-        self._pattern = body_pattern(force.phantom)
+        ghost = force.ghost
+        self._pattern = body_pattern(force.phantom, None if ghost is None else ghost.couplings)
         space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         self._internal = np.empty(fixed.shape)
@@ -84,7 +85,7 @@ class Newton:
         Raises
         ------
         NotInEquilibriumError
-            If the iterations do not suffice.
+            If the iterations do not suffice, or no correction leads on.
         SingularStiffnessError
             If even the tangent with rotations held is not positive definite.
         """
@@ -93,14 +94,16 @@ class Newton:
         count = 1
         while not self._is_small(place):
             if count == _ITERATIONS or not np.isfinite(place.norm):
-                raise NotInEquilibriumError(
-                    f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
-                    f"{count} iterations; expected {_TOLERANCE:g} of them. "
-                    f"{self._why(place)}"
-                )
+                raise self._failure(place, f"after {count} iterations")
             place = self._next(place, load)
             count += 1
         return place.displacement, count
+
+    def _failure(self, place: Place, where: str) -> NotInEquilibriumError:
+        return NotInEquilibriumError(
+            f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N {where}; "
+            f"expected {_TOLERANCE:g} of them. {self._why(place)}"
+        )
 
     def _why(self, place: Place) -> str:
         """Say what stood in the way, as far as it can be seen."""
@@ -184,7 +187,7 @@ class Newton:
 
     def _next(self, place: Place, load: Floats) -> Place:
         """Place with a smaller residual; if that is not a correction away, one further down."""
-        leap = place
+        leap = None
         for rotational in _SHARES:
             try:
                 correction = self._solve(place, None, rotational)
@@ -200,6 +203,8 @@ class Newton:
             share = self._share_downhill(place, correction, load)
             if share > 0.0:
                 return self.place(place.displacement + share * correction, load)
+        if leap is None:
+            raise self._failure(place, "where no correction lowers the potential energy")
         return leap  # beside a cell whose force jumps, or in round-off
 
     def _share_downhill(self, place: Place, correction: Floats, load: Floats) -> float:

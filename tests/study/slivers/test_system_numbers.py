@@ -222,6 +222,16 @@ def test_the_critical_step_is_found_by_running_where_there_is_no_system(scene):
     assert from_above[0] == pytest.approx(exact, rel=0.02)
 
 
+@pytest.mark.parametrize("fault", [MemoryError, TypeError, OSError])
+def test_a_fault_of_a_solver_is_no_instability(scene, fault):
+    class Faulty(Explicit):
+        def solve(self, scene, level, repetitions=1):
+            raise fault("of its own")
+
+    with pytest.raises(fault, match="of its own"):
+        step_by_running(Faulty(), scene, 0, 0.1, {})
+
+
 @pytest.mark.parametrize(
     ("near", "far", "verdicts"),
     [

@@ -21,7 +21,7 @@ def step_by_running(
 
     The body starts at rest, and its supports and loads act at once. A run has blown up where a
     displacement is not finite or a thousand times the body's size, or the solver says so by an
-    error.
+    error of arithmetic, value or run time. Others are faults, and raised.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _is_stable(solver: Solver, scene: Scene, level: int, parameters: dict[str, A
         raise InputError(f"it refuses the motion: {refusal}") from None
     except InputError:
         raise
-    except Exception:  # of a solver that notices it itself
+    except (ArithmeticError, ValueError, RuntimeError):  # of a solver that notices it itself
         return False
     size = float(np.ptp(np.asarray(solution.points), axis=0).max())
     largest = np.abs(np.asarray(solution.displacement)).max()

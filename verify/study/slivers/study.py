@@ -18,7 +18,7 @@ from verify.assess.system_numbers import (
     with_uncut_twin,
 )
 from verify.errors import InputError, UnsupportedSceneError
-from verify.printable import one_line
+from verify.printable import one_line, words_of
 from verify.scene import Box, Rectangle, Scene, scene_content
 from verify.solvers import Solver
 from verify.study.measured_scenes import (
@@ -133,8 +133,10 @@ def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iter
 def _by_running(solver: Solver, variant: Variant, scene: Scene, level: int) -> Row:
     try:
         low, high = step_by_running(solver, scene, level, _guess(scene, level), variant.parameters)
-    except Exception as problem:  # a guest may raise anything
+    except InputError as problem:
         return STEP, "s", None, one_line(str(problem))
+    except Exception as problem:  # a guest may raise anything
+        return STEP, "s", None, words_of(problem)
     return STEP, "s", float((low * high) ** 0.5), f"by running: {low:.4g} to {high:.4g} s"
 
 
