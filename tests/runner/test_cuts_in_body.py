@@ -112,3 +112,16 @@ def test_a_factor_at_a_tip_on_an_interface_is_refused():
             check_scene(scene([cut], material=two, quantities=asked))
         cut["points"][1] = [x - 0.05, y + 0.1]
         check_scene(scene([cut], material=two, quantities=asked))
+
+
+def test_a_factor_where_none_is_measured_is_refused(written):
+    cut = {"kind": "polyline", "points": [[-0.1, 0.43], [0.55, 0.52]]}
+    asked = [{"kind": "stress_intensity", "name": "K", "mode": "I", "end": "end"}]
+    with pytest.raises(InputError, match="measured in rectangles and polygons"):
+        check_scene(scene([cut], quantities=asked, **written[2]))
+    disc = {"kind": "disc", "centre": [0.5, 0.5, 0.45], "normal": [0.0, 0.0, 1.0], "radius": 0.25}
+    asked = [{"kind": "stress_intensity", "name": "K", "mode": "I", "point": [0.75, 0.5, 0.45]}]
+    two = soft(3, regions=[{"where": "x > 0.9", "young": 5.0}])
+    with pytest.raises(InputError, match="measured in one material"):
+        check_scene(scene([disc], d=3, quantities=asked, material=two))
+    check_scene(scene([disc], d=3, quantities=asked, material=soft(3)))

@@ -47,7 +47,11 @@ def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None
     if reason := _defect_on_faces(scene, asked):
         return reason
     if scene.dimension == 3:
+        if not scene.material.is_uniform:
+            return "factors along a front are measured in one material"
         return front_defect(scene, asked)
+    if isinstance(scene.geometry, MeshFile):
+        return "factors at a tip are measured in rectangles and polygons"
     from reference.fracture import no_tip
 
     assert asked.end is not None  # the scene is plane
@@ -152,8 +156,6 @@ def _tip_modes(
 def _front_modes(
     scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
 ) -> tuple[float, ...]:
-    if len(scene.material.each) > 1:
-        raise UnsupportedSceneError("factors along a front are measured in one material")
     return front_factors(scene, solution, scene.material.each[0], asked, **given)
 
 
