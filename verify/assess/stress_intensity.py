@@ -16,6 +16,7 @@ from verify.scene import (
     DiscCut,
     Gravity,
     Material,
+    MeshFile,
     PolygonCut,
     PolylineCut,
     Scene,
