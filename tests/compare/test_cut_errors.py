@@ -91,6 +91,7 @@ def test_a_tooth_inside_an_element_is_in_the_error(solver):
     assert found.norm.relative == pytest.approx(expected, rel=0.03)
     assert record.cut.swept == pytest.approx(area, rel=0.06)
     assert not record.cut.continued
+    assert record.cut.missing == record.cut.surplus == 0.0
     assert record.cut.lateral > 0.1
     assert record.cut.errors["displacement_l2"] < 1e-10  # as it was judged before
     assert "there without continuation" in record.notes[CUT]

@@ -102,9 +102,9 @@ def realised_cut(solution: Solution, body: AnyBody, rule: CutRule) -> RealisedCu
         of_facet = np.concatenate([of_facet, np.repeat(rows, probes.shape[1])])
         points = np.concatenate([points, probes[rows].reshape(-1, points.shape[1])])
         away, foot, end = _to_asked(points, body, cut, same)
-        # beside a place where the cut was made as asked it was made once more
         far = np.flatnonzero(~end & (away > limit))
-        if len(far):
+        if len(far) and _ends_aside(own, body, cut, limit, same):
+            # beside a place where the cut was made as asked it was made once more
             there = _to_realised(foot[far], None, own, body, same)[0]
             end[far] = there <= _AT * away[far]
         surplus += float(weights[end[: len(weights)]].sum())
@@ -183,6 +183,13 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
     if isinstance(body, MembraneBody):  # the surfaces may be apart
         away, _ = distance_to_cut(body.cuts[cut], points)
     return away, foot, end
+
+
+def _ends_aside(facets: Array, body: AnyBody, cut: str, limit: float, same: float) -> bool:
+    """Whether facets end freely beside the middle of a cut as asked."""
+    free = _free_faces(facets, body, same).mean(axis=1)
+    away, _, end = _to_asked(free, body, cut, same)
+    return bool((~end & (away > limit)).any())
 
 
 def _ends(segments: Array) -> tuple[Array, Array]:
