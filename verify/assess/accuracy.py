@@ -10,7 +10,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from verify.assess.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
-from verify.assess.doubtful import absurd_strain, doubtful_errors
+from verify.assess.doubtful import absurd_strain, doubtful_errors, locking_notices
 from verify.assess.energy_account import ACCOUNT, account_metrics, ledger_notices
 from verify.assess.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.assess.intervals import error_interval
@@ -132,6 +132,7 @@ def assess_accuracy(
             *unavailable_quantities(scene, measured),
             *ledger_notices([r for r in measured if r.solver != REFERENCE]),
             *doubtful_errors(scene, [r for r in measured if r.solver != REFERENCE]),
+            *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
             *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
         ],
         row=asdict(scene.row) if scene.row else None,

@@ -1,4 +1,4 @@
-"""Answers that pass and mean little: errors above 100 % beside ratios, strains that are none."""
+"""Answers that mean little: errors above 100 % beside ratios, absurd strains, locking."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,6 +15,9 @@ _ALL = 1.0  # relative error of a solver that answers zero
 # Root mean square strain of linear kinematics that no normalised case (stress and stiffness of
 # size one) comes near; a body in millimetres under its weight has a thousand times its strain.
 _ABSURD = 10.0
+# The bound of the energy-norm error of linear elements grows like √(1 + λ/μ) h/L (Babuška and Suri,
+# SIAM J. Numer. Anal. 29, 1992, 1261): at a half, half of an answer may be missing.
+_LOCKED = 0.5
 
 
 def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
@@ -73,3 +76,32 @@ def absurd_strain(
         "expected lengths in m, stresses and moduli in Pa, densities in kg/m³"
     )
     return [Notice(NoticeKind.WARNING, "strain", None, text)]
+
+
+def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]]) -> list[Notice]:
+    """Warn of linear elements in nearly incompressible material, by each solver's finest answer.
+
+    Parameters
+    ----------
+    scene : Scene
+    solutions : mapping of solver to mapping of level to Solution
+    """
+    if scene.material.plane == "stress":  # the sheet is free to become thicker
+        return []
+    poisson = max(material.poisson for material in scene.material.each)
+    stiffness = 1.0 / (1.0 - 2.0 * poisson)  # 1 + λ/μ
+    found = []
+    for name, levels in solutions.items():
+        finest = levels[max(levels)]
+        is_membrane = finest.cells.shape[1] == finest.points.shape[1]
+        if finest.order != 1 or is_membrane:
+            continue
+        across = float(np.ptp(finest.points, axis=0).min()) / finest.size  # not known: nan
+        if stiffness**0.5 >= _LOCKED * across:
+            text = (
+                f"linear elements at Poisson's ratio {poisson:g}, {across:.3g} across the body, "
+                "may lock: with displacements alone they are too stiff there; expected a finer "
+                "mesh, or a method with a pressure or an averaged dilatation"
+            )
+            found.append(Notice(NoticeKind.WARNING, "locking", name, text))
+    return found
