@@ -16,8 +16,9 @@ _ALL = 1.0  # relative error of a solver that answers zero
 # size one) comes near; a body in millimetres under its weight has a thousand times its strain.
 _ABSURD = 10.0
 # The bound of the energy-norm error of linear elements grows like √(1 + λ/μ) h/L (Babuška and Suri,
-# SIAM J. Numer. Anal. 29, 1992, 1261): at a half, half of an answer may be missing.
-_LOCKED = 0.5
+# SIAM J. Numer. Anal. 29, 1992, 1261): h counts as so much more than at ν = 0.3. Below two such
+# elements across, a body cannot bend. Up to ν = 0.45 a pressure does not pay.
+_COMPRESSIBLE, _NEARLY, _ACROSS = 0.3, 0.45, 2.0
 
 
 def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
@@ -86,10 +87,11 @@ def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]
     scene : Scene
     solutions : mapping of solver to mapping of level to Solution
     """
-    if scene.material.plane == "stress":  # the sheet is free to become thicker
-        return []
     poisson = max(material.poisson for material in scene.material.each)
-    stiffness = 1.0 / (1.0 - 2.0 * poisson)  # 1 + λ/μ
+    # in plane stress the sheet is free to become thicker
+    if poisson <= _NEARLY or scene.material.plane == "stress":
+        return []
+    coarser = ((1.0 - 2.0 * _COMPRESSIBLE) / (1.0 - 2.0 * poisson)) ** 0.5  # 1 + λ/μ = 1 / (1 − 2ν)
     found = []
     for name, levels in solutions.items():
         finest = levels[max(levels)]
@@ -97,7 +99,7 @@ def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]
         if finest.order != 1 or is_membrane:
             continue
         across = float(np.ptp(finest.points, axis=0).min()) / finest.size  # not known: nan
-        if stiffness**0.5 >= _LOCKED * across:
+        if across < _ACROSS * coarser:
             text = (
                 f"linear elements at Poisson's ratio {poisson:g}, {across:.3g} across the body, "
                 "may lock: with displacements alone they are too stiff there; expected a finer "
