@@ -53,8 +53,8 @@ def _has_a_region(scene: Scene, solve: SolveRecord) -> bool:
 CHANGES = (
     Change(
         2,
-        ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "released_*",
-         "ledger_mismatch"),
+        ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
+         "released_to_scheme", "released_to_damping", "released_mismatch"),
         "energies are those of the fields, with the mass that the solver declares; they were the "
         "solver's own account",
         _moves,
