@@ -1,9 +1,11 @@
 """The neutral solution: what is written is read, a wrong shape fails where it arises."""
 
-from dataclasses import fields
+import json
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from verify.errors import InputError
 from verify.solution import Regularisation, Solution, read_solution, write_solution
@@ -68,6 +70,52 @@ def test_a_membrane_is_triangles_in_space_and_read_as_such(tmp_path, order):
     assert read.cell_type == flat.cell_type
     for name in ("points", "cells", "displacement", "cut_facets"):
         np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+
+
+@pytest.mark.parametrize("kind", ["consistent", "by node", "matrix"])
+def test_a_declared_mass_is_read_as_it_was_written(tmp_path, kind):
+    plain = simplex(2, 1)
+    coupled = np.array([[2.0, 0.1 / 3, 0.0], [0.1 / 3, 1.0, -0.2], [0.0, -0.2, 3.0]])
+    masses = {"consistent": kind, "by node": np.array([1 / 3, 2.0, 0.0])}
+    mass = masses.get(kind, csr_array(coupled))
+    write_solution(replace(plain, mass=mass), tmp_path / "solution")
+    read = read_solution(tmp_path / "solution").mass
+    if kind == "matrix":
+        np.testing.assert_array_equal(read.toarray(), coupled)
+        content = json.loads((tmp_path / "solution.json").read_text())["mass"]
+        assert all(i <= j for i, j in zip(content["rows"], content["columns"], strict=True))
+    else:
+        np.testing.assert_array_equal(read, mass)
+
+
+@pytest.mark.parametrize("mass, said", [
+    ("lumped", "mass 'lumped'; expected 'consistent', numbers or a sparse matrix"),
+    (np.ones(4), "mass of shape (4,); expected (3,)"),
+    (np.array([1.0, np.nan, 1.0]), "mass has values that are not finite"),
+    (csr_array(np.eye(4)), "mass of shape (4, 4); expected (3, 3)"),
+    (csr_array(np.triu(np.ones((3, 3)))), "not symmetric"),
+])  # fmt: skip
+def test_a_mass_that_is_none_is_refused(mass, said):
+    with pytest.raises(InputError) as refused:
+        replace(simplex(2, 1), mass=mass)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize("content, said", [
+    ([1.0, 2.0], "mass of shape (2,)"),
+    ({"rows": [0]}, "expected 'consistent', a list by node, or rows, columns and values"),
+    ({"rows": [1], "columns": [0], "values": [1.0]}, "below its diagonal"),
+    ({"rows": [0], "columns": [7], "values": [1.0]}, "not a readable solution"),
+    (3.0, "mass of type 'float'"),
+])  # fmt: skip
+def test_a_mass_in_a_file_that_is_none_is_refused_with_the_file(tmp_path, content, said):
+    write_solution(simplex(2, 1), tmp_path / "solution")
+    file = tmp_path / "solution.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"mass": content}))
+    with pytest.raises(InputError) as refused:
+        read_solution(tmp_path / "solution")
+    assert said in str(refused.value)
+    assert "solution.json" in str(refused.value)
 
 
 PLAIN = {
