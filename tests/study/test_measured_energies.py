@@ -123,9 +123,9 @@ def test_a_gain_that_is_hidden_in_any_part_of_a_ledger_is_found(plate, part):
 ])  # fmt: skip
 def test_a_mass_that_is_not_of_the_body_is_not_taken(plate, mass, said):
     case, honest = plate
-    _, notes = energies_of(case, replace(honest, mass=mass(honest)))
-    assert notes["mass"].startswith("the declared mass is not taken")
-    assert said in notes["mass"]
+    found, _ = energies_of(case, replace(honest, mass=mass(honest)))
+    assert "the declared mass is not taken" in found["energy_drift"].source
+    assert said in found["energy_drift"].source
 
 
 def test_a_mass_with_more_energy_than_any_lumping_is_not_taken(plate):
@@ -135,16 +135,16 @@ def test_a_mass_with_more_energy_than_any_lumping_is_not_taken(plate):
     basis = np.linalg.qr(points)[0]
     more = np.eye(len(points)) - basis @ basis.T
     heavy = honest.mass + type(honest.mass)(20.0 * honest.mass.max() * more)
-    _, notes = energies_of(case, replace(honest, mass=heavy))
-    assert "lumping makes 1 to 4 of it" in notes["mass"]
+    found, _ = energies_of(case, replace(honest, mass=heavy))
+    assert "lumping makes 1 to 4 of it" in found["energy_drift"].source
 
 
 def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
     """With the consistent mass of its field an honest lumped answer drifts; not surely so."""
     case, honest = plate
-    found, notes = energies_of(case, replace(honest, mass=None))
+    found, _ = energies_of(case, replace(honest, mass=None))
     drift = found["energy_drift"]
-    assert notes["mass"].startswith("no mass is declared")
+    assert "no mass is declared" in drift.source
     assert 1e-6 < drift.value <= drift.uncertainty
     assert verdict_of(case, replace(honest, mass=None), {**DRIFT, "at_most": 1e-6}) is (
         Verdict.UNDECIDED

@@ -17,7 +17,6 @@ MISMATCH = "ledger_mismatch"
 _ENERGIES = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump", MISMATCH)
 _MOMENTA = ("linear_momentum_drift", "angular_momentum_drift")
 ACCOUNT = (*_ENERGIES, *_MOMENTA, *PART_METRICS, "released_mismatch")
-_SOURCE = "fields and declared mass of the solution"
 _NAMED = 1e-6  # of the energy in play: what a ledger of single precision is off by
 _WARNED = 0.01  # of the energy in play: what a spectator would see
 _ABSOLUTE = ("kinetic", "strain")  # the others are potentials and work, counted from the start
@@ -39,9 +38,8 @@ def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric],
     -------
     metrics : list of Metric
     notes : dict of str to str
-        For what could not be measured, why; the mass that was taken (``mass``), what is the
-        solver's word (``work_of_loads``, ``work_of_supports``), and where its ledger differs
-        (``ledger``).
+        For what could not be measured, why; what is the solver's word (``work_of_loads``,
+        ``work_of_supports``), and where its ledger differs (``ledger``).
     """
     metrics, notes = _energies(scene, account)
     found = account.whole
@@ -88,6 +86,7 @@ def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[
         "energy_oscillation": (found.oscillation, off.oscillation),
     }
     notes = dict(energies.said)
+    source = f"fields of the solution; kinetic energy by {notes.pop('kinetic_energy')}"
     if len(found.jumps):
         jump = float(np.abs(found.jumps).max())
         values["energy_jump"] = jump, found.oscillation + float(off.jumps.max())
@@ -104,15 +103,17 @@ def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[
     else:
         notes[MISMATCH] = "the solution has no ledger of its own"
     return [
-        _relative(name, *value, scale, float(width.max())) for name, value in values.items()
+        _relative(name, *value, scale, float(width.max()), source) for name, value in values.items()
     ], notes
 
 
-def _relative(name: str, value: float, width: float, scale: float, scale_off: float) -> Metric:
+def _relative(
+    name: str, value: float, width: float, scale: float, scale_off: float, source: str
+) -> Metric:
     """Make a metric of a value over the energy in play, which may be off too."""
     least = max(scale - scale_off, 1e-3 * scale)
     high = (value + width) / least
-    return Metric(name, value / scale, "1", None, high - value / scale, _SOURCE)
+    return Metric(name, value / scale, "1", None, high - value / scale, source)
 
 
 def _mismatch(account: MotionAccount, named: float) -> tuple[tuple[float, float], dict[str, float]]:

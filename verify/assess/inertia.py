@@ -94,7 +94,7 @@ def inertia_of(
             return Inertia(energy, width, own, moment, "the declared mass")
         wrong = f"the declared mass is not taken: {wrong}"
     lumping = lumping_of(solution, density)
-    note = f"{wrong}: that of the field, give or take its lumping"
+    note = f"that of the field, give or take its lumping ({wrong})"
     return Inertia(whole.energy, lumping.kinetic, weights, lumping.moment, note)
 
 

@@ -84,7 +84,7 @@ def measured_energies(
     inertia = inertia_of(solution, density, whole, separated)
     found = {"kinetic": inertia.kinetic, "strain": strain}
     widths = {"kinetic": inertia.width}
-    said = {"mass": inertia.note}
+    said = {"kinetic_energy": inertia.note}
     weight = [load.acceleration for load in scene.loads if isinstance(load, Gravity)]
     if weight:
         pulled = np.einsum("n,tna->ta", inertia.weights, solution.displacement)

@@ -57,7 +57,9 @@ def _kept(account: MotionAccount) -> Finding:
     if least > _LOST:
         return Finding(float(missing.max()), _LOST, "energy changes that nothing accounts for")
     if most > _LOST:
-        return Finding(0.0, None, f"known within {width.max():.1g} only: {energies.said['mass']}")
+        return Finding(
+            0.0, None, f"known within {width.max():.1g} only: {energies.said['kinetic_energy']}"
+        )
     loss = float(taken.max())
     note = f"its method takes {loss:.2g} of the energy in play, as it states"
     return Finding(float(missing.max()), _LOST, note if loss > _LOST else "")
