@@ -4,12 +4,15 @@ Scenes in general position, by a fixed seed: the field fits by construction, the
 changed by a thousandth to a few per cent. Whether that contradicts the field is known by hand.
 """
 
+import tomllib
+
 import numpy as np
 import pytest
 
 from tests.scenes import box, scene, soft
 from verify.errors import InputError
 from verify.runner.checking import check_scene
+from verify.scene import Scene, case_folder
 
 _TRIALS = 2
 _HELD = [{"where": "boundary", "displacement": "exact"}]
@@ -173,3 +176,31 @@ def test_what_contradicts_the_exact_field_is_refused_and_nothing_else(make):
         for change in _CHANGES[make]:
             changed, said = change(content, rng)
             assert said in _refusal(d=d, **(content | changed)), (change.__name__, content, changed)
+
+
+def _other(content, **tables):
+    """The content with keys of its tables changed."""
+    return content | {key: content[key] | more for key, more in tables.items()}
+
+
+def test_a_field_in_motion_is_held_against_its_beginning_its_blade_and_histories():
+    """A blade that advances through a strip, on a way inclined to the mesh: of the case itself."""
+    file = case_folder() / "cutting/blade_strip_inclined.toml"
+    content = tomllib.loads(file.read_text())
+    check_scene(Scene.model_validate(content))
+    (blade,) = content["cuts"]
+    slower = content["exact"]["parameters"] | {"speed": 0.392}
+    early = blade | {"times": [time - 0.005 for time in blade["times"]]}
+    history = [*content["supports"][:-1], content["supports"][-1] | {"history": [[0.0, 0.999]]}]
+    gravity = {"kind": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+    for changed, said in (
+        (content | {"initial": {"kind": "rest"}}, "contradicts initial"),
+        (_other(content, initial={"velocity": [0.0, 0.0, 0.0]}), "the velocity is"),
+        (_other(content, exact={"parameters": slower}), "contradicts cut"),
+        (content | {"cuts": [early]}, "contradicts cut"),
+        (content | {"supports": history}, "contradicts supports[5]"),
+        (content | {"loads": [gravity]}, "is in no equilibrium"),
+    ):
+        with pytest.raises(InputError) as error:
+            check_scene(Scene.model_validate(changed))
+        assert said in str(error.value)
