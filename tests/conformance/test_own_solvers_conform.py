@@ -18,8 +18,9 @@ def test_the_compact_solver_conforms_in_every_basis(basis):
     kept = {result.name for result in results if result.state is State.PASS}
     # the three bases share the mesh; none may hide behind refusals
     wanted = {"cut-patch", "rigid-rotation-3d", "parted-3d", "renumbering", "mirrored-cut"}
-    wanted |= {"two-materials", "two-cuts"}
+    wanted |= {"two-materials", "two-cuts", "ending-cut", "crossed-interface"}
     if basis == "sidewise":
+        wanted |= {"crossing-cuts", "branched-cut", "traction-3d"}
         wanted |= {"finite-rotation-2d", "finite-rotation-3d", "free-fall"}
     assert wanted <= kept
 
@@ -43,6 +44,8 @@ def test_the_conforming_solver_conforms():
     assert exit_code_of(results) == 0, [r for r in results if r.state is not State.PASS]
     kept = {result.name for result in results if result.state is State.PASS}
     assert {"cut-patch", "two-materials", "two-cuts", "traction", "weight", "mirrored-cut"} <= kept
+    wanted = {"crossing-cuts", "branched-cut", "ending-cut", "crossed-interface", "traction-3d"}
+    assert wanted <= kept
 
 
 def test_the_command_prints_the_checks_as_a_table_and_as_json(capsys):

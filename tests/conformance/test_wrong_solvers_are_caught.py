@@ -22,6 +22,12 @@ def state(solver, *names, **options):
         ("SwapsTheSides", "traction", "displacement off by"),
         ("TakesTheFirstCut", "two-cuts", "displacement off by"),
         ("TakesTheLastCut", "two-cuts", "displacement off by"),
+        ("TakesTheFirstCut", "crossing-cuts", "displacement off by"),
+        ("TakesTheFirstCut", "branched-cut", "displacement off by"),
+        ("EndsElsewhere", "ending-cut", "open a quarter of an element beyond its end"),
+        ("EndsTooSoon", "ending-cut", "closed a quarter of an element before its end"),
+        ("TakesOneMaterial", "crossed-interface", "displacement off by"),
+        ("TooStiffInSpace", "traction-3d", "displacement off by"),
         ("TakesOneMaterial", "two-materials", "displacement off by"),
         ("TakesThePoissonRatioOfOne", "two-materials", "displacement off by"),
         ("WrongEnergy", "energy-account", "ledger"),
@@ -48,6 +54,13 @@ def test_a_fault_breaks_the_check_that_is_there_for_it(solver, check, said):
     assert found.state is State.FAIL
     assert said in found.reason
     assert exit_code_of([found]) == 1
+
+
+def test_what_a_solver_states_is_said_where_it_is_off_and_is_not_held_against_it():
+    """A part that two cuts leave without a node stays with its sibling in virtual_node."""
+    (found,) = conform("virtual_node", only=["crossing-cuts"])
+    assert found.state is State.REFUSED
+    assert "it states: part without a node left with its sibling" in found.reason
 
 
 def test_a_solver_that_states_the_energy_of_its_field_keeps_its_account():

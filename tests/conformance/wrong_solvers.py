@@ -56,6 +56,38 @@ class TakesThePoissonRatioOfOne(XfemSolver):
         return super().solve(changed(scene, material=material), level, repetitions)
 
 
+class EndsElsewhere(XfemSolver):
+    """Ends a cut some elements of length 0.2 m further on."""
+
+    elements = 0.5
+    tip = "through"
+
+    def solve(self, scene, level, repetitions=1):
+        def moved(cut):
+            start, end = np.array(cut.points[0]), np.array(cut.points[-1])
+            far = end + 0.2 * self.elements * (end - start) / np.linalg.norm(end - start)
+            return cut.model_copy(update={"points": [*cut.points[:-1], far.tolist()]})
+
+        longer = changed(scene, cuts=[moved(cut) for cut in scene.cuts])
+        solution = super().solve(longer, level, repetitions, tip=self.tip)
+        return replace(solution, regularisations=[])  # nor does it say so
+
+
+class EndsTooSoon(EndsElsewhere):
+    elements = -0.5
+    tip = "inside"
+
+
+class TooStiffInSpace(XfemSolver):
+    """Two per cent: no displacement that is prescribed all around tells."""
+
+    def solve(self, scene, level, repetitions=1):
+        if scene.dimension == 3:
+            stiff = scene.material.model_copy(update={"young": 1.02 * scene.material.young})
+            scene = changed(scene, material=stiff)
+        return super().solve(scene, level, repetitions)
+
+
 class SwapsTheSides(XfemSolver):
     """Gives each of the two nodes at a place on the cut what the other has."""
 

@@ -1,11 +1,4 @@
-"""The checks of the suite, each with the argument for its limit.
-
-`EXACT`, 1e-7: answers that lie in the solver's space are found up to the residual at which its
-linear solver stops. Direct solvers reach 1e-13 on these meshes; an iterative one that stops at a
-relative residual of 1e-9 loses up to two digits to the condition number (about 1e2 for 5 × 4
-cells). What is wrong in the method shows at 1e-3 and more: half an element of a wrong side, a
-missing factor, a swapped sign.
-"""
+"""The checks of the suite, each with the argument for its limit."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,21 +6,21 @@ from pathlib import Path
 import numpy as np
 
 from verify.compare.hooke import hooke
-from verify.compare.realised import cut_deviation
-from verify.compare.strain_energy import strain_energy
 from verify.conformance import scenes
 from verify.conformance.check import Check, Finding
 from verify.conformance.energy_in_motion import energy_in_motion
-from verify.conformance.measures import covered, distance, nodal_deviation, weight_imbalance
-from verify.conformance.scenes import Field
+from verify.conformance.field_check import EXACT, Solutions, is_field, named
+from verify.conformance.measures import distance, weight_imbalance
+from verify.conformance.meeting_checks import (
+    crossed_interface,
+    ending_cut,
+    parted_checks,
+    pulled_in_space,
+)
 from verify.conformance.trials import Outcome, Trial
 from verify.result import Status
-from verify.scene import Scene
-from verify.solution import Solution
 
-EXACT = 1e-7
 _RIGID = 1e-6  # of the height of the fall: what 40 steps of an iterative solver may add up to
-Solutions = Mapping[str, Solution]
 
 
 def checks(folder: Path) -> list[Check]:
@@ -43,11 +36,14 @@ def checks(folder: Path) -> list[Check]:
         _turned(3),
         _parted_halves(),
         _strained_sides(),
-        _two_cuts(),
+        *parted_checks(),
+        ending_cut(),
         _energy_account(),
         _closed_cut(),
         _pulled_halves(),
+        pulled_in_space(),
         _two_materials(),
+        crossed_interface(),
         _hanging_halves(),
         _freed_half(),
         energy_in_motion(),
@@ -59,59 +55,19 @@ def checks(folder: Path) -> list[Check]:
     ]
 
 
-def _is_field(scene: Scene, field: Field, energy: float | None = None) -> Check:
-    """Make a check that an answer is `field`; the strain energy of the answer is `energy`."""
-    law = hooke(scene.material)
-
-    def judge(solutions: Solutions) -> Finding:
-        (solution,) = solutions.values()
-        if (gap := covered(solution)) > EXACT:
-            return Finding(gap, EXACT, "the cells do not cover the body once")
-        off = nodal_deviation(solution, field)
-        if not off <= EXACT:
-            return Finding(off, EXACT, f"displacement off by {off:.2e}{_moved(scene, solution)}")
-        found = strain_energy(solution, law)
-        if energy is None:
-            return Finding(off, EXACT)
-        # E·(u/L)² is the energy of strains as large as the displacements; an error of EXACT in
-        # the displacements is one of EXACT · u / h in the strains, and its square in the energy
-        largest = float(np.abs(solution.displacement).max())
-        allowed = 2 * EXACT * energy + 400 * EXACT**2 * scenes.YOUNG * largest**2
-        note = f"strain energy {found:.6g}, expected {energy:.6g}"
-        if not abs(found - energy) <= allowed:
-            return Finding(abs(found - energy), allowed, note)
-        return Finding(off, EXACT)
-
-    return Check(scene.name, "", [Trial(scene.name, scene)], judge)
-
-
-def _named(check: Check, name: str, claim: str) -> Check:
-    return Check(name, claim, check.trials, check.judge)
-
-
-def _moved(scene: Scene, solution: Solution) -> str:
-    """Say by how much the realised cut deviates from the one asked for, if it does."""
-    from verify.compare.body import body_of
-
-    if scene.dimension != 2 or not scene.cuts:
-        return ""
-    off = cut_deviation(solution, body_of(scene))
-    return f"; its realised cut is off by {off:.2e} m" if off > EXACT else ""
-
-
 def _uncut_linear(dimension: int) -> Check:
     scene, field = scenes.uncut_linear(dimension)
     gradient = field(np.eye(dimension), np.eye(dimension)).T[None]
     energy = float(hooke(scene.material).energy_density(gradient)[0])
     claim = f"without a cut a linear field is reproduced ({dimension}D)"
-    return _named(_is_field(scene, field, energy), f"uncut-{dimension}d", claim)
+    return named(is_field(scene, field, energy), f"uncut-{dimension}d", claim)
 
 
 def _rigid(kind: str, dimension: int) -> Check:
     words = {"translation": "a translation", "rotation": "an infinitesimal rotation"}[kind]
     claim = f"{words} of a cut body costs no energy ({dimension}D)"
-    check = _is_field(*scenes.rigid(kind, dimension), 0.0)
-    return _named(check, f"rigid-{kind}-{dimension}d", claim)
+    check = is_field(*scenes.rigid(kind, dimension), 0.0)
+    return named(check, f"rigid-{kind}-{dimension}d", claim)
 
 
 def _turned(dimension: int) -> Check:
@@ -120,7 +76,7 @@ def _turned(dimension: int) -> Check:
     The strain energy is the solver's own account, if it keeps one.
     """
     scene, field = scenes.turned(dimension)
-    judge_field = _is_field(scene, field).judge
+    judge_field = is_field(scene, field).judge
     assert judge_field is not None
 
     def judge(solutions: Solutions) -> Finding:
@@ -140,7 +96,7 @@ def _turned(dimension: int) -> Check:
 
 def _parted_halves() -> Check:
     claim = "the halves of a cut cube part without strain"
-    return _named(_is_field(*scenes.parted_halves(), 0.0), "parted-3d", claim)
+    return named(is_field(*scenes.parted_halves(), 0.0), "parted-3d", claim)
 
 
 def _freed_half() -> Check:
@@ -173,22 +129,17 @@ def _freed_half() -> Check:
 
 def _strained_sides() -> Check:
     claim = "each side of a cut takes its own strain (patch test on a cut)"
-    return _named(_is_field(*scenes.strained_sides()), "cut-patch", claim)
+    return named(is_field(*scenes.strained_sides()), "cut-patch", claim)
 
 
 def _two_materials() -> Check:
     claim = "of two materials each strains with its own constants, beside a cut"
-    return _named(_is_field(*scenes.two_materials()), "two-materials", claim)
-
-
-def _two_cuts() -> Check:
-    claim = "the three parts between two cuts move without strain"
-    return _named(_is_field(*scenes.two_cuts(), 0.0), "two-cuts", claim)
+    return named(is_field(*scenes.two_materials()), "two-materials", claim)
 
 
 def _pulled_halves() -> Check:
     claim = "two halves under a traction contract each for itself, with the material's constants"
-    return _named(_is_field(*scenes.pulled_halves()), "traction", claim)
+    return named(is_field(*scenes.pulled_halves()), "traction", claim)
 
 
 def _energy_account() -> Check:

@@ -25,21 +25,21 @@ _SQUARE = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
 _CUBE = {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]}
 _MIDDLE, _SLOPE = (0.5, 0.47), 0.24
 _INCLINED = {"kind": "polyline", "points": [[-0.1, 0.326], [1.1, 0.614]]}
-_UPRIGHT_AT = 0.37
-_UPRIGHT = {"kind": "polyline", "points": [[_UPRIGHT_AT, -0.1], [_UPRIGHT_AT, 1.1]]}
+UPRIGHT_AT = 0.37
+UPRIGHT = {"kind": "polyline", "points": [[UPRIGHT_AT, -0.1], [UPRIGHT_AT, 1.1]]}
 _TILTED_PLANE: dict[str, Any] = {
     "kind": "polygon",
     "points": [[-0.1, -0.1, 0.37], [1.1, -0.1, 0.37], [1.1, 1.1, 0.61], [-0.1, 1.1, 0.61]],
 }
 _BOUNDARY_EXACT = [{"where": "boundary", "displacement": "exact"}]
-_ROLLERS = [
+ROLLERS = [
     {"where": "bottom", "displacement": [0.0], "components": ["y"]},
     {"where": "left", "displacement": [0.0], "components": ["x"]},
     {"where": "right", "displacement": [0.0], "components": ["x"]},
 ]
 
 
-def _scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
+def unit_scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
     """Make a scene of a unit square, in which `parts` replace the defaults."""
     content: dict[str, Any] = {
         "title": name,
@@ -52,7 +52,8 @@ def _scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
     return restore_scene({"name": name, "file": str(file) if file else None, "scene": content})
 
 
-def _in_space(cuts: list[Mapping[str, Any]]) -> dict[str, Any]:
+def in_space(cuts: list[Mapping[str, Any]]) -> dict[str, Any]:
+    """Parts of a scene of a unit cube of 3 × 3 × 3 cells."""
     return {
         "geometry": _CUBE,
         "mesh": {"cells": [[3, 3, 3]]},
@@ -65,8 +66,8 @@ def uncut_linear(dimension: int = 2) -> tuple[Scene, Field]:
     """Prescribe a linear field on the boundary of an uncut body."""
     matrix = np.array([[0.03, 0.05, -0.02], [-0.01, 0.02, 0.04], [0.01, -0.03, 0.05]])
     matrix = matrix[:dimension, :dimension]
-    parts = _in_space([]) if dimension == 3 else {}
-    scene = _scene(
+    parts = in_space([]) if dimension == 3 else {}
+    scene = unit_scene(
         f"uncut-{dimension}d",
         supports=_BOUNDARY_EXACT,
         exact={"solution": "linear", "parameters": {"matrix": matrix.tolist()}},
@@ -77,29 +78,29 @@ def uncut_linear(dimension: int = 2) -> tuple[Scene, Field]:
 
 def rigid(kind: str, dimension: int = 2) -> tuple[Scene, Field]:
     """Move the whole boundary of a cut body rigidly: ``translation`` or ``rotation``."""
-    parts = _in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
+    parts = in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
     name = f"{kind}-{dimension}d"
     if kind == "translation":
         shift = np.array([0.3, -0.2, 0.1])[:dimension]
         supports = [{"where": "boundary", "displacement": shift.tolist()}]
-        scene = _scene(name, supports=supports, **parts)
+        scene = unit_scene(name, supports=supports, **parts)
         return scene, lambda points, near: np.tile(shift, (len(points), 1))
     spin = np.array([[0.0, -0.1, 0.05], [0.1, 0.0, -0.07], [-0.05, 0.07, 0.0]])
     spin = spin[:dimension, :dimension]
     exact = {"solution": "linear", "parameters": {"matrix": spin.tolist()}}
-    scene = _scene(name, supports=_BOUNDARY_EXACT, exact=exact, **parts)
+    scene = unit_scene(name, supports=_BOUNDARY_EXACT, exact=exact, **parts)
     return scene, lambda points, near: points @ spin.T
 
 
 def turned(dimension: int) -> tuple[Scene, Field]:
     """Turn the whole boundary of a cut body by a finite angle and shift it."""
-    parts = _in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
+    parts = in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
     centre, shift = [0.4, 0.3, 0.6][:dimension], [0.2, -0.1, 0.3][:dimension]
     rotation = Rotation(
         angle=50.0, centre=centre, axis=(1.0, 2.0, -1.0) if dimension == 3 else None
     )
     support = {"where": "boundary", "displacement": shift, "rotation": rotation.model_dump()}
-    scene = _scene(
+    scene = unit_scene(
         f"turned-{dimension}d",
         supports=[support],
         analysis={"kinematics": "corotational"},
@@ -112,13 +113,13 @@ def turned(dimension: int) -> tuple[Scene, Field]:
 def parted_halves() -> tuple[Scene, Field]:
     """Lift the upper half of a cube off the lower one, along a tilted plane."""
     lift = np.array([0.05, 0.0, 0.2])
-    scene = _scene(
+    scene = unit_scene(
         "parted-halves",
         supports=[
             {"where": "bottom", "displacement": [0.0, 0.0, 0.0]},
             {"where": "top", "displacement": lift.tolist()},
         ],
-        **_in_space([_TILTED_PLANE]),
+        **in_space([_TILTED_PLANE]),
     )
     corner, end = _TILTED_PLANE["points"][0], _TILTED_PLANE["points"][2]
     slope = (end[2] - corner[2]) / (end[1] - corner[1])
@@ -133,7 +134,7 @@ def parted_halves() -> tuple[Scene, Field]:
 def freed_half() -> tuple[Scene, Array]:
     """Let the lower half of a square fall (m/s², second value) while the upper one is held."""
     gravity = np.array([0.5, -2.0])
-    scene = _scene(
+    scene = unit_scene(
         "freed-half",
         cuts=[_INCLINED],
         supports=[{"where": "top", "displacement": [0.0, 0.0]}],
@@ -145,7 +146,7 @@ def freed_half() -> tuple[Scene, Array]:
 
 def swinging() -> Scene:
     """Let a square that stands on its lower side swing under a sudden weight, cut from its side."""
-    return _scene(
+    return unit_scene(
         "swinging",
         cuts=[{"kind": "polyline", "points": [[0.37, 0.41], [1.1, 0.63]]}],
         supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
@@ -167,7 +168,7 @@ def strained_sides() -> tuple[Scene, Field, float]:
         E'/2 · Σ area · strain², J/m.
     """
     strain, shift = (0.1, -0.05), (0.03, -0.02)  # above, below
-    scene = _scene(
+    scene = unit_scene(
         "strained-sides", supports=_BOUNDARY_EXACT, cuts=[_INCLINED], exact=_patch(strain, shift)
     )
     direction = np.array([1.0, _SLOPE]) / np.hypot(1.0, _SLOPE)
@@ -200,8 +201,8 @@ def closed_cut() -> tuple[Scene, Scene]:
     """Pull a body along its cut, and the same body without the cut: the cut bears nothing."""
     exact = _patch((0.1, 0.1), (0.0, 0.0))
     return (
-        _scene("closed-cut", supports=_BOUNDARY_EXACT, cuts=[_INCLINED], exact=exact),
-        _scene("no-cut", supports=_BOUNDARY_EXACT, exact=exact),
+        unit_scene("closed-cut", supports=_BOUNDARY_EXACT, cuts=[_INCLINED], exact=exact),
+        unit_scene("no-cut", supports=_BOUNDARY_EXACT, exact=exact),
     )
 
 
@@ -211,16 +212,16 @@ def pulled_halves() -> tuple[Scene, Field]:
     Plane stress. The outer sides are on rollers, so that the cut opens by ν t / E everywhere.
     """
     traction = 0.2
-    scene = _scene(
+    scene = unit_scene(
         "pulled-halves",
         material={"young": YOUNG, "poisson": POISSON, "plane": "stress"},
-        cuts=[_UPRIGHT],
-        supports=_ROLLERS,
+        cuts=[UPRIGHT],
+        supports=ROLLERS,
         loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
     )
 
     def field(points: Array, near: Array) -> Array:
-        fixed = np.where(near[:, 0] < _UPRIGHT_AT, 0.0, 1.0)
+        fixed = np.where(near[:, 0] < UPRIGHT_AT, 0.0, 1.0)
         strain = traction / YOUNG
         return np.column_stack([-POISSON * strain * (points[:, 0] - fixed), strain * points[:, 1]])
 
@@ -238,11 +239,11 @@ def two_materials() -> tuple[Scene, Field]:
     young, poisson = np.array([1.0, 4.0]) * YOUNG, np.array([0.1, 0.4])
     strip = {"where": f"x > {interface}", "young": float(young[1]), "poisson": float(poisson[1])}
     base = {"young": float(young[0]), "poisson": float(poisson[0]), "plane": "stress"}
-    scene = _scene(
+    scene = unit_scene(
         "two-materials",
         material={**base, "regions": [strip]},
-        cuts=[_UPRIGHT],
-        supports=_ROLLERS,
+        cuts=[UPRIGHT],
+        supports=ROLLERS,
         loads=[
             {
                 "kind": "traction",
@@ -257,34 +258,8 @@ def two_materials() -> tuple[Scene, Field]:
         x, y = points.T
         first = interface - np.minimum(x, interface)
         inwards = poisson[0] * first + poisson[1] * (1 - np.maximum(x, interface))
-        across = np.where(near[:, 0] < _UPRIGHT_AT, -poisson[0] * x, inwards)
+        across = np.where(near[:, 0] < UPRIGHT_AT, -poisson[0] * x, inwards)
         return strain * np.column_stack([across, y])
-
-    return scene, field
-
-
-def two_cuts() -> tuple[Scene, Field]:
-    """Move and turn (infinitesimally) each of three parts between two cuts, held off the cuts."""
-    cuts = np.array([[[-0.1, 0.14], [1.1, 0.23]], [[-0.1, 0.85], [1.1, 0.77]]])
-    held = ["bottom", "x < 1e-9 and y > 0.3 and y < 0.7", "top"]
-    motions = np.array([[0.02, -0.03, 0.1], [-0.04, 0.05, -0.06], [0.05, 0.08, 0.03]])
-    scene = _scene(
-        "two-cuts",
-        mesh={"cells": [[5, 8], [10, 16]]},
-        supports=[
-            {"where": where, "displacement": [f"{a} - {turn} * y", f"{b} + {turn} * x"]}
-            for where, (a, b, turn) in zip(held, motions.tolist(), strict=True)
-        ],
-        cuts=[
-            {"kind": "polyline", "name": name, "points": ends.tolist()}
-            for name, ends in zip(("lower", "upper"), cuts, strict=True)
-        ],
-    )
-
-    def field(points: Array, near: Array) -> Array:
-        heights = [np.interp(near[:, 0], ends[:, 0], ends[:, 1]) for ends in cuts]
-        a, b, turn = motions[np.sum([near[:, 1] > height for height in heights], axis=0)].T
-        return np.column_stack([a - turn * points[:, 1], b + turn * points[:, 0]])
 
     return scene, field
 
@@ -292,9 +267,9 @@ def two_cuts() -> tuple[Scene, Field]:
 def hanging_halves() -> tuple[Scene, Array]:
     """Hang two halves, cut apart lengthwise, under their weight (N/m³, second value)."""
     gravity = np.array([0.5, -2.0])
-    scene = _scene(
+    scene = unit_scene(
         "hanging-halves",
-        cuts=[_UPRIGHT],
+        cuts=[UPRIGHT],
         supports=[{"where": "top", "displacement": [0.0, 0.0]}],
         loads=[{"kind": "gravity", "acceleration": gravity.tolist()}],
     )
@@ -309,7 +284,7 @@ def sheared_halves(mirrored: bool) -> Scene:
     order = slice(None, None, -1) if mirrored else slice(None)
     lower, upper, side = ("left", "right", "top") if mirrored else ("bottom", "top", "right")
     ends = [[-0.1, 0.47], [1.1, 0.62]]
-    return _scene(
+    return unit_scene(
         "mirrored" if mirrored else "sheared-halves",
         mesh={"cells": [[6, 6], [12, 12]]},
         cuts=[{"kind": "polyline", "points": [end[order] for end in ends]}],
@@ -323,7 +298,7 @@ def sheared_halves(mirrored: bool) -> Scene:
 
 def free_piece() -> Scene:
     """Cut a piece off that nothing holds: there is no static answer."""
-    return _scene(
+    return unit_scene(
         "free-piece",
         cuts=[_INCLINED],
         supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
@@ -354,7 +329,7 @@ def given_mesh(folder: Path, shuffled: bool) -> Scene:
     file = folder / f"{name}.vtu"
     spatial = np.pad(points, ((0, 0), (0, 1)))
     meshio.Mesh(spatial, [("triangle", cells)]).write(file, file_format="vtu")
-    return _scene(
+    return unit_scene(
         f"{name}-mesh",
         file=folder / f"{name}.toml",
         geometry={"kind": "file", "file": file.name, "dimension": 2},
@@ -393,11 +368,11 @@ def unusual() -> list[Scene]:
             "cuts": [{"kind": "polyline", "points": [[0.3, 0.2], [0.6, 0.3]]}],
         },
         "space": {
-            **_in_space([_TILTED_PLANE]),
+            **in_space([_TILTED_PLANE]),
             "supports": [space],
             "loads": [{"kind": "gravity", "acceleration": [0.0, 0.3, -1.0]}],
         },
     }
     if find_spec("gmsh") is None:  # a mesh generator that is not there is no fault of a solver
         del cases["polygon"]
-    return [_scene(name, **{**held, "loads": loads, **parts}) for name, parts in cases.items()]
+    return [unit_scene(name, **{**held, "loads": loads, **parts}) for name, parts in cases.items()]
