@@ -14,7 +14,6 @@ from verify.errors import InputError
 from verify.runner.checking import check_scene
 from verify.scene import Scene, case_folder
 
-_TRIALS = 2
 _HELD = [{"where": "boundary", "displacement": "exact"}]
 
 
@@ -166,10 +165,11 @@ _CHANGES = {
 }
 
 
+@pytest.mark.parametrize("trials", [1, pytest.param(12, marks=pytest.mark.heavy)])
 @pytest.mark.parametrize("make", _CHANGES, ids=lambda make: make.__name__)
-def test_what_contradicts_the_exact_field_is_refused_and_nothing_else(make):
+def test_what_contradicts_the_exact_field_is_refused_and_nothing_else(make, trials):
     rng = np.random.default_rng(27)
-    for _ in range(_TRIALS):
+    for _ in range(trials):
         content = make(rng)
         d = _dimension(content)
         assert _refusal(d=d, **content) == ""

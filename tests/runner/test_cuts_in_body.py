@@ -65,7 +65,7 @@ def test_random_cuts_of_a_body_from_a_file_are_what_they_are_of_the_same_body_de
     rng = np.random.default_rng(12)
     described = {"mesh": {"cells": [[2] * d]}}
     seen = set()
-    for _ in range(60):
+    for _ in range(40):
         cut = _random_cut(rng, d)
         point = rng.uniform(-0.3, 1.3, d).tolist()
         place = {"kind": "displacement", "name": "u", "point": point, "component": "x"}

@@ -6,7 +6,8 @@ from verify.assess.reference import exact_reference
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError
-from verify.scene import Scene, list_cases, load_scene
+from verify.runner.checking import check_scene
+from verify.scene import Scene, list_cases, load_scene, load_scenes
 
 CASES = [name for name in list_cases() if name.startswith("statics/")]
 EXACT = [name for name in CASES if load_scene(name).exact is not None]
@@ -63,3 +64,10 @@ def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field(name):
     assert len(tips) == len(points)
     for tip in tips:
         assert np.linalg.norm(points - tip, axis=1).min() < 1e-14
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", list_cases())
+def test_no_case_is_refused_before_a_run(name):
+    for scene in load_scenes(name):
+        check_scene(scene)
