@@ -123,7 +123,7 @@ class Case:
         velocity, acceleration : (t, n, d) arrays, optional
             m/s, m/s².
         more
-            Further keys of ``solution.json``: ``unknowns``, ``cut_facets``, ``notes``, …
+            Further keys of ``solution.json``: ``unknowns``, ``cut_facets``, ``mass``, ``notes``, …
         """
         displacement = np.asarray(displacement, dtype=float)
         frames = displacement if displacement.ndim == 3 else displacement[None]
