@@ -109,6 +109,11 @@ class TextLevels(Guest):
         return "3"
 
 
+class Talking(Guest):
+    def refuses(self, scene):
+        return "no " * 2_000_000
+
+
 class RaisingRefusal(Guest):
     def refuses(self, scene):
         raise SystemExit("not today")

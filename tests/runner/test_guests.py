@@ -47,6 +47,26 @@ def test_an_answer_that_is_none_has_its_reason(tmp_path, monkeypatch, scene, nam
     assert not (tmp_path / "solution.json").exists()
 
 
+def test_a_link_in_its_folder_is_not_written_through(tmp_path, scene):
+    folder, kept = tmp_path / "solve", tmp_path / "kept.json"
+    folder.mkdir()
+    kept.write_text("mine")
+    for name in ("solution.json", "solution.vtu", "outcome.json"):
+        (folder / name).symlink_to(kept)
+    job = {"scene": scene_content(scene), "solver": "guests:Guest", "level": 0}
+    outcome = solve_job({**job, "repetitions": 1, "parameters": {}}, folder)
+    assert outcome["status"] == "solved"
+    assert kept.read_text() == "mine"
+    assert (folder / "solution.json").stat().st_size > 100
+    assert not list(folder.glob("outcome*"))
+
+
+def test_a_refusal_of_any_length_is_a_sentence(scene):
+    answer = survey("guests:Talking", [scene_content(scene)])
+    assert answer["cases"]["square"]["refusal"].startswith("no no no")
+    assert len(answer["cases"]["square"]["refusal"]) <= 400
+
+
 @pytest.mark.parametrize("name", ASKED)
 def test_nonsense_when_it_is_asked_has_its_reason(scene, name):
     answer = survey(f"guests:{name}", [scene_content(scene)])

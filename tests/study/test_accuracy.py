@@ -230,21 +230,15 @@ def test_a_rate_over_the_levels_that_could_be_compared_is_none(monkeypatch):
     assert "xfem level 1: comparison failed: ZeroDivisionError" in found.reason
 
 
-def in_space(given):
+def in_space():
     tetrahedra = np.column_stack([np.tile([0, 1], (2, 1)), [[2, 3], [3, 2]]])
     points = np.vstack([np.zeros(3), np.eye(3)])
     return solution(points, tetrahedra, np.zeros((4, 3)))
 
 
-@pytest.mark.parametrize(
-    "wrong, said",
-    [
-        (lambda s: replace(s, displacement=1e40 * s.displacement), "the body is 1.41 m large"),
-        (in_space, "space of dimension 3; expected cells of dimension 2 in space of dimension 2"),
-    ],
-)
-def test_an_answer_that_no_comparison_can_be_made_of_is_its_solvers_failure(wrong, said):
-    guests = {"guest": {0: wrong(LEVELS[0])}, "xfem": {0: LEVELS[0]}}
+def test_an_answer_that_no_comparison_can_be_made_of_is_its_solvers_failure():
+    said = "space of dimension 3; expected cells of dimension 2 in space of dimension 2"
+    guests = {"guest": {0: in_space()}, "xfem": {0: LEVELS[0]}}
     result = assess([BOUND], guests, EXACT)
     guest = next(solve for solve in result.solves if solve.solver == "guest")
     assert guest.status is Status.FAILED

@@ -6,6 +6,7 @@ from pathlib import Path
 from verify.errors import InputError
 from verify.exchange.export import level_folder
 from verify.json_files import read_json
+from verify.printable import one_line
 from verify.result import Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene
@@ -59,7 +60,7 @@ def read_answers(scene: Scene, folder: Path) -> Answers:
             continue
         try:
             if refusal := read_json(path).get("refused"):
-                answers.missing[level] = Status.REFUSED, str(refusal)
+                answers.missing[level] = Status.REFUSED, one_line(refusal)
                 continue
             solution = read_solution(path.with_suffix(""))
             if solution.dimension != scene.dimension:

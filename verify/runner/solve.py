@@ -101,6 +101,8 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         text = f"a solution in {solution.dimension}D; expected {scene.dimension}D, as the case is"
         raise InputError(text)
     if store:
+        for planted in [path for path in folder.iterdir() if path.is_symlink()]:
+            planted.unlink()  # of the solver: what it leads to is not ours to write
         write_solution(solution, folder / "solution")
     return {
         "status": Status.SOLVED,

@@ -12,11 +12,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from verify.errors import InputError
-from verify.printable import shown, words_of
+from verify.printable import one_line, shown, words_of
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
 from verify.solvers.named import solver_in
+
+_LONGEST = 400  # characters of a refusal: it stands in every record of the solver
 
 # module:class, imported only when asked for, so that one solver's missing dependency
 # (FEniCSx, say) does not hinder the others
@@ -84,7 +86,7 @@ def checked_refusal(answer: Any) -> str | None:
     """
     if answer is not None and not isinstance(answer, str):
         raise InputError(f"refuses() gave {shown(answer)}; expected a sentence, or None")
-    return answer or None
+    return one_line(answer, _LONGEST) if answer else None
 
 
 def checked_levels(answer: Any) -> int:
