@@ -11,6 +11,7 @@ import pytest
 
 import verify
 from verify import provenance as module
+from verify.cut_record import CutRecord
 from verify.errors import InputError
 from verify.provenance import provenance, versions
 from verify.reference_record import ReferenceRecord
@@ -35,6 +36,7 @@ def judged(*verdicts):
                 "statics/a", "xfem", 0, Status.SOLVED,
                 metrics=[Metric("energy_norm", 0.25, "1", uncertainty=1e-3, source="exact: patch")],
                 timings={"solve": [0.1, 0.2]}, size=0.5, unknowns=8,
+                cut=CutRecord(2, 0.1, 0.04, 0.0, 0.0, 0.01, 0.7, 0.06, None, {"jump_l2": 1.0}),
             ),
             SolveRecord("statics/a", "xfem", 1, Status.TIMEOUT, "killed after 3 s"),
         ],
@@ -48,6 +50,10 @@ def test_a_result_is_read_as_it_was_written(tmp_path):
     write_result(result, tmp_path / "a" / "result.json")
     assert read_result(tmp_path / "a" / "result.json") == result
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["result.json"]
+    older = json.loads((tmp_path / "a" / "result.json").read_text())
+    del older["solves"][0]["cut"]
+    (tmp_path / "a" / "result.json").write_text(json.dumps(older))
+    assert read_result(tmp_path / "a" / "result.json").solves[0].cut is None
 
 
 def strict(path):

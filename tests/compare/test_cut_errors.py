@@ -1,12 +1,13 @@
 """Cut-off teeth and corners are in the errors: against an integration of one's own."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from cut_meshes import scene
 
-from verify.assess.cut_errors import measured_cut, with_cut, with_other_errors
+from verify.assess.cut_errors import are_mixed, measured_cut, with_cut, with_other_errors
 from verify.assess.error_history import error_history
 from verify.assess.quantities import Measured
 from verify.compare.body import body_of
@@ -14,7 +15,9 @@ from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.compare.integration import spread_of
 from verify.compare.motion import ExactMotion
-from verify.result import CUT, SolveRecord, Status
+from verify.reference_record import ReferenceRecord
+from verify.report.tables import cuts_table
+from verify.result import CUT, CaseResult, SolveRecord, Status
 from verify.scene.planar import inside_polygon
 from verify.solvers.interface import find_solver
 
@@ -120,3 +123,20 @@ def test_the_error_of_a_random_zigzag_is_that_of_the_stored_field(seed):
             assert CUT in record.notes
         if solver == "conforming":
             assert record.cut.lateral < 1e-12
+
+
+def test_levels_with_and_without_continuation_make_no_order_and_the_report_shows_them():
+    solves = []
+    for level, cells in enumerate((4, 8)):
+        record, _, _ = judged(TOOTH, cells, "xfem")
+        solves.append(replace(record, level=level, size=1 / cells))
+    within = replace(solves[1].cut, limit=solves[1].cut.lateral)
+    assert not are_mixed(solves)
+    assert are_mixed([solves[0], replace(solves[1], cut=within)])
+    case = {"case": "a", "title": "", "requirement": "", "scene_hash": "", "scene": {}}
+    result = CaseResult(**case, reference=ReferenceRecord(), solves=solves, rates=[], verdicts=[])
+    table = cuts_table(result)
+    assert table is not None
+    assert [row[1].text for row in table.rows] == ["0", "1"]
+    assert all("partly without" in row[7].text for row in table.rows)
+    assert cuts_table(replace(result, solves=[])) is None
