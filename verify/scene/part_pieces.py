@@ -6,6 +6,7 @@ on these pieces, so that a part is the same for all of them.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -100,20 +101,27 @@ def pieces_on_part(
     """
     count, k, d = corners.shape
     boundary = corners if boundary is None else boundary
-    size = size_of(boundary)
     if where == "boundary":
         return Pieces.whole(np.arange(count), k)
     if where in geometry.parts():
-        on = on_named(geometry, where, corners.reshape(-1, d), size).reshape(count, k)
+        on = on_named(geometry, where, corners.reshape(-1, d), size_of(boundary)).reshape(count, k)
         return Pieces.whole(np.flatnonzero(on.all(axis=1)), k)
+    return _of_formula(where, k, d, *(x.astype(float).tobytes() for x in (corners, boundary)))
+
+
+@lru_cache(maxsize=16)
+def _of_formula(where: str, k: int, d: int, facets: bytes, every: bytes) -> Pieces:
+    """Pieces on the part of an inequality; kept, as loads that change in time ask at each step."""
+    corners, boundary = (np.frombuffer(x).reshape(-1, k, d) for x in (facets, every))
+    count, size = len(corners), size_of(boundary)
     pieces = Pieces.whole(np.arange(count), k)
     largest = np.inf if is_affine(where) else _LARGEST[k] * size
-    for sides in comparisons(where, geometry.dimension):
+    for sides in comparisons(where, d):
         pieces, values = _refined(pieces, corners, sides, size, largest)
         pieces = _clipped(pieces, values)
     points = off_ridges(pieces.places(corners), boundary, size)
     away = _normal_projections(corners)[pieces.facet]
-    return _joined(pieces, on_formula(geometry, where, points, away, size), count)
+    return _joined(pieces, on_formula(where, points, away, size), count)
 
 
 def _refined(

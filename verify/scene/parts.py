@@ -31,7 +31,6 @@ def on_part(
 
 
 def on_formula(
-    geometry: Geometry,
     where: str,
     points: NDArray[np.float64],
     away: NDArray[np.float64],
@@ -42,7 +41,7 @@ def on_formula(
     `away` (n, d, d) projects onto what is normal to the facet of each: there alone a part is met
     by points that are not on it, so that ``x < 0`` is a face.
     """
-    region = parse_region(where, geometry.dimension)
+    region = parse_region(where, points.shape[1])
     found = region(points)
     for step in np.moveaxis(_TOLERANCE * size * away, 1, 0):
         found |= region(points + step) | region(points - step)
