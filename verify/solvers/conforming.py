@@ -265,7 +265,9 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
         "smallest det F": f"{state.least:.3g}",
         "smallest det F at": place_text(state.place),
         "area inside out": f"{state.share:.1e}",
-        "inside out up to": f"{state.reach:.2g} m from a tip, a corner or the end of a support",
+        "inside out": f"up to {state.reach:.2g} m from a tip, a corner or the end of a support"
+        if state.share
+        else "nowhere",
         "steps taken again": "; ".join(finite.refused_steps) or "none",
         "stability": _stability(finite),
     }
