@@ -354,6 +354,7 @@ def test_a_domain_fits_around_any_front_on_the_first_level_of_a_reference_of_def
         assert len(mesh.cells) < 40_000
 
 
+@pytest.mark.heavy
 @pytest.mark.fenicsx
 def test_a_small_penny_has_its_factors_on_the_first_level_of_a_reference_of_default_size():
     """An eighth of the body wide; second-order elements of h/a = 0.22: a few per cent."""
