@@ -27,6 +27,7 @@ from verify.assess.reference import (
     exact_reference,
 )
 from verify.assess.released import released_metrics
+from verify.assess.ringing import ringing_factors
 from verify.assess.sufficiency import sufficiency
 from verify.assess.unavailable import unavailable_quantities
 from verify.compare.body import AnyBody, body_of
@@ -132,6 +133,7 @@ def assess_accuracy(
             *doubtful_errors(scene, [r for r in measured if r.solver != REFERENCE]),
             *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
             *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
+            *ringing_factors(scene, solutions.get(REFERENCE, {})),
         ],
         row=asdict(scene.row) if scene.row else None,
     )
