@@ -1,10 +1,20 @@
 """Closed forms of a crack that is loaded suddenly, against other ways to the same numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from reference_scenes import needs_fenicsx
 
-from reference.exact.hooke import Hooke
+from reference.exact.hooke import Hooke, hooke
 from reference.exact.sudden_crack import sudden_intensity, sudden_slip
+from verify.assess.quantities import Measured
+from verify.assess.reference import known_quantity, size_of
+from verify.assess.ringing import ringing_factors
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.scene import load_scene
+from verify.solvers import find_solver
 
 LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
 TIME = 0.9
@@ -65,3 +75,46 @@ def test_the_slip_is_that_of_finite_differences():
         off.append(np.abs(jump - expected)[far].max() / expected.max())
     assert off[1] < 0.6 * off[0]
     assert off[1] < 0.01
+
+
+class TestOnTheReference:
+    pytestmark = needs_fenicsx
+
+    def test_steps_far_below_the_time_across_an_element_are_warned_of(self):
+        """With 5 outputs a step is 0.84 h/c, with 40 a tenth of that."""
+        scene = load_scene("dynamics/crack_pressed_suddenly")
+        few = find_solver("reference").solve(scene, 0, repetitions=0)
+        assert few.iterations["steps"] == 4
+        assert not ringing_factors(scene, few)
+        (notice,) = ringing_factors(scene, replace(few, iterations={"steps": 39}))
+        assert notice.about == "K_I_early, K_I_later, K_I_late"
+        assert "0.0316 s, is 0.087 of the time" in notice.text
+        rest = scene.model_copy(update={"quantities": []})
+        assert not ringing_factors(rest, replace(few, iterations={"steps": 39}))
+
+    @pytest.mark.heavy
+    @pytest.mark.parametrize(
+        ("case", "mode", "traction"),
+        [("crack_pressed_suddenly", "I", 1.0), ("crack_sheared_suddenly", "II", 1e-3)],
+    )
+    def test_half_widths_cover_the_factor_at_every_output(self, case, mode, traction):
+        """Outputs 0.45 h/c apart, closer than the natural step: ten factors and more per mode."""
+        scene = load_scene(f"dynamics/{case}")
+        size, outputs = 0.3, 11
+        times = np.linspace(0.0, scene.analysis.duration, outputs)[1:]
+        (asked,) = scene.quantities[-1:]
+        scene = scene.model_copy(update={
+            "analysis": scene.analysis.model_copy(update={"outputs": outputs}),
+            "reference": scene.reference.model_copy(update={"size": size}),
+        })  # fmt: skip
+        body, law = body_of(scene), law_of(scene)
+        solver = find_solver("reference")
+        solutions = [solver.solve(scene, level, repetitions=0) for level in range(3)]
+        measured = [Measured(one, body, law, scene) for one in solutions]
+        sizes = [size_of(one) for one in solutions]
+        for time in times:
+            one = asked.model_copy(update={"time": float(time)})
+            values = [level.quantity(one) for level in measured]
+            known = known_quantity(one, measured, values, sizes, falls=4.0)
+            exact = sudden_intensity(mode, traction, hooke(scene.material), time)
+            assert abs(known.value - exact) < known.half_width, time
