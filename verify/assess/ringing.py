@@ -1,5 +1,7 @@
 """Stress-intensity factors in motion that ring: time steps far below the time across an element."""
 
+from collections.abc import Mapping
+
 from reference.moduli import wave_speed
 from verify.result import Notice, NoticeKind
 from verify.scene import Scene
@@ -12,18 +14,22 @@ from verify.solution import Solution
 _SHORT = 0.25
 
 
-def ringing_factors(scene: Scene, solution: Solution) -> list[Notice]:
+def ringing_factors(scene: Scene, levels: Mapping[int, Solution]) -> list[Notice]:
     """Warn of the factors of a reference whose steps are far shorter than a wave takes across h.
 
     Parameters
     ----------
     scene : Scene
-    solution : Solution
-        The finest level of a conforming reference: every level halves step and elements.
+    levels : mapping of int to Solution
+        Of a conforming reference: every level halves step and elements. Empty without one.
     """
     names = [one.name for one in scene.quantities if isinstance(one, StressIntensityQuantity)]
-    steps, duration = solution.iterations.get("steps"), scene.analysis.duration
-    if not names or not steps or duration is None:
+    duration = scene.analysis.duration
+    if not names or not levels or duration is None:
+        return []
+    solution = levels[max(levels)]
+    steps = solution.iterations.get("steps")
+    if not steps:
         return []
     step, across = duration / steps, float(solution.size / wave_speed(scene.material))
     if step >= _SHORT * across:
