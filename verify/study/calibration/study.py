@@ -53,7 +53,7 @@ def calibration_study(
     Parameters
     ----------
     quick : bool
-        Two scenes of each family, in the plane only: too few to judge a family by.
+        Two scenes of each family that is cheap: too few to judge a family by.
     announce : callable
         Is told what is being solved.
     seed : int
