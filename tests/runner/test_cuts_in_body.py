@@ -91,7 +91,7 @@ def test_cuts_that_no_mesh_follows_are_refused():
             check_scene(scene([{"kind": "polyline", "points": short}]))
         start, end = np.sort(rng.uniform(0.1, 0.9, 2)).tolist()
         along = [[start, 1.0], [end, 1.0], rng.uniform(0.2, 0.7, 2).tolist()]
-        with pytest.raises(InputError, match=r"'cut' and the boundary .* over"):
+        with pytest.raises(InputError, match=r"runs along the boundary over"):
             check_scene(scene([{"kind": "polyline", "points": along}]))
         meets = [[start, 1.2], [end, 0.7], along[2]]  # crosses the boundary, and goes in
         check_scene(scene([{"kind": "polyline", "points": meets}]))

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.runner.exact_samples import holds
-from verify.scene import Box, Polygon, Rectangle, Scene
+from verify.scene import Box, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.cut_placement import check_points
-from verify.scene.planar import inner_parts
-from verify.scene.spatial import area_inside, rim_edges
+from verify.scene.planar import overlap_length
+from verify.scene.spatial import rim_edges
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
@@ -25,36 +25,41 @@ _METRES = 100.0  # times the body: a cut as large is not in metres, or the body 
 
 
 def check_cuts_can_be_meshed(scene: Scene) -> None:
-    """Raise `InputError` where cuts are too short, or too close to each other or the boundary.
+    """Raise `InputError` where a cut is too short, or runs along the boundary on part of its way.
 
-    A cut that runs along the boundary for a part of its way is as close to it as can be.
+    Cuts that are close to each other or to the boundary are for methods that need no mesh between
+    them, and are not refused here.
     """
-    from reference.meshing.features import plane_features
-    from reference.meshing.separation import check_separation
-
     body, where = scene.geometry, str(scene.file or scene.name)
     if not isinstance(body, Rectangle | Polygon | Box):
         return
     corners = np.array([body.lower, body.upper]) if isinstance(body, Box) else body.outline()
     size = float(np.ptp(corners, axis=0).max())
     for i, cut in enumerate(scene.final_cuts):
-        extent = _extent_inside(cut, corners)
+        place, extent = f"cuts[{i}] ('{cut.name}')", _extent(cut)
         if extent < _SHORTEST * size:
             raise InputError(
-                f"cuts[{i}] ('{cut.name}'): is {extent:.3g} m long inside a body of {size:.3g} m; "
-                f"expected at least {_SHORTEST * size:.3g} m",
+                f"{place}: is {extent:.3g} m long in a body of {size:.3g} m; expected at least "
+                f"{_SHORTEST * size:.3g} m",
                 where,
             )
-    if not isinstance(body, Box):
-        check_separation(plane_features(scene), size, where)
+        if isinstance(cut, PolylineCut):
+            along = overlap_length(cut.vertices(), np.vstack([corners, corners[:1]]))
+            if along:
+                raise InputError(
+                    f"{place}: runs along the boundary over {along:.3g} m, where it cuts nothing; "
+                    "let it begin and end where it leaves the boundary",
+                    where,
+                )
 
 
-def _extent_inside(cut: Any, corners: Array) -> float:
-    """Length of a cut inside a polygon (k, 2), or root of its area in a box (2, 3), m."""
+def _extent(cut: Any) -> float:
+    """Length of a cut in the plane, or root of its area in space, m."""
     if cut.dimension == 3:
-        return float(area_inside(cut.surface(), *corners) ** 0.5)
-    parts = inner_parts(cut.vertices(), corners)
-    return float(sum(np.linalg.norm(end - start) for start, end in parts))
+        corners = cut.surface()[0][cut.surface()[1]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return float((0.5 * np.linalg.norm(normals, axis=1).sum()) ** 0.5)
+    return float(np.linalg.norm(np.diff(cut.vertices(), axis=0), axis=1).sum())
 
 
 def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
