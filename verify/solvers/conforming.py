@@ -81,7 +81,7 @@ class ConformingSolver:
         graded.
     scheme : {"newmark", "energy_momentum", "implicit_euler", "generalised_alpha"}
         Dynamics: time integration. The step is the scene's, or else the time in which a pressure
-        wave crosses an element.
+        wave crosses an element; outputs that are closer cut it short, on every level alike.
     spectral_radius : float
         Of generalised-α at infinite frequency, 0 to 1.
     delay : float
