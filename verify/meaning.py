@@ -40,6 +40,13 @@ def _moves(scene: Scene, solve: SolveRecord) -> bool:
     return (scene.get("analysis") or {}).get("kind") == "dynamic"
 
 
+def _linear_motion(scene: Scene, solve: SolveRecord) -> bool:
+    """Whether a reference judges that was integrated by the trapezoidal rule."""
+    linear = (scene.get("analysis") or {}).get("kinematics", "linear") == "linear"
+    blade = any(cut.get("kind") == "tool_path" for cut in scene.get("cuts") or [])
+    return _moves(scene, solve) and linear and not blade and not scene.get("exact")
+
+
 def _not_continued(scene: Scene, solve: SolveRecord) -> bool:
     return solve.cut is not None and not solve.cut.continued
 
@@ -58,6 +65,14 @@ CHANGES = (
         "energies are those of the fields, with the mass that the solver declares; they were the "
         "solver's own account",
         _moves,
+    ),
+    Change(
+        2,
+        ("displacement_l2*", "displacement_max*", "energy_norm*", "jump_l2*", "opening_l2*",
+         "opening_max*"),
+        "the reference is integrated by generalised-α with the spectral radius 1/2; it was by the "
+        "trapezoidal rule",
+        _linear_motion,
     ),
     Change(
         2,
