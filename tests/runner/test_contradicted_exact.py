@@ -8,8 +8,8 @@ import tomllib
 
 import numpy as np
 import pytest
+from scenes import box, scene, soft
 
-from tests.scenes import box, scene, soft
 from verify.errors import InputError
 from verify.runner.checking import check_scene
 from verify.scene import Scene, case_folder

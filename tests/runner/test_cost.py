@@ -72,10 +72,10 @@ def test_a_mesh_that_no_machine_holds_is_warned_of_in_one_line(tmp_path, case_te
     assert main(["check", str(file)]) == 0
     assert capsys.readouterr().err == ""
     assert "cells = [[2, 2], [4, 4]]" in case_text
-    file.write_text(case_text.replace("cells = [[2, 2], [4, 4]]", "sizes = [0.5, 1e-7]"))
+    file.write_text(case_text.replace("cells = [[2, 2], [4, 4]]", "sizes = [0.5, 2e-5]"))
     assert main(["check", str(file)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
-    assert "warning: level 1 of xfem would take about 5e+08 GB" in line
+    assert "warning: level 1 of xfem would take about 1.25e+04 GB" in line
 
 
 def test_the_command_says_it_of_a_file(tmp_path, case_text, capsys):

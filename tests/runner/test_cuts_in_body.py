@@ -9,8 +9,8 @@ import re
 import meshio
 import numpy as np
 import pytest
+from scenes import scene, soft
 
-from tests.scenes import scene, soft
 from verify.errors import InputError
 from verify.runner.checking import check_scene
 from verify.runner.cuts_in_body import check_places_in_mesh

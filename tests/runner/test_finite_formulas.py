@@ -1,8 +1,8 @@
 """Formulas that are no finite number where they are used are refused before a run."""
 
 import pytest
+from scenes import scene, soft
 
-from tests.scenes import scene, soft
 from verify.errors import InputError
 from verify.runner.checking import check_scene
 

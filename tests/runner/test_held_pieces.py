@@ -6,8 +6,8 @@ part gets a support, none, or one that leaves a shift or a turn.
 
 import numpy as np
 import pytest
+from scenes import scene, soft
 
-from tests.scenes import scene, soft
 from verify.errors import InputError
 from verify.runner.checking import check_scene
 

@@ -95,6 +95,8 @@ def realised_cut(solution: Solution, body: AnyBody, rule: CutRule) -> RealisedCu
         away, end, nearest = _to_realised(points, rule.normals[mine[k]], own, body, same)
         missing += float(weights[end].sum())
         forth.append(float(away[~end].max(initial=0.0)))
+        if not len(rows):
+            continue
         beyond[rows[nearest[~end & (away > limit)]]] = True
 
         points, weights = points_in(own, _ORDER[facets.shape[1]])
