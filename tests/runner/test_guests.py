@@ -1,5 +1,7 @@
 """Misbehaviour of a guest is a row with its reason: nobody else loses a verdict, the run ends."""
 
+import errno
+
 import pytest
 
 from verify.result import Status
@@ -47,7 +49,25 @@ def test_an_answer_that_is_none_has_its_reason(tmp_path, monkeypatch, scene, nam
     assert not (tmp_path / "solution.json").exists()
 
 
-def test_a_link_in_its_folder_is_not_written_through(tmp_path, scene):
+def test_what_fills_the_disk_is_removed_so_that_others_can_write(tmp_path, scene, monkeypatch):
+    folder = tmp_path / "solve"
+    (folder / "scratch").mkdir(parents=True)
+    for name in ("job.json", "log.txt", "half.vtu", "scratch/matrix"):
+        (folder / name).write_text("x")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    monkeypatch.setattr("verify.solution.write_solution", full_disk)
+    job = {"scene": scene_content(scene), "solver": "guests:Guest", "level": 0}
+    outcome = solve_job({**job, "repetitions": 1, "parameters": {}}, folder)
+    assert (outcome["status"], outcome["reason"]) == ("failed", "the disk is full")
+    assert {path.name for path in folder.iterdir()} == {"job.json", "log.txt"}
+
+
+def full_disk(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_link_in_its_folder_is_not_written_through(tmp_path, scene, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
     folder, kept = tmp_path / "solve", tmp_path / "kept.json"
     folder.mkdir()
     kept.write_text("mine")

@@ -31,3 +31,18 @@ def test_side_by_side_the_longest_case_is_first_and_its_reference_before_all():
 def test_one_after_the_other_they_keep_the_order_of_the_run():
     order = order_of_solves(PLANS, Options(jobs=1))
     assert order == [job for plan in PLANS for job in (*plan.jobs, *plan.models)]
+
+
+def test_a_guest_that_left_no_record_comes_last_when_a_run_is_resumed(tmp_path):
+    def job(solver, *files):
+        folder = tmp_path / solver
+        folder.mkdir()
+        for name in files:
+            (folder / name).write_text("{}")
+        return Job("statics/f1_patch", solver, 0, 1, "", folder)
+
+    ended, filled = job("ended", "job.json", "record.json"), job("filled", "job.json")
+    reference, new = job("reference", "job.json"), job("new")
+    scene = load_scene("statics/f1_patch")
+    plan = CasePlan(scene, ["filled"], [filled, ended, reference, new], models=[])
+    assert order_of_solves([plan], Options(jobs=1)) == [ended, reference, new, filled]

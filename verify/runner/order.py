@@ -15,7 +15,18 @@ def order_of_solves(plans: Sequence[CasePlan], options: Options) -> list[Job]:
     One after the other they keep the order of the plans. Side by side, the case that is expected
     to take longest is begun first, and in each case its reference, coarse to fine, which is most of
     it: what is short is left for the end, when it fills all processes to the last.
+
+    A solve of a guest that was begun and left no record comes last: it may end the run once more.
     """
+    return sorted(_order(plans, options), key=_left_no_record)
+
+
+def _left_no_record(job: Job) -> bool:
+    begun = (job.folder / "job.json").exists() and not (job.folder / "record.json").exists()
+    return begun and job.solver != REFERENCE
+
+
+def _order(plans: Sequence[CasePlan], options: Options) -> list[Job]:
     if options.jobs == 1 and not options.cluster:
         return [job for plan in plans for job in (*plan.jobs, *plan.models)]
 

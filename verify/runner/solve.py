@@ -8,6 +8,7 @@ first rank writes.
 import contextlib
 import errno
 import os
+import shutil
 import sys
 import traceback
 from pathlib import Path
@@ -65,12 +66,24 @@ def solve_job(
         return {"status": Status.MEMORY, "reason": "the solver could not allocate memory"}
     except OSError as error:
         _leave_traceback()
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        reason = "the disk is full" if full else one_line(error, _LONGEST)
-        return {"status": Status.FAILED, "reason": reason}
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            return {"status": Status.FAILED, "reason": one_line(error, _LONGEST)}
+        _make_room(folder)
+        return {"status": Status.FAILED, "reason": "the disk is full"}
     except BaseException as error:  # a solver may raise anything
         _leave_traceback()
         return {"status": Status.FAILED, "reason": words_of(error, _LONGEST)}
+
+
+def _make_room(folder: Path) -> None:
+    """Remove what a solve that filled the disk has left in its folder: others have to write too."""
+    for path in folder.iterdir():
+        if path.name in ("job.json", "log.txt"):
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def _leave_traceback() -> None:
