@@ -211,12 +211,18 @@ def test_a_number_that_means_something_else_than_the_stored_one_says_so_and_fail
     assert rows(baseline("check", later)[1])["xfem/1/strain_energy", "own"] == "FAIL"
 
 
+FINITE = {"kind": "dynamic", "kinematics": "finite_rotation"}
+
+
 @pytest.mark.parametrize(("scene", "metric", "lateral", "count"), [
     ({}, "strain_energy", None, 0),
     (REGION, "strain_energy", None, 1),
     ({}, "energy_drift", None, 0),  # at rest
     ({"analysis": {"kind": "dynamic"}}, "energy_drift", None, 1),
-    ({"analysis": {"kind": "dynamic"}}, "displacement_l2", None, 0),
+    ({"analysis": {"kind": "dynamic"}}, "displacement_l2", None, 1),  # another scheme judges
+    ({"analysis": FINITE}, "displacement_l2", None, 0),
+    ({"analysis": {"kind": "dynamic"}, "cuts": [{"kind": "tool_path"}]}, "energy_norm", None, 0),
+    ({"analysis": {"kind": "dynamic"}, "exact": {"solution": "x"}}, "energy_norm", None, 0),
     ({}, "displacement_l2", 0.1, 1),
     ({}, "displacement_l2", 0.001, 0),  # a faceted arc: nothing changed
 ])  # fmt: skip
