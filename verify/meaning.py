@@ -47,6 +47,10 @@ def _linear_motion(scene: Scene, solve: SolveRecord) -> bool:
     return _moves(scene, solve) and linear and not blade and not scene.get("exact")
 
 
+def _reference_in_linear_motion(scene: Scene, solve: SolveRecord) -> bool:
+    return solve.solver == "reference" and _linear_motion(scene, solve)
+
+
 def _not_continued(scene: Scene, solve: SolveRecord) -> bool:
     return solve.cut is not None and not solve.cut.continued
 
@@ -73,6 +77,13 @@ CHANGES = (
         "the reference is integrated by generalised-α with the spectral radius 1/2; it was by the "
         "trapezoidal rule",
         _linear_motion,
+    ),
+    Change(
+        2,
+        ("*",),
+        "it is integrated by generalised-α with the spectral radius 1/2, which dissipates; it was "
+        "by the trapezoidal rule",
+        _reference_in_linear_motion,
     ),
     Change(
         2,
