@@ -9,7 +9,8 @@ from verify.conformance import State, conform
 LOSES_MATERIAL = {
     "rigid-translation-2d", "rigid-rotation-2d", "rigid-translation-3d", "rigid-rotation-3d",
     "finite-rotation-2d", "finite-rotation-3d", "parted-3d",
-    "cut-patch", "two-cuts", "energy-account", "closed-cut", "traction", "two-materials",
+    "cut-patch", "two-cuts", "energy-account", "closed-cut", "traction", "traction-3d",
+    "two-materials",
 }  # fmt: skip
 BREAKS: dict[str, set[str]] = {
     "subdivision": set(),
@@ -21,11 +22,11 @@ BREAKS: dict[str, set[str]] = {
     "removal_refined": LOSES_MATERIAL,
     "uncut": {
         "parted-3d", "free-fall", "cut-patch", "two-cuts", "energy-account", "traction",
-        "two-materials", "free-piece",
+        "traction-3d", "two-materials", "free-piece",
     },
     "mass_spring": {
-        "cut-patch", "energy-account", "closed-cut", "traction", "two-materials", "weight",
-        "energy-in-motion",
+        "cut-patch", "energy-account", "closed-cut", "traction", "traction-3d", "two-materials",
+        "weight", "energy-in-motion",
     },
 }  # fmt: skip
 
