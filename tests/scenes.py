@@ -1,5 +1,7 @@
 """Scenes that tests build: of each only what its claim needs is said."""
 
+from verify.errors import InputError
+from verify.runner.checking import check_scene
 from verify.scene import Scene
 
 
@@ -26,3 +28,12 @@ def scene(cuts=(), d=2, **changes):
         "cuts": list(cuts),
     }
     return Scene.model_validate(content | changes)
+
+
+def check_refusal(**content):
+    """Why `verify check` refuses a scene; empty if it does not."""
+    try:
+        check_scene(scene(**content))
+    except InputError as error:
+        return str(error)
+    return ""

@@ -1,4 +1,4 @@
-"""Where the realised cut of a solve is, and the errors that are not judged for that."""
+"""Position of the realised cut of a solve, and the errors that are not judged because of it."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How far a realised cut is from the cut as asked: beside it, at its ends.
+"""Deviation of a realised cut from the cut as asked: lateral, and at its ends.
 
 Measured from the facets of the realised cut and the cuts as asked alone, cut by cut: a facet
 belongs to the cut that it is nearest to. A point whose nearest point is a free end lies beyond it:

@@ -95,10 +95,12 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
         os.close(lock)
 
 
-def emptied(folder: Path) -> None:
-    """Make `folder`, or remove all that is in it."""
+def emptied(folder: Path, kept: tuple[str, ...] = ()) -> None:
+    """Make `folder`, or remove all that is in it but what is `kept`."""
     folder.mkdir(parents=True, exist_ok=True)
     for leftover in folder.iterdir():
+        if leftover.name in kept:
+            continue
         if leftover.is_dir() and not leftover.is_symlink():
             shutil.rmtree(leftover)
         else:

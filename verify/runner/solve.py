@@ -8,7 +8,6 @@ first rank writes.
 import contextlib
 import errno
 import os
-import shutil
 import sys
 import traceback
 from pathlib import Path
@@ -19,6 +18,7 @@ from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
 from verify.result import COMPILING, CRITICAL_STEP, Status
 from verify.runner.childhood import die_with_parent, peak_memory
+from verify.runner.directory import emptied
 from verify.runner.ranks import give_up, world
 
 _WORTH_SAYING = 0.5  # seconds of compilation
@@ -68,22 +68,12 @@ def solve_job(
         _leave_traceback()
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             return {"status": Status.FAILED, "reason": one_line(error, _LONGEST)}
-        _make_room(folder)
+        with contextlib.suppress(OSError):  # what it left is in the way of all others
+            emptied(folder, kept=("job.json", "log.txt"))
         return {"status": Status.FAILED, "reason": "the disk is full"}
     except BaseException as error:  # a solver may raise anything
         _leave_traceback()
         return {"status": Status.FAILED, "reason": words_of(error, _LONGEST)}
-
-
-def _make_room(folder: Path) -> None:
-    """Remove what a solve that filled the disk has left in its folder: others have to write too."""
-    for path in folder.iterdir():
-        if path.name in ("job.json", "log.txt"):
-            continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
 
 
 def _leave_traceback() -> None:
