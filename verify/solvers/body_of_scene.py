@@ -32,8 +32,10 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     Raises
     ------
     InputError
-        If a mesh file is bad, or gmsh is needed and not installed.
+        If there is no such level, a mesh file is bad, or gmsh is needed and not installed.
     """
+    if not 0 <= level < scene.mesh.count:
+        raise InputError(f"mesh level {level}; expected 0..{scene.mesh.count - 1}")
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
         mesh = SimplexMesh(*read_mesh(scene))

@@ -1,11 +1,7 @@
 """Adapters of the FEniCSx side: conforming elements at equal h, and the reference itself."""
 
 from collections.abc import Callable, Collection, Mapping
-from time import perf_counter
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from reference.boundary_values import constrained_values, support_ends
 from reference.dolfinx_versions import import_dolfinx
@@ -19,7 +15,6 @@ from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
-from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
@@ -27,6 +22,7 @@ from verify.solvers.across_interfaces import across_interfaces
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
 from verify.solvers.interface import check_choices
+from verify.solvers.runs import Record, at_rest, repeated
 from verify.system import System
 
 # Spectral radii of the reference in linear motion: what jumps excites waves that no mesh resolves.
@@ -51,20 +47,6 @@ def _refusal(scene: Scene) -> str | None:
     elif not isinstance(geometry, Rectangle | Polygon | Box):
         return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
     return None
-
-
-class _Answer(NamedTuple):
-    """What every way to solve gives; displacement and its rates are (t, n, d)."""
-
-    space: ConformingSpace
-    times: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    velocity: NDArray[np.float64] | None
-    acceleration: NDArray[np.float64] | None
-    ledger: dict[str, NDArray[np.float64]]
-    timings: dict[str, float]
-    iterations: dict[str, int]
-    notes: dict[str, str]
 
 
 class ConformingSolver:
@@ -195,25 +177,21 @@ def _solve(
         raise UnsupportedSceneError(reason)
     exact, comm = exact_of(scene), _comm()
 
-    def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
-        space = conforming_space(mesh, degree, comm)
+    def run(made: tuple[ConformingMesh, float, int], trial: bool) -> Solution:
+        mesh, size, level = made
+        space, record = conforming_space(mesh, degree, comm), Record()
         if scene.analysis.kind == "static":
-            return _equilibrium(scene, space, exact, pressure)
-        found = move(scene, space, exact, marching(level, size), comm, pressure, trial)
-        return _Answer(**vars(found))
+            fields = _equilibrium(scene, space, exact, pressure, record)
+        else:
+            how = marching(level, size)
+            fields = move(scene, space, exact, how, record, comm, pressure, trial)
+        return _solution(scene, space, record, fields, size)
 
-    timings: dict[str, list[float]] = {}
-    if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        answer(0, *_shared(comm, lambda: make_mesh(0)), trial=True)
-    for _ in range(max(repetitions, 1)):
-        start = perf_counter()
-        mesh, size = _shared(comm, lambda: make_mesh(level))
-        meshed = perf_counter() - start
-        result = answer(level, mesh, size)
-        if repetitions:
-            for phase, seconds in {"meshing": meshed, **result.timings}.items():
-                timings.setdefault(phase, []).append(seconds)
-    return _solution(scene, mesh, result, size, timings)
+    def made(level: int) -> tuple[ConformingMesh, float, int]:
+        return *_shared(comm, lambda: make_mesh(level)), level
+
+    # a trial on the coarsest mesh compiles the forms
+    return repeated(scene, repetitions, lambda: made(level), run, lambda: made(0))
 
 
 def _comm() -> Any:
@@ -234,18 +212,22 @@ def _shared(
     return shared
 
 
-def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: bool) -> _Answer:
+def _equilibrium(
+    scene: Scene, space: ConformingSpace, exact: Any, pressure: bool, record: Record
+) -> dict[str, Any]:
     """Solve a scene by its kinematics; with a pressure if that is wanted."""
     if scene.analysis.kinematics == "linear":
         linear = (solve_mixed if pressure else solve_linear)(scene, space, exact)
-        notes = {
+        record.notes = {
             "unknowns": MIXED if pressure else "displacement",
             "linear solver": linear.answer.method,
             "round-off": f"{linear.answer.round_off:.1e}",
             "residual": f"{linear.answer.residual:.1e}",
         }
-        counts = {"cg": linear.answer.iterations} if linear.answer.iterations else {}
-        return _at_rest(space, linear, counts, notes)
+        if linear.answer.iterations:
+            record.iterations["cg"] = linear.answer.iterations
+        record.timings |= linear.timings
+        return at_rest(linear.displacement, linear.strain_energy)
     unknowns, _ = constrained_values(scene, space, exact)
     # in space large saddle points of a tangent have no solver but a factorisation
     pressure = pressure and scene.dimension == 2
@@ -259,7 +241,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             "corotated_mixed" if pressure else "corotated",
         )
     state = finite.orientation
-    notes = {
+    record.notes = {
         "unknowns": MIXED if pressure else "displacement",
         "linear solver": finite.method,
         "smallest det F": f"{state.least:.3g}",
@@ -271,19 +253,9 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
         "steps taken again": "; ".join(finite.refused_steps) or "none",
         "stability": _stability(finite),
     }
-    counts = {"newton": finite.iterations, "load steps": finite.steps}
-    return _at_rest(space, finite, counts, notes)
-
-
-def _at_rest(
-    space: ConformingSpace, found: Any, iterations: dict[str, int], notes: dict[str, str]
-) -> _Answer:
-    """Return the answer of an equilibrium that was `found`."""
-    ledger = {"strain": np.array([found.strain_energy])}
-    return _Answer(
-        space, np.zeros(1), found.displacement[None], None, None, ledger, found.timings,
-        iterations, notes,
-    )  # fmt: skip
+    record.iterations |= {"newton": finite.iterations, "load steps": finite.steps}
+    record.timings |= finite.timings
+    return at_rest(finite.displacement, finite.strain_energy)
 
 
 def _stability(finite: LargeStrainSolve) -> str:
@@ -309,33 +281,21 @@ def _specks(mesh: ConformingMesh) -> list[Regularisation]:
 
 
 def _solution(
-    scene: Scene,
-    mesh: ConformingMesh,
-    result: _Answer,
-    size: float,
-    timings: dict[str, list[float]],
+    scene: Scene, space: ConformingSpace, record: Record, fields: dict[str, Any], size: float
 ) -> Solution:
-    space = result.space
-    return Solution(
+    mesh = space.mesh
+    record.regularisations += [
+        *_specks(mesh),
+        *support_ends(scene, space, size),
+        *across_interfaces(scene, mesh.points, mesh.cells),
+    ]
+    record.notes |= {"element": f"P{space.degree}", "cells": str(len(mesh.cells))}
+    return record.solution(
         points=space.node_points,
         cells=space.cell_nodes,
-        displacement=result.displacement,
-        times=result.times,
-        velocity=result.velocity,
-        acceleration=result.acceleration,
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
-        regularisations=[
-            *_specks(mesh),
-            *support_ends(scene, space, size),
-            *across_interfaces(scene, mesh.points, mesh.cells),
-        ],
-        ledger=result.ledger,
-        mass=None if result.velocity is None else CONSISTENT,
-        unknowns=result.displacement[0].size,
         size=size,
-        timings=timings,
-        iterations=result.iterations,
-        notes={"element": f"P{space.degree}", "cells": str(len(mesh.cells)), **result.notes},
+        **fields,
     )

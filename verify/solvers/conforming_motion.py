@@ -1,7 +1,6 @@
 """Motion on a conforming mesh whose facets open on the way, whole cuts or behind a blade."""
 
-from dataclasses import dataclass, field
-from time import perf_counter
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,11 @@ from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
 from reference.tied_solver import lasting_ties
 from reference.weak_place import naming_weak_places
+from verify.declared_mass import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.cuts import Cut
 from verify.scene.initial import starts_open
+from verify.solvers.runs import Record
 
 Array = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
@@ -70,36 +71,6 @@ class Marching:
         return generalised_alpha(radius), self.name == "energy_momentum"
 
 
-@dataclass
-class ConformingMotion:
-    """A computed motion, on the space with all cuts open.
-
-    Attributes
-    ----------
-    space : ConformingSpace
-    times : (t,) array
-        s.
-    displacement, velocity : (t, n, d) arrays
-        m, m/s.
-    acceleration : (t, n, d) array, optional
-        m/s², that balances the forces of the same time; of linear kinematics only.
-    ledger : dict of str to (t,) array
-    timings : dict of str to float
-    iterations : dict of str to int
-    notes : dict of str to str
-    """
-
-    space: ConformingSpace
-    times: Array
-    displacement: Array
-    velocity: Array
-    acceleration: Array | None
-    ledger: dict[str, Array]
-    timings: dict[str, float]
-    iterations: dict[str, int]
-    notes: dict[str, str] = field(default_factory=dict)
-
-
 def natural_step(scene: Scene, size: float) -> float:
     """Time in which a pressure wave crosses an element of a size, s."""
     return size / wave_speed(scene.material)
@@ -110,11 +81,12 @@ def move(
     space: ConformingSpace,
     exact: Any,
     marching: Marching,
+    record: Record,
     comm: Any = None,
     pressure: bool = False,
     trial: bool = False,
-) -> ConformingMotion:
-    """Integrate the motion of a dynamic scene.
+) -> dict[str, Any]:
+    """Integrate the motion of a dynamic scene; return its fields of `Solution`.
 
     Parameters
     ----------
@@ -123,6 +95,8 @@ def move(
         With all cuts open.
     exact : ExactSolution or None
     marching : Marching
+    record : Record
+        Gets timings, iterations and notes.
     comm : MPI communicator, optional
         Of the ranks that share the work, each with the whole answer; default: each by itself.
     pressure : bool
@@ -138,7 +112,7 @@ def move(
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
-    return _Mover(scene, space, exact, marching, comm, pressure).run(trial)
+    return _Mover(scene, space, exact, marching, record, comm, pressure).run(trial)
 
 
 class _Mover:
@@ -150,56 +124,56 @@ class _Mover:
         space: ConformingSpace,
         exact: Any,
         marching: Marching,
+        record: Record,
         comm: Any,
         pressure: bool,
     ) -> None:
         self.scene, self.space, self.exact = scene, space, exact
-        self.comm, self.marching = comm, marching
+        self.comm, self.marching, self.record = comm, marching, record
         pressure = pressure and scene.analysis.kinematics == "linear"
         self.unknowns = MIXED if pressure else "displacement"
         self.times = np.array(scene.analysis.output_times)
         self.end = float(self.times[-1])
-        clock = perf_counter()
-        self.body = MovingBody(scene, space, exact, pressure)
-        self.facing = facing_nodes(space)
-        self.opening = self._snapped(opening_times(scene, space.mesh, marching.delay))
-        self.closed = np.ones(len(self.opening), dtype=bool)
-        self.planned = self._plan()
-        self.ledger = Ledger()
         phases = ("loading", "initial state", "steps", "accounting")
-        self.timings = dict.fromkeys(phases, 0.0)
-        self.timings["loading"] = perf_counter() - clock
+        record.timings |= dict.fromkeys(phases, 0.0)
+        with record.timed("loading"):
+            self.body = MovingBody(scene, space, exact, pressure)
+            self.facing = facing_nodes(space)
+            self.opening = self._snapped(opening_times(scene, space.mesh, marching.delay))
+            self.closed = np.ones(len(self.opening), dtype=bool)
+            self.planned = self._plan()
+        self.ledger = Ledger()
         self.steppers: dict[float, Stepper] = {}
         self.steps = self.openings = 0
         scheme, _ = marching.scheme()
         # of others the old acceleration has no part in the step, or only with the forces of then
         self.softly = scene.analysis.damping[1] > 0.0 and scheme.alpha_m != scheme.alpha_f
 
-    def run(self, trial: bool) -> ConformingMotion:
-        """Run to the end, or for one step."""
+    def run(self, trial: bool) -> dict[str, Any]:
+        """Run to the end, or for one step; return the fields."""
+        record = self.record
         with naming_weak_places(self.scene, self.space, self.body.ties):
-            clock = perf_counter()
-            state = self._initial()
-            self.timings["initial state"] += perf_counter() - clock
+            with record.timed("initial state"):
+                state = self._initial()
             states = self._march(state, trial)
         shape = (len(states), -1, self.space.dimension)
         linear = self.scene.analysis.kinematics == "linear"
         for stepper in self.steppers.values():
             stepper.close()
-        return ConformingMotion(
-            self.space,
-            self.times[: len(states)],
-            np.reshape([state.displacement for state in states], shape),
-            np.reshape([state.velocity for state in states], shape),
-            np.reshape([state.acceleration for state in states], shape) if linear else None,
-            self.ledger.columns(),
-            self.timings,
-            {
-                "steps": self.steps,
-                "newton": sum(stepper.solves for stepper in self.steppers.values()),
-            },
-            self._notes(),
-        )
+        newton = sum(stepper.solves for stepper in self.steppers.values())
+        record.iterations |= {"steps": self.steps, "newton": newton}
+        record.notes |= self._notes()
+        return {
+            "times": self.times[: len(states)],
+            "displacement": np.reshape([state.displacement for state in states], shape),
+            "velocity": np.reshape([state.velocity for state in states], shape),
+            "acceleration": np.reshape([state.acceleration for state in states], shape)
+            if linear
+            else None,
+            "mass": CONSISTENT,
+            "ledger": self.ledger.columns(),
+            "unknowns": self.space.node_points.size,
+        }
 
     def _plan(self) -> bool:
         """Choose between one factorisation with all that is ever tied, and one per opening.
@@ -230,10 +204,9 @@ class _Mover:
         due = self.closed & (self.opening <= time + _PASSED * self.end)
         if not due.any():
             return False
-        clock = perf_counter()
-        self._tie(self.closed & ~due)
+        with self.record.timed("loading"):
+            self._tie(self.closed & ~due)
         self.openings += 1
-        self.timings["loading"] += perf_counter() - clock
         return True
 
     def _tie(self, closed: NDArray[np.bool_]) -> None:
@@ -311,21 +284,20 @@ class _Mover:
                 self._begin(state, balanced=not self.softly)
                 begun = True
             if begun and self.softly:
-                clock = perf_counter()
-                forces = self._unbalanced(state, state.time + _SAME * self.end)
-                self.steppers[size].restart(state, forces)
-                self.timings["loading"] += perf_counter() - clock
+                with self.record.timed("loading"):
+                    forces = self._unbalanced(state, state.time + _SAME * self.end)
+                    self.steppers[size].restart(state, forces)
             self._step(self.steppers[size], state)
             begun = False
 
     def _begin(self, state: State, balanced: bool = True) -> None:
         """Take up what jumps: velocities of supports and, if balanced, accelerations."""
-        clock, body = perf_counter(), self.body
-        state.velocity[body.held] = body.prescribed(state.time)[1]
-        self.ledger.started(body, state)
-        if balanced:
-            state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
-        self.timings["loading"] += perf_counter() - clock
+        body = self.body
+        with self.record.timed("loading"):
+            state.velocity[body.held] = body.prescribed(state.time)[1]
+            self.ledger.started(body, state)
+            if balanced:
+                state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
 
     def _balanced(self, state: State, begun: bool) -> State:
         """Copy a state, with the acceleration that balances its forces.
@@ -355,13 +327,11 @@ class _Mover:
         return forces
 
     def _step(self, stepper: Stepper, state: State) -> None:
-        clock = perf_counter()
-        before = state.copy()
-        forces = stepper.step(state)
-        stepped = perf_counter()
-        self.ledger.record(self.body, before, state, forces)
-        self.timings["steps"] += stepped - clock
-        self.timings["accounting"] += perf_counter() - stepped
+        with self.record.timed("steps"):
+            before = state.copy()
+            forces = stepper.step(state)
+        with self.record.timed("accounting"):
+            self.ledger.record(self.body, before, state, forces)
         self.steps += 1
 
     def _breaks(self) -> Array:

@@ -1,14 +1,9 @@
 """Adapters of the other ways to cut (`verify.methods`): a scene in, a neutral solution out."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import partial
 from inspect import signature
-from time import perf_counter
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from reference.exact import exact_of
 from verify.accelerated import FAST
@@ -19,53 +14,24 @@ from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Regularisation, Solution
-from verify.solvers.across_interfaces import across_interfaces
-from verify.solvers.body_of_scene import (
-    background_mesh,
-    density_of,
-    material_of,
-)
+from verify.solvers.body_of_scene import background_mesh, density_of, material_of
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.interface import check_choices
-from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
-from verify.solvers.runs import (
-    Answer,
-    Repeated,
-    check_steps,
-    errors_of_scene,
-    repeated,
-    solution_on,
-)
-from verify.solvers.supports_of_scene import path_of_supports, support_ends, supports_of
+from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_static import dismissed_equilibria, path_notes
-from verify.solvers.xfem_steps import SCHEMES
+from verify.solvers.xfem_answer import solution_on, springs_left_out
+from verify.solvers.xfem_static import Law, solve_equilibrium
+from verify.solvers.xfem_steps import EXPLICIT, SCHEMES
 from verify.solvers.xfem_system import system_of
 from verify.system import System
-from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import solve_static
-from verify.xfem.supports import check_bodies
-
-_Floats = NDArray[np.float64]
 
 _SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")
-
-
-_EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
-
-
-@dataclass(frozen=True)
-class _Answer(Answer):
-    """An answer, the body that it is of, and how many springs a fit left out."""
-
-    body: CutBody
-    left_out: int
 
 
 class MethodSolver:
@@ -89,7 +55,7 @@ class MethodSolver:
     """
 
     choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES}
-    _force: Any = InternalForce
+    _law: Law = InternalForce
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -142,12 +108,12 @@ class MethodSolver:
         self._check(scene, scheme, parameters)
         marching = Marching(scheme, step_factor, spectral_radius)
 
-        def run(mesh: SimplexMesh, size: float, trial: bool) -> _Answer:
+        def run(mesh: tuple[SimplexMesh, float], trial: bool) -> Solution:
             if scene.analysis.kind == "dynamic":
-                return self._moved(scene, mesh, size, marching, parameters, trial)
-            return self._at_rest(scene, mesh, size, load_steps, parameters)
+                return self._moved(scene, *mesh, marching, parameters, trial)
+            return self._at_rest(scene, *mesh, load_steps, parameters)
 
-        return _solution(scene, self.name, repeated(scene, level, repetitions, run))
+        return repeated(scene, repetitions, lambda: background_mesh(scene, level), run)
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
@@ -185,18 +151,26 @@ class MethodSolver:
         marching: Marching,
         parameters: dict[str, Any],
         trial: bool,
-    ) -> _Answer:
+    ) -> Solution:
         """Cut, load, move."""
+        record = Record()
         forces: list[InternalForce] = []
 
         def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
-            forces.append(self._law(scene, body))
+            material, kinematics = (
+                material_of(scene, body.resisting.mesh),
+                scene.analysis.kinematics,
+            )
+            forces.append(self._law(body.resisting, material, kinematics, kernels=FAST))
             return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
         openings = openings_of(scene, size)
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-        moved = Motion(scene, openings, opening, marching, exact_of(scene)).run(trial)
-        return _Answer(**vars(moved), body=opening.final, left_out=_left_out(forces[-1]))
+        motion = Motion(scene, openings, opening, marching, exact_of(scene), record)
+        phantom, fields = motion.run(trial)
+        record.regularisations += springs_left_out(forces[-1])
+        self._say(record, opening.final)
+        return solution_on(scene, record, phantom, fields, size, opening.final.conforming)
 
     def _at_rest(
         self,
@@ -205,46 +179,27 @@ class MethodSolver:
         size: float,
         load_steps: int,
         parameters: dict[str, Any],
-    ) -> _Answer:
+    ) -> Solution:
         """Cut, load, solve."""
-        exact = exact_of(scene)
         body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
-        start = perf_counter()
-        supports = supports_of(scene, body.phantom, exact)
-        load = loads_of(scene, body.phantom, exact)
-        timings = {**body.seconds, "loading": perf_counter() - start}
-        iterations: dict[str, int] = {}
-        notes: dict[str, str] = {}
-        further: list[Regularisation] = []
-        left_out = 0
-        if scene.analysis.kinematics == "linear" and self._force is InternalForce:
-            material = material_of(scene, body.resisting.mesh)
-            static = solve_static(body.resisting, material, supports, load, kernels=FAST)
-            u, energy = static.displacement, static.strain_energy
-            timings |= static.timings
-        else:
-            check_bodies(body.resisting, supports)
-            start = perf_counter()
-            force, path = self._law(scene, body), path_of_supports(scene, body.phantom, exact)
-            found = static_equilibrium(
-                force, supports.fixed, lambda s: path(s).values, load, load_steps or 1
-            )
-            u, energy, left_out = found.displacement, found.energy, _left_out(force)
-            steps = len(found.iterations)
-            iterations = {"newton": sum(found.iterations), "load steps": steps}
-            notes, further = path_notes(found), dismissed_equilibria(found)
-            timings["solve"] = perf_counter() - start
-        return _Answer(
-            body.phantom, np.zeros(1), u[None], None, None, {"strain": np.array([energy])},
-            timings, iterations, notes, u.size, further, body, left_out,
+        record = Record(timings=dict(body.seconds))
+        fields = solve_equilibrium(
+            scene, body.phantom, exact_of(scene), record, resisting=body.resisting, law=self._law,
+            load_steps=load_steps,
         )  # fmt: skip
+        self._say(record, body)
+        return solution_on(scene, record, body.phantom, fields, size, body.conforming)
 
-    def _law(self, scene: Scene, body: CutBody) -> InternalForce:
-        """Return the internal force of a cut body."""
-        material = material_of(scene, body.resisting.mesh)
-        kinematics = scene.analysis.kinematics
-        force: InternalForce = self._force(body.resisting, material, kinematics, kernels=FAST)
-        return force
+    def _say(self, record: Record, body: CutBody) -> None:
+        """Record what the method made of the mesh."""
+        counts = body.counts
+        record.regularisations += [Regularisation(**vars(change)) for change in body.changes]
+        record.notes |= {
+            "method": self.name,
+            "nodes": f"{counts.nodes_before} before the cut, {counts.nodes} after",
+            "elements": f"{counts.elements_before} before the cut, {counts.elements} after",
+            "smallest volume fraction": f"{body.smallest_fraction:.3g}",
+        }
 
 
 class MassSpringSolver(MethodSolver):
@@ -283,7 +238,7 @@ class MassSpringSolver(MethodSolver):
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
         check_choices(self.name, self.choices, {"cut": cut, "fit": fit})
         self._method = cut
-        self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
+        self._law = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(scene, level, repetitions, **parameters)
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
@@ -292,7 +247,7 @@ class MassSpringSolver(MethodSolver):
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         super()._check(scene, scheme, parameters)
-        if scene.analysis.kind == "dynamic" and scheme in (*_EXPLICIT, "energy_momentum"):
+        if scene.analysis.kind == "dynamic" and scheme in (*EXPLICIT, "energy_momentum"):
             raise UnsupportedSceneError(
                 f"{scheme} of springs: their critical step is not that of the elements, and they "
                 "have no stress; expected newmark, implicit_euler or generalised_alpha"
@@ -303,30 +258,3 @@ def _parameters_of(method: str) -> list[str]:
     """Names of the parameters of a method after mesh and cuts."""
     _, _, *offered = signature(METHODS[method]).parameters.values()
     return [one.name for one in offered if one.kind is not one.KEYWORD_ONLY]
-
-
-def _left_out(force: InternalForce) -> int:
-    """Count the springs that the fit would make negative; elements have none."""
-    return int(getattr(force, "clamped", 0))
-
-
-def _solution(scene: Scene, name: str, done: Repeated[_Answer]) -> Solution:
-    body = done.answer.body
-    counts = body.counts
-    regularisations = [
-        Regularisation(change.kind, change.count, change.size, change.unit)
-        for change in body.changes
-    ]
-    mesh = body.phantom.mesh
-    regularisations += [*done.answer.further, *across_interfaces(scene, mesh.points, mesh.cells)]
-    regularisations += support_ends(scene, body.phantom, done.size)
-    if done.answer.left_out:
-        kind = "spring that the fit would make negative left out"
-        regularisations.append(Regularisation(kind, done.answer.left_out, 0.0, "N/m"))
-    notes = {
-        "method": name,
-        "nodes": f"{counts.nodes_before} before the cut, {counts.nodes} after",
-        "elements": f"{counts.elements_before} before the cut, {counts.elements} after",
-        "smallest volume fraction": f"{body.smallest_fraction:.3g}",
-    }
-    return solution_on(body.conforming, done, None, regularisations, notes)

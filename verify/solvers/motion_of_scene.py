@@ -17,7 +17,7 @@ from verify.solution import Regularisation
 from verify.solvers.body_in_motion import body_in_motion, initial_state
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings, stops_of
-from verify.solvers.runs import Answer
+from verify.solvers.runs import Record
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.body import DynamicBody, Integrator, MotionState
@@ -107,14 +107,23 @@ class Motion:
     marching : Marching
     exact : object or None
         The exact solution that supports and loads may be taken from.
+    record : Record
+        Gets timings, iterations, notes and regularisations.
     """
 
     def __init__(
-        self, scene: Scene, openings: Openings, opening: OpeningBody, marching: Marching, exact: Any
+        self,
+        scene: Scene,
+        openings: Openings,
+        opening: OpeningBody,
+        marching: Marching,
+        exact: Any,
+        record: Record,
     ) -> None:
         self.scene, self.opening, self.marching, self.exact = scene, opening, marching, exact
+        self.record = record
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
-        self.timings = dict.fromkeys(phases, 0.0)
+        record.timings |= dict.fromkeys(phases, 0.0)
         self.times, self.due = openings.outputs, openings.due
         self.stops = stops_of(scene, openings)
         self.account = Account(opening.removal)
@@ -122,13 +131,20 @@ class Motion:
         self.step_sizes: set[float] = set()
         self.said = ""
 
-    def run(self, trial: bool) -> Answer:
+    def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
         """Run all stages and carry the fields of each to the finally cut mesh.
 
         Parameters
         ----------
         trial : bool
             Whether to stop after the first step: what compiles, compiles in it.
+
+        Returns
+        -------
+        phantom : PhantomMesh
+            With all cuts open; nothing follows a root cell.
+        fields : dict
+            Of `Solution`, of its unknowns.
 
         Raises
         ------
@@ -137,17 +153,15 @@ class Motion:
         XfemError, StepFailedError, NotInEquilibriumError
             From the library.
         """
-        clock = perf_counter()
-        events = self.opening.events()
-        self.timings[self.opening.phase] += perf_counter() - clock
+        with self.record.timed(self.opening.phase):
+            events = self.opening.events()
         initial = self.scene.initial
         closed_before = isinstance(initial, Equilibrium) and not starts_open(initial)
         opened = -np.inf if closed_before else self.due
         phantom = self._cut(opened)
         body = self._body(phantom)
-        clock = perf_counter()
-        state = initial_state(self.scene, body, self.exact)
-        self.timings["initial state"] += perf_counter() - clock
+        with self.record.timed("initial state"):
+            state = initial_state(self.scene, body, self.exact)
         fields: list[_Output] = []
         while True:
             due = state.time + self.due
@@ -164,16 +178,12 @@ class Motion:
                 return self._answer(fields)
 
     def _cut(self, time: float) -> PhantomMesh:
-        clock = perf_counter()
-        phantom = self.opening.at(time)
-        self.timings[self.opening.phase] += perf_counter() - clock
-        return phantom
+        with self.record.timed(self.opening.phase):
+            return self.opening.at(time)
 
     def _body(self, phantom: PhantomMesh) -> DynamicBody:
-        clock = perf_counter()
-        body = body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
-        self.timings["loading"] += perf_counter() - clock
-        return body
+        with self.record.timed("loading"):
+            return body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
 
     def _stage(
         self, body: DynamicBody, state: MotionState, until: float, trial: bool
@@ -183,6 +193,7 @@ class Motion:
         Returns the states at the output times on the way.
         """
         ledger, largest = BalanceRecorder(body, state), self._largest_step(body)
+        timings = self.record.timings
         integrators: dict[float, Integrator] = {}
         outputs, instants, taken = [], [], 0
         for a, b in pairwise([state.time, *self.stops[self.stops > state.time + self.due]]):
@@ -198,8 +209,8 @@ class Motion:
                 forces = integrators[size].step(state)
                 stepped = perf_counter()
                 ledger.record(state, forces)
-                self.timings["steps"] += stepped - clock
-                self.timings["accounting"] += perf_counter() - stepped
+                timings["steps"] += stepped - clock
+                timings["accounting"] += perf_counter() - stepped
                 taken += 1
                 if over := trial or state.time >= until - self.due:
                     break
@@ -241,8 +252,8 @@ class Motion:
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{scheme}': {error}") from None
 
-    def _answer(self, fields: list[_Output]) -> Answer:
-        phantom = self._cut(np.inf)
+    def _answer(self, fields: list[_Output]) -> tuple[PhantomMesh, dict[str, Any]]:
+        phantom, record = self._cut(np.inf), self.record
         olds = {id(one.phantom): one.phantom for one in fields}
         sources = {key: self.opening.source(old, phantom) for key, old in olds.items()}
 
@@ -254,23 +265,20 @@ class Motion:
         accelerations = [
             carried(one, one.acceleration) for one in fields if one.acceleration is not None
         ]
-        iterations = {"steps": self.steps}
+        record.iterations["steps"] = self.steps
         if self.solves:
-            iterations["newton"] = self.solves
-        return Answer(
-            phantom.corners,
-            self.times[: len(fields)],
-            np.array([carried(one, one.state.displacement) for one in fields]),
-            np.array([carried(one, one.state.velocity) for one in fields]),
-            np.array(accelerations) if len(accelerations) == len(fields) else None,
-            self.account.columns(),
-            self.timings,
-            iterations,
-            self._notes(),
-            phantom.node_points.size,
-            self.opening.regularisations(),
-            mass=self._mass(phantom),
-        )
+            record.iterations["newton"] = self.solves
+        record.notes |= self._notes()
+        record.regularisations += self.opening.regularisations()
+        return phantom.corners, {
+            "times": self.times[: len(fields)],
+            "displacement": np.array([carried(one, one.state.displacement) for one in fields]),
+            "velocity": np.array([carried(one, one.state.velocity) for one in fields]),
+            "acceleration": np.array(accelerations) if len(accelerations) == len(fields) else None,
+            "mass": self._mass(phantom),
+            "ledger": self.account.columns(),
+            "unknowns": phantom.node_points.size,
+        }
 
     def _mass(self, phantom: PhantomMesh) -> str | csr_array:
         """Mass of the corners of the body with all its cuts."""

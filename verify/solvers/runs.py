@@ -1,56 +1,66 @@
-"""Runs of our solvers on the mesh of a scene: repeated, timed, errors in the words of the scene."""
+"""Runs of our solvers: what a run says of itself, repeated and timed, errors as the scene's."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import background_mesh
 from verify.xfem.errors import BasisError, XfemError
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.phantom import PhantomMesh
-from verify.xfem.subdivision import Subdivision, extrapolation
-
-_Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times.
+@dataclass
+class Record:
+    """What a run says of itself beside its fields, filled as it goes: entries of `Solution`.
 
-    `mass` is that of a motion: a word, or the matrix (N, N) with which it ended.
+    Attributes
+    ----------
+    timings : dict of str to float
+        Wall seconds of each phase.
+    iterations : dict of str to int
+    regularisations : list of Regularisation
+    notes : dict of str to str
     """
 
-    phantom: PhantomMesh
-    times: _Floats
-    displacement: _Floats
-    velocity: _Floats | None
-    acceleration: _Floats | None
-    ledger: dict[str, _Floats]
-    timings: dict[str, float]
-    iterations: dict[str, int]
-    notes: dict[str, str]
-    unknowns: int
-    further: list[Regularisation]
-    mass: str | csr_array | None = field(default=None, kw_only=True)
+    timings: dict[str, float] = field(default_factory=dict)
+    iterations: dict[str, int] = field(default_factory=dict)
+    regularisations: list[Regularisation] = field(default_factory=list)
+    notes: dict[str, str] = field(default_factory=dict)
+
+    @contextmanager
+    def timed(self, phase: str) -> Iterator[None]:
+        """Add the time of what is done in a ``with`` to that of a phase."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            self.timings[phase] = self.timings.get(phase, 0.0) + perf_counter() - start
+
+    def solution(self, **fields: Any) -> Solution:
+        """Return the solution with these `fields` of it, and all that is recorded."""
+        return Solution(
+            **fields,
+            timings={phase: [seconds] for phase, seconds in self.timings.items()},
+            iterations=self.iterations,
+            regularisations=self.regularisations,
+            notes=self.notes,
+        )
 
 
-@dataclass(frozen=True)
-class Repeated[A: Answer]:
-    """Answer of the last run, element size in m, and wall seconds of every run by phase."""
-
-    answer: A
-    size: float
-    timings: dict[str, list[float]]
+def at_rest(displacement: NDArray[np.float64], strain_energy: float) -> dict[str, Any]:
+    """Return the fields of `Solution` of an equilibrium: displacement (N, d) in m, energy in J."""
+    return {
+        "displacement": displacement[None],
+        "ledger": {"strain": np.array([strain_energy])},
+        "unknowns": displacement.size,
+    }
 
 
 def check_steps(load_steps: int, step_factor: float) -> None:
@@ -72,90 +82,40 @@ def errors_of_scene(scene: Scene) -> Iterator[None]:
         raise InputError(str(error), str(scene.file or scene.name)) from None
 
 
-def repeated[A: Answer](
-    scene: Scene, level: int, repetitions: int, run: Callable[[SimplexMesh, float, bool], A]
-) -> Repeated[A]:
-    """Run on the mesh of a level as often as asked for, and at least once.
+def repeated[Mesh](
+    scene: Scene,
+    repetitions: int,
+    make_mesh: Callable[[], Mesh],
+    run: Callable[[Mesh, bool], Solution],
+    trial_mesh: Callable[[], Mesh] | None = None,
+) -> Solution:
+    """Run as often as asked for, and at least once, on a mesh that is made anew for each run.
 
     Parameters
     ----------
     scene : Scene
-    level, repetitions : int
+    repetitions : int
+        Without any nothing is timed.
+    make_mesh : callable
     run : callable
-        Solves on a mesh, given its element size and whether it is a trial, which compiles what
-        compiles and is not timed. Each gets a mesh of its own, with nothing kept from before.
+        Solves on a mesh; says whether it is a trial, which compiles what compiles and is not timed.
+    trial_mesh : callable, optional
+        Makes the mesh of the trial; default: the same.
 
-    Raises
-    ------
-    InputError
-        If there is no such level.
+    Returns
+    -------
+    Solution
+        Of the last run, with the timings of all.
     """
-    if not 0 <= level < scene.mesh.count:
-        raise InputError(f"mesh level {level}; expected 0..{scene.mesh.count - 1}")
+    timings: dict[str, list[float]] = {}
     with errors_of_scene(scene):
-        start = perf_counter()
-        mesh, size = background_mesh(scene, level)
-        meshing = perf_counter() - start
         if repetitions:
-            run(SimplexMesh(mesh.points, mesh.cells), size, True)
-        answers = [
-            run(SimplexMesh(mesh.points, mesh.cells), size, False)
-            for _ in range(max(1, repetitions))
-        ]
-    timings = {"meshing": [meshing]}
-    if repetitions:
-        timings |= {name: [one.timings[name] for one in answers] for name in answers[0].timings}
-    return Repeated(answers[-1], size, timings)
-
-
-def solution_on(
-    shown: Subdivision,
-    done: Repeated[Any],
-    cell_sides: NDArray[np.int64] | None,
-    regularisations: list[Regularisation],
-    notes: dict[str, str],
-) -> Solution:
-    """Put the answer of a run on the conforming mesh of its cut body.
-
-    Parameters
-    ----------
-    shown : Subdivision
-    done : Repeated
-        Its answer is on the unknowns of the cut body.
-    cell_sides : (m,) int array, optional
-        Of the cells of `shown`.
-    regularisations : list of Regularisation
-    notes : dict of str to str
-        Choices of the solver, beside those of the answer.
-    """
-    answer = done.answer
-
-    def at_points(values: _Floats) -> _Floats:
-        return np.stack([shown.interpolation @ one for one in values])
-
-    mass = answer.mass
-    if not (mass is None or isinstance(mass, str)):
-        back = extrapolation(answer.phantom, shown)
-        mass = csr_array(back.T @ mass @ back)
-    return Solution(
-        points=shown.points,
-        cells=shown.cells,
-        displacement=at_points(answer.displacement),
-        times=answer.times,
-        velocity=None if answer.velocity is None else at_points(answer.velocity),
-        acceleration=None if answer.acceleration is None else at_points(answer.acceleration),
-        mass=mass,
-        cut_facets=shown.cut_facets,
-        cell_sides=cell_sides,
-        ledger=answer.ledger,
-        unknowns=answer.unknowns,
-        size=done.size,
-        timings=done.timings,
-        iterations=answer.iterations,
-        regularisations=regularisations,
-        notes={
-            **notes,
-            "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
-            **answer.notes,
-        },
-    )
+            run((trial_mesh or make_mesh)(), True)
+        for _ in range(max(1, repetitions)):
+            start = perf_counter()
+            mesh = make_mesh()
+            meshing = perf_counter() - start
+            found = run(mesh, False)
+            for phase, seconds in {"meshing": [meshing], **found.timings}.items():
+                timings.setdefault(phase, []).extend(seconds)
+    return replace(found, timings=timings if repetitions else {})

@@ -2,10 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
-from time import perf_counter
 from typing import Any
-
-import numpy as np
 
 from reference.exact import exact_of
 from verify.accelerated import FAST
@@ -17,9 +14,9 @@ from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
-from verify.solvers.runs import Answer, check_steps, errors_of_scene, repeated
+from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
 from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.xfem_answer import joined, solution_of, treated
+from verify.solvers.xfem_answer import joined, solution_on, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
@@ -159,11 +156,10 @@ class XfemSolver:
             raise UnsupportedSceneError(said)
         if given.slivers == "penalise":
             _check_penalty(scene, given.basis, given.mass)
-        done = repeated(
-            scene, level, repetitions,
-            lambda mesh, size, trial: _run(scene, mesh, size, exact, given, trial),
+        return repeated(
+            scene, repetitions, lambda: background_mesh(scene, level),
+            lambda mesh, trial: _run(scene, *mesh, exact, given, trial),
         )  # fmt: skip
-        return solution_of(scene, done, given.notes())
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
@@ -218,29 +214,19 @@ def _run(
     exact: Any,
     given: _Parameters,
     trial: bool,
-) -> Answer:
+) -> Solution:
     """Cut, load, solve."""
+    record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
         openings = openings_of(scene, size)
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
-        return Motion(scene, openings, opening, given.marching(), exact).run(trial)
-    start = perf_counter()
-    phantom, slivers, changes = _cut(scene, mesh, size, exact, given)
-    enrichment = perf_counter() - start
-    penalise, kernels = given.slivers == "penalise", _KERNELS[given.kernels]
-    found = solve_equilibrium(
-        scene, phantom, exact, given.basis, given.load_steps, penalise, kernels
-    )
-    return Answer(
-        phantom=phantom,
-        times=np.zeros(1),
-        displacement=found.displacement[None],
-        velocity=None,
-        acceleration=None,
-        ledger={"strain": np.array([found.strain_energy])},
-        timings={"enrichment": enrichment, **found.timings},
-        iterations=found.iterations,
-        notes=found.notes,
-        unknowns=found.displacement.size,
-        further=[*treated(slivers), *found.regularisations, *changes],
-    )
+        motion = Motion(scene, openings, opening, given.marching(), exact, record)
+        return solution_on(scene, record, *motion.run(trial), size)
+    with record.timed("enrichment"):
+        phantom, slivers, changes = _cut(scene, mesh, size, exact, given)
+    record.regularisations += [*treated(slivers), *changes]
+    fields = solve_equilibrium(
+        scene, phantom, exact, record, basis=given.basis, load_steps=given.load_steps,
+        penalise=given.slivers == "penalise", kernels=_KERNELS[given.kernels],
+    )  # fmt: skip
+    return solution_on(scene, record, phantom, fields, size)

@@ -1,7 +1,6 @@
 """Static equilibrium of a cut body, in linear and in corotational kinematics."""
 
-from dataclasses import dataclass, field, replace
-from time import perf_counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,9 @@ from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import material_of
 from verify.solvers.loads_of_scene import loads_of
+from verify.solvers.runs import Record, at_rest
 from verify.solvers.supports_of_scene import path_of_supports, supports_of
-from verify.solvers.xfem_answer import penalised
+from verify.solvers.xfem_answer import penalised, springs_left_out
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
@@ -21,110 +21,91 @@ from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.linear_solvers import Kernels
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import solve_static
-from verify.xfem.supports import Supports, check_bodies
+from verify.xfem.supports import check_bodies
 
-_Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """Displacement (N, d) in m, strain energy in J, and how they were found."""
-
-    displacement: _Floats
-    strain_energy: float
-    timings: dict[str, float]
-    iterations: dict[str, int] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
-    regularisations: list[Regularisation] = field(default_factory=list)
+Law = Callable[..., InternalForce]
 
 
 def solve_equilibrium(
     scene: Scene,
     phantom: PhantomMesh,
     exact: Any,
-    basis: str,
-    load_steps: int,
+    record: Record,
+    *,
+    resisting: PhantomMesh | None = None,
+    law: Law = InternalForce,
+    basis: str = "sidewise",
+    load_steps: int = 0,
     penalise: bool = False,
     kernels: Kernels = FAST,
-) -> Equilibrium:
-    """Solve a static scene on a cut mesh; with `penalise` with a ghost penalty (linear only).
+) -> dict[str, Any]:
+    """Solve a static scene on a cut mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+    phantom : PhantomMesh
+        What bears loads and supports.
+    exact : object or None
+        The exact solution that supports and loads may be taken from.
+    record : Record
+        Gets timings, iterations, notes and regularisations.
+    resisting : PhantomMesh, optional
+        What resists, with the same unknowns; default: the same.
+    law : callable
+        Makes the internal force; other than that of elements it is solved by Newton's method.
+    basis, load_steps
+        As of the solver ``xfem``.
+    penalise : bool
+        Whether with a ghost penalty (linear only).
+    kernels : Kernels
+
+    Returns
+    -------
+    dict
+        Fields of `Solution`, of the unknowns of the cut mesh.
 
     Raises
     ------
     XfemError, NotInEquilibriumError
         From the library.
     """
-    clock = perf_counter()
-    supports = supports_of(scene, phantom, exact)
-    load = loads_of(scene, phantom, exact)
-    loading = perf_counter() - clock
-    if scene.analysis.kinematics == "linear":
-        found = _linear(scene, phantom, supports, load, basis, penalise, kernels)
-    else:
-        found = _corotational(scene, phantom, exact, supports, load, load_steps, kernels)
-    return replace(found, timings={"loading": loading, **found.timings})
-
-
-def _linear(
-    scene: Scene,
-    phantom: PhantomMesh,
-    supports: Supports,
-    load: _Floats,
-    basis: str,
-    penalise: bool,
-    kernels: Kernels,
-) -> Equilibrium:
-    material = material_of(scene, phantom.mesh)
-    if basis == "sidewise":
-        ghost = GhostPenalty(phantom, material) if penalise else None
-        static = solve_static(phantom, material, supports, load, ghost=ghost, kernels=kernels)
+    with record.timed("loading"):
+        supports = supports_of(scene, phantom, exact)
+        load = loads_of(scene, phantom, exact)
+    body = resisting or phantom
+    material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
+    if basis != "sidewise":
+        other: Any = basis
+        displacement, phases = solve_in_basis(body, material, supports, load, other)
+        record.timings |= phases
+        record.notes["linear solver"] = "SciPy SuperLU"
+        energy = InternalForce(body, material, "linear").evaluate(displacement)[1]
+        return at_rest(displacement, energy)
+    if kinematics == "linear" and law is InternalForce:
+        ghost = GhostPenalty(body, material) if penalise else None
+        static = solve_static(body, material, supports, load, ghost=ghost, kernels=kernels)
         share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
-        notes = {
-            "linear solver": _said(static.solver, kernels),
-            "residual": f"{static.residual:.3e}",
-        }
-        return Equilibrium(
-            static.displacement,
-            static.strain_energy,
-            static.timings,
-            notes=notes,
-            regularisations=penalised(ghost, share),
+        record.timings |= static.timings
+        record.notes["linear solver"] = _said(static.solver, kernels)
+        record.notes["residual"] = f"{static.residual:.3e}"
+        record.regularisations += penalised(ghost, share)
+        return at_rest(static.displacement, static.strain_energy)
+    check_bodies(body, supports)
+    with record.timed("solve"):
+        force = law(body, material, kinematics, kernels=kernels)
+        path = path_of_supports(scene, phantom, exact)
+        found = static_equilibrium(
+            force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
         )
-    other: Any = basis
-    displacement, phases = solve_in_basis(phantom, material, supports, load, other)
-    energy = InternalForce(phantom, material, "linear").evaluate(displacement)[1]
-    return Equilibrium(displacement, energy, phases, notes={"linear solver": "SciPy SuperLU"})
-
-
-def _corotational(
-    scene: Scene,
-    phantom: PhantomMesh,
-    exact: Any,
-    supports: Supports,
-    load: _Floats,
-    load_steps: int,
-    kernels: Kernels,
-) -> Equilibrium:
-    check_bodies(phantom, supports)
-    clock = perf_counter()
-    force = InternalForce(phantom, material_of(scene, phantom.mesh), kernels=kernels)
-    path = path_of_supports(scene, phantom, exact)
-    found = static_equilibrium(
-        force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
-    )
-    notes = {
+    record.iterations["newton"] = sum(found.iterations)
+    record.notes |= {
         "linear solver": " and ".join(_said(one, kernels) for one in sorted(found.solvers)),
-        **path_notes(found),
+        **_path_notes(found),
         "pieces inside out": _inverted(force, found.displacement),
     }
-    return Equilibrium(
-        found.displacement,
-        found.energy,
-        {"solve": perf_counter() - clock},
-        {"newton": sum(found.iterations)},
-        notes,
-        dismissed_equilibria(found),
-    )
+    record.regularisations += [*_dismissed(found), *springs_left_out(force)]
+    return at_rest(found.displacement, found.energy)
 
 
 def _said(solver: str, kernels: Kernels) -> str:
@@ -134,7 +115,7 @@ def _said(solver: str, kernels: Kernels) -> str:
     return {"direct": "SciPy SuperLU", "iterative": "SciPy conjugate gradients"}[solver]
 
 
-def path_notes(found: StaticEquilibrium) -> dict[str, str]:
+def _path_notes(found: StaticEquilibrium) -> dict[str, str]:
     """Load steps of an equilibrium at finite rotation, and what it was checked by."""
     check = found.check
     stable = "stiffness is singular (slack, or a collapsed piece): not shown"
@@ -148,7 +129,7 @@ def path_notes(found: StaticEquilibrium) -> dict[str, str]:
     }
 
 
-def dismissed_equilibria(found: StaticEquilibrium) -> list[Regularisation]:
+def _dismissed(found: StaticEquilibrium) -> list[Regularisation]:
     """Report equilibria that were found and left for one of less energy."""
     energies = found.check.dismissed
     if not energies:
@@ -157,7 +138,7 @@ def dismissed_equilibria(found: StaticEquilibrium) -> list[Regularisation]:
     return [Regularisation(kind, len(energies), max(energies), "J")]
 
 
-def _inverted(force: InternalForce, displacement: _Floats) -> str:
+def _inverted(force: InternalForce, displacement: NDArray[np.float64]) -> str:
     mesh = force.phantom.mesh
     if mesh.dim < mesh.space:
         return "not defined for a membrane"

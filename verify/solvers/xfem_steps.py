@@ -42,7 +42,7 @@ MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
     "thesis": lambda phantom, density: shifted_mass(phantom, density, "enrichment"),
 }
 _REACH = 1.0  # strain up to which the step of a turning body is a bound
-_EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
 
 
 def integrator_of(
@@ -92,7 +92,7 @@ def largest_step(
     asked : float, optional
         ``analysis.time_step`` of the scene, s.
     """
-    explicit = scheme in _EXPLICIT
+    explicit = scheme in EXPLICIT
     if not explicit and asked is not None:
         return asked, "analysis.time_step"
     critical = _critical(body, material, density, explicit)
