@@ -9,6 +9,7 @@ import numpy as np
 
 from verify.compare.hooke import hooke
 from verify.compare.strain_energy import strain_energy
+from verify.regularisation import Regularisation
 from verify.solvers.xfem import XfemSolver
 
 
@@ -75,6 +76,72 @@ class EndsElsewhere(XfemSolver):
 
 class EndsTooSoon(EndsElsewhere):
     elements = -0.5
+    tip = "inside"
+
+
+def excused(solution):
+    """A solution that states that something was done to its cut."""
+    entry = Regularisation("node moved onto the cut", 1, 0.1, "m")
+    return replace(solution, regularisations=[entry])
+
+
+class ForgetsABranchAndStates(TakesTheFirstCut):
+    def solve(self, scene, level, repetitions=1):
+        return excused(super().solve(scene, level, repetitions))
+
+
+class TakesOneMaterialAndStates(TakesOneMaterial):
+    def solve(self, scene, level, repetitions=1):
+        return excused(super().solve(scene, level, repetitions))
+
+
+class PartsElsewhereAndStates(XfemSolver):
+    """Cuts 0.2 m beside, says that its cut is where it was asked, and excuses itself."""
+
+    aside = 0.2
+
+    def solve(self, scene, level, repetitions=1):
+        def moved(cut):
+            points = (np.array(cut.points) + [0.0, self.aside]).tolist()
+            return cut.model_copy(update={"points": points})
+
+        other = changed(scene, cuts=[moved(scene.cuts[0]), *scene.cuts[1:]])
+        solution = super().solve(other, level, repetitions)
+        asked = np.array([cut.points for cut in scene.cuts])
+        return excused(replace(solution, cut_facets=asked))
+
+
+class PartsBesideAndStates(PartsElsewhereAndStates):
+    aside = 0.02
+
+
+class PartsBesideAndStretches(PartsBesideAndStates):
+    """Its cut is a little aside, and one corner of the body far off."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        x, y = solution.points.T
+        stretch = 0.3 * np.maximum(0.0, 0.8 - x)[:, None] * np.array([1.0, 1.0])
+        held = (y < 1e-9) | (y > 1 - 1e-9)
+        off = np.where(held[:, None] | (y < 0.6)[:, None], 0.0, stretch)
+        return replace(solution, displacement=solution.displacement + off)
+
+
+class PartsBesideAndSwaps(PartsBesideAndStates):
+    """Its cut is a little aside, and its lower half moves as the upper one shall."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        return replace(solution, displacement=-solution.displacement)
+
+
+class EndsElsewhereAndStates(EndsElsewhere):
+    def solve(self, scene, level, repetitions=1):
+        return excused(super().solve(scene, level, repetitions))
+
+
+class EndsFarTooSoonAndStates(EndsElsewhereAndStates):
+    elements = -2.6
     tip = "inside"
 
 

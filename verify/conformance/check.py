@@ -15,6 +15,8 @@ class State(StrEnum):
     PASS = "pass"
     FAIL = "fail"
     ERROR = "error"  # the solver crashed, hung or raised on a scene that it did not refuse
+    # off, by what a regularisation that it states and the place of its cut explain
+    STATED = "stated"
     REFUSED = "refused"  # the solver does not do such scenes, or gives no such number
 
 
@@ -22,12 +24,14 @@ class State(StrEnum):
 class Finding:
     """A number that must not exceed `limit`; `note` says what else was seen.
 
-    `limit` None: there was nothing to measure, for the reason in `note`.
+    `limit` None: there was nothing to measure, for the reason in `note`. `stated`: what is above
+    the limit is explained by what the solver states.
     """
 
     observed: float
     limit: float | None
     note: str = ""
+    stated: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,4 +83,5 @@ def evaluate(check: Check, outcomes: Mapping[str, Outcome]) -> CheckResult:
         return CheckResult(check.name, check.claim, State.REFUSED, reason=found.note)
     # `not <=`, so that a number that is not finite breaks the check
     state = State.PASS if found.observed <= found.limit else State.FAIL
+    state = State.STATED if found.stated else state
     return CheckResult(check.name, check.claim, state, found.observed, found.limit, found.note)

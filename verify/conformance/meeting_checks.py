@@ -1,12 +1,17 @@
 """Checks of cuts that cross, branch, end, or cross an interface, and of a force in space."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from verify.compare.locate import SolutionField
 from verify.conformance import meeting_scenes as scenes
 from verify.conformance.check import Check, Finding
-from verify.conformance.field_check import Solutions, is_field, named
+from verify.conformance.excuses import parting_record, unexplained
+from verify.conformance.field_check import EXACT, Solutions, is_field, named
+from verify.conformance.scenes import Field
 from verify.conformance.trials import Trial
+from verify.scene import Scene
 from verify.solution import Solution
 
 _PARTED = {
@@ -29,16 +34,19 @@ _AWAY, _OFF = 0.05, 1e-6  # m: a quarter of an element; from the line of the cut
 
 def parted_checks() -> list[Check]:
     """Make the checks of bodies whose parts move, each for itself."""
-    made = {name: is_field(*make(), 0.0) for name, (make, _) in _PARTED.items()}
-    return [
-        named(check if name == "two-cuts" else unless_stated(check), name, _PARTED[name][1])
-        for name, check in made.items()
-    ]
+    made = []
+    for name, (make, claim) in _PARTED.items():
+        scene, field = make()
+        check = is_field(scene, field, 0.0)
+        lenient = check if name == "two-cuts" else unless_stated(check, scene, field)
+        made.append(named(lenient, name, claim))
+    return made
 
 
 def crossed_interface() -> Check:
     """Make the check of a cut that crosses an interface of materials."""
-    check = unless_stated(is_field(*scenes.crossed_interface()))
+    scene, field = scenes.crossed_interface()
+    check = unless_stated(is_field(scene, field), scene, field)
     return named(check, "crossed-interface", "both sides of a cut across an interface are pulled")
 
 
@@ -64,7 +72,7 @@ def ending_cut() -> Check:
         return Finding(beyond / opened, _CLOSED, note if beyond > _CLOSED * opened else "")
 
     claim = "a cut that ends at a node of the mesh ends there"
-    return unless_stated(Check("ending-cut", claim, [Trial(scene.name, scene)], judge))
+    return unless_stated(Check("ending-cut", claim, [Trial(scene.name, scene)], judge), scene)
 
 
 def _jumps(solution: Solution, places: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -74,17 +82,27 @@ def _jumps(solution: Solution, places: np.ndarray, normal: np.ndarray) -> np.nda
     return np.asarray(np.linalg.norm(above - below, axis=1))
 
 
-def unless_stated(check: Check) -> Check:
-    """Judge nothing where a solver is off and states a regularisation, which is then said."""
+def unless_stated(check: Check, scene: Scene, field: Field | None = None) -> Check:
+    """Hold nothing against a solver that its stated regularisation and its measured cut explain.
+
+    `field` is the one in closed form, if there is one.
+    """
     judge = check.judge
     assert judge is not None
 
     def lenient(solutions: Solutions) -> Finding:
         found = judge(solutions)
-        stated = {entry.kind for one in solutions.values() for entry in one.regularisations}
+        (solution,) = solutions.values()
+        stated = ", ".join(sorted({entry.kind for entry in solution.regularisations}))
         if found.limit is None or found.observed <= found.limit or not stated:
             return found
-        said = f"{found.note}; it states: {', '.join(sorted(stated))}"
-        return Finding(found.observed, None, said)
+        cut = parting_record(scene, solution)
+        lacking = unexplained(scene, solution, cut, field)
+        said = f"{found.note}; it states: {stated}"
+        if lacking:
+            return replace(found, note=f"{said}, which does not explain it: {lacking}")
+        shift = {"beside": cut.lateral, "missing": cut.missing, "more": cut.surplus}
+        how = ", ".join(f"{size:.2g} m {what}" for what, size in shift.items() if size > EXACT)
+        return replace(found, note=f"{said}; its cut is {how}", stated=True)
 
     return Check(check.name, check.claim, check.trials, lenient)
