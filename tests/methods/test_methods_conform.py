@@ -12,21 +12,22 @@ LOSES_MATERIAL = {
     "cut-patch", "two-cuts", "energy-account", "closed-cut", "traction", "traction-3d",
     "two-materials",
 }  # fmt: skip
+MEETING = {"crossing-cuts", "branched-cut", "ending-cut", "crossed-interface"}
 BREAKS: dict[str, set[str]] = {
     "subdivision": set(),
     "snapping": set(),
     "snapping_subdivision": set(),
     "virtual_node": set(),
     "virtual_node_arbitrary": set(),
-    "removal": LOSES_MATERIAL,
-    "removal_refined": LOSES_MATERIAL,
+    "removal": LOSES_MATERIAL | MEETING,
+    "removal_refined": LOSES_MATERIAL | MEETING,
     "uncut": {
         "parted-3d", "free-fall", "cut-patch", "two-cuts", "energy-account", "traction",
-        "traction-3d", "two-materials", "free-piece",
+        "traction-3d", "two-materials", "free-piece", *MEETING,
     },
     "mass_spring": {
         "cut-patch", "energy-account", "closed-cut", "traction", "traction-3d", "two-materials",
-        "weight", "energy-in-motion",
+        "weight", "energy-in-motion", "crossed-interface",
     },
 }  # fmt: skip
 

@@ -23,6 +23,7 @@ from verify.compare.integration import cut_rules
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import nodal_strain_energy
+from verify.conformance.measures import covered
 from verify.conformance.scenes import YOUNG, Array, Field
 from verify.cut_record import CutRecord
 from verify.scene import Scene
@@ -44,8 +45,13 @@ def parting_record(scene: Scene, solution: Solution) -> CutRecord:
 
 
 def unexplained(scene: Scene, solution: Solution, cut: CutRecord, field: Field | None) -> str:
-    """Say what the place of the cut does not explain of a deviation from a field, or ""."""
+    """Say what the place of the cut does not explain of a deviation from a field, or "".
+
+    Without a field the end of the cut is what deviates.
+    """
     element = _element(scene)
+    if (gap := covered(solution)) > _SAME:
+        return f"{gap:.3g} of the body is not covered once"
     moved = {"beside it": (cut.lateral, _ASIDE), "missing": (cut.missing, _LENGTH),
              "too much": (cut.surplus, _LENGTH)}  # fmt: skip
     if max(amount for amount, _ in moved.values()) <= _SAME:
@@ -53,7 +59,9 @@ def unexplained(scene: Scene, solution: Solution, cut: CutRecord, field: Field |
     for what, (amount, most) in moved.items():
         if amount > most * element:
             return f"{amount:.3g} m of the cut {what}, more than {most} elements"
-    return "" if field is None else _unexplained_field(scene, solution, field)
+    if field is not None:
+        return _unexplained_field(scene, solution, field)
+    return "" if max(cut.missing, cut.surplus) > _SAME else "the cut ends where it was asked"
 
 
 def _unexplained_field(scene: Scene, solution: Solution, field: Field) -> str:
