@@ -102,7 +102,7 @@ class PartsElsewhereAndStates(XfemSolver):
 
     def solve(self, scene, level, repetitions=1):
         def moved(cut):
-            points = (np.array(cut.points) + [0.0, self.aside]).tolist()
+            points = np.add(cut.points, [0.0, self.aside]).tolist()
             return cut.model_copy(update={"points": points})
 
         other = changed(scene, cuts=[moved(scene.cuts[0]), *scene.cuts[1:]])

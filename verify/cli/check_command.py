@@ -9,9 +9,10 @@ from typing import Any
 from verify.cli.cost_text import case_lines, costs_of, memory_line
 from verify.errors import InputError
 from verify.printable import one_line
-from verify.runner.body_size import body_text, coincident_nodes
+from verify.runner.body_size import body_text
 from verify.runner.checking import check_scene
 from verify.runner.cost import LevelCost
+from verify.runner.mesh_faults import mesh_warning
 from verify.runner.options import Options
 from verify.runner.reference_cache import cache_folder
 from verify.scene import load_scenes
@@ -56,6 +57,6 @@ def _row(file: str, options: Options) -> dict[str, Any]:
         "title": f"{scenes[0].title}{rows}",
         "error": None,
         "body": body_text(scenes[0]),
-        "warning": coincident_nodes(scenes[0]),
+        "warning": mesh_warning(scenes[0]),
         "cost": cost,
     }

@@ -146,7 +146,7 @@ def _add_conform(add: Add) -> None:
         "examples:\n  verify conform xfem\n  verify conform xfem --set basis=shifted\n"
         "  verify conform my_module:MySolver --json\n\n"
         "exit codes:\n"
-        "  0  every check that the solver did not refuse passes, or is explained by what it states\n"
+        "  0  every check that the solver did not refuse passes, or is off as it states\n"
         "  1  a check fails\n"
         "  2  no such solver, or it cannot be loaded\n"
         "  3  the solver crashed, hung or failed on a scene that it did not refuse\n"

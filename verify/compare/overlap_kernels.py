@@ -370,3 +370,62 @@ def _overlapping(seeds, lower, upper, cells, low, high, corners, inward, toleran
                     seen[near[k]], waiting[ended] = 1, near[k]
                     ended += 1
     return total
+
+
+def cells_run_through(
+    starts: Floats, ends: Floats, own: Ints, lower: Floats, upper: Floats, cells: Ints,
+    normals: Floats, offsets: Floats,
+) -> Ints:  # fmt: skip
+    """Find a convex cell (n,) that a segment runs through, other than its own; −1 if none.
+
+    A cell is where all normals · x > offsets: `normals` is (m, k, d), `offsets` (m, k). `own` (n,)
+    is −1 for a segment without a cell.
+    """
+    found, stack = np.full(len(starts), -1), np.empty(64, dtype=np.int64)
+    _run_through(starts, ends, own, lower, upper, cells, normals, offsets, stack, found)
+    return found
+
+
+@njit(cache=True)
+def _clipped(start, end, normals, offsets):
+    """Whether a segment has a part where all normals · x > offsets (Cyrus and Beck, 1978)."""
+    first, last = 0.0, 1.0
+    for k in range(len(offsets)):
+        at_start = at_end = -offsets[k]
+        for a in range(len(start)):
+            at_start += normals[k, a] * start[a]
+            at_end += normals[k, a] * end[a]
+        if at_start <= 0.0 and at_end <= 0.0:
+            return False
+        if at_start < 0.0:
+            first = max(first, at_start / (at_start - at_end))
+        elif at_end < 0.0:
+            last = min(last, at_start / (at_start - at_end))
+    return first < last
+
+
+@njit(cache=True)
+def _run_through(starts, ends, own, lower, upper, cells, normals, offsets, stack, found):
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    for i in range(len(starts)):
+        stack[0], top = 1, 1
+        while top > 0 and found[i] < 0:
+            top -= 1
+            node = stack[top]
+            apart = False
+            for a in range(starts.shape[1]):
+                apart |= min(starts[i, a], ends[i, a]) > upper[node, a]
+                apart |= max(starts[i, a], ends[i, a]) < lower[node, a]
+            if apart:
+                continue
+            if node < leaves:
+                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                top += 2
+                continue
+            for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
+                cell = cells[k]
+                if cell < 0 or found[i] >= 0:
+                    break
+                if cell != own[i] and _clipped(starts[i], ends[i], normals[cell], offsets[cell]):
+                    found[i] = cell

@@ -1,11 +1,9 @@
-"""Size and mass of a body, and nodes of its mesh file that coincide: to be read before a run."""
+"""Size and mass of a body, to be read before a run."""
 
 import numpy as np
 
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.material_regions import points_of_body
-
-_CLOSE = 1e-6  # of the body: nodes that were written apart and meant to be one
 
 
 def volume_of(scene: Scene) -> float:
@@ -51,26 +49,3 @@ def body_text(scene: Scene) -> str:
         weights = volumes * scene.material.at(places).density * (scene.material.thickness or 1.0)
         mass = f", {weights.sum():.3g} kg{' per m of thickness' if d == 2 else ''}"
     return f"{extent} m{mesh}, {volumes.sum():.3g} m{power}{mass}"
-
-
-def coincident_nodes(scene: Scene) -> str:
-    """Warn of nodes on the boundary of a mesh file that coincide and are not joined, or say ""."""
-    if not isinstance(scene.geometry, MeshFile):
-        return ""
-    from scipy.spatial import cKDTree
-
-    points, cells = read_mesh(scene)
-    corners = cells.shape[1]
-    facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)])
-    distinct, count = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
-    outer = points[np.unique(distinct[count == 1])]
-    near = _CLOSE * float(np.ptp(points, axis=0).max())
-    pairs = cKDTree(outer).query_pairs(near, output_type="ndarray") if len(outer) else outer
-    if not len(pairs):
-        return ""
-    at = ", ".join(f"{x:.6g}" for x in outer[pairs[:, 0].min()])
-    return (
-        f"{len(pairs)} pairs of nodes of '{scene.geometry.file}' lie within {near:.2g} m "
-        f"of each other and are not joined, one at ({at}): the body is apart there; merge them if "
-        "it is not meant to be"
-    )

@@ -3,6 +3,7 @@
 from typing import Any
 
 from verify.errors import InputError
+from verify.runner.mesh_faults import check_overlaps
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.empty_parts import check_parts_of_mesh
@@ -22,6 +23,7 @@ def check_scene(scene: Scene) -> None:
             mesh = read_mesh(scene)
             check_parts_of_mesh(scene, *mesh)
             check_regions_of_mesh(scene, *mesh)
+            check_overlaps(scene, *mesh)
         except InputError:
             raise
         except ValueError as error:

@@ -1,8 +1,8 @@
 """Pieces that nothing holds, found before a run: all solvers find them, after their work."""
 
 from verify.errors import InputError
-from verify.runner.body_size import coincident_nodes
 from verify.runner.cost import mesh_of_level
+from verify.runner.mesh_faults import mesh_warning
 from verify.scene import Equilibrium, Scene
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.cuts_of_scene import cuts_of
@@ -35,7 +35,7 @@ def check_pieces_are_held(scene: Scene, exact: object) -> None:
         phantom, _ = join_specks(phantom, supports_of(scene, phantom, exact))
         check_bodies(phantom, supports_of(scene, phantom, exact))
     except UnsupportedBodyError as error:
-        apart = coincident_nodes(scene)
+        apart = mesh_warning(scene)
         text = f"supports: {error}{f' ({apart})' if apart else ''}"
         raise InputError(text, str(scene.file or scene.name)) from None
     except XfemError:

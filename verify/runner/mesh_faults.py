@@ -1,0 +1,219 @@
+"""Meshes of files that are another body than meant: overlaps, hanging nodes, gaps, doubled nodes.
+
+Cells that share a facet are checked where a mesh is read; here parts are that share no node.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.scene import MeshFile, Scene, read_mesh
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Of the largest extent of the body. What is closer was meant to be one place: single precision
+# keeps 1e-7. Cells less deep in each other touch.
+_CLOSE = 1e-6
+_FLAT = 1e-9  # of the same: what lies in the plane of a triangle
+# A gap is at most as wide as coordinates of three digits leave it, and narrow beside its facets.
+_GAP, _NARROW = 1e-3, 0.1
+
+
+def check_overlaps(scene: Scene, points: Array, cells: Ints) -> None:
+    """Refuse a mesh whose cells overlap, wherever they are.
+
+    Raises
+    ------
+    InputError
+        With the number of cells, and a place.
+    """
+    skin = _Skin(points, cells)
+    held = skin.overlapped()
+    if not len(held):
+        return
+    where, middle = str(scene.file or scene.name), points[cells[held[0]]].mean(axis=0)
+    raise InputError(
+        f"geometry.file: cells overlap in {len(held)} cells, one at {_at(middle)}: a second copy, "
+        "or parts that reach into one another; expected each place of the body once", where
+    )  # fmt: skip
+
+
+def mesh_warning(scene: Scene) -> str:
+    """Warn of parts of a mesh file that touch or nearly touch and are not joined, or say ""."""
+    if not isinstance(scene.geometry, MeshFile):
+        return ""
+    skin = _Skin(*read_mesh(scene))
+    pairs, (hanging, near) = skin.coincident(), skin.unjoined()
+    said = []
+    if len(pairs):
+        said.append(f"{len(pairs)} pairs of nodes coincide, one at {_at(skin.points[pairs[0, 0]])}")
+    if len(hanging):
+        said.append(f"{len(hanging)} nodes hang on facets, one at {_at(skin.points[hanging[0]])}")
+    if len(near):
+        said.append(
+            f"{len(near)} nodes lie before facets within {_GAP:g} of the body, one at "
+            f"{_at(skin.points[near[0]])}"
+        )
+    if not said:
+        return ""
+    return (
+        f"'{scene.geometry.file}' is not joined where {'; '.join(said)}: the body is apart there; "
+        "merge nodes or mesh it anew if it is not meant to be"
+    )
+
+
+def _at(point: Array) -> str:
+    return f"({', '.join(f'{x:.6g}' for x in point)})"
+
+
+class _Skin:
+    """Facets of a mesh (of a membrane: edges) that one cell alone has.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, k) int array
+    """
+
+    def __init__(self, points: Array, cells: Ints) -> None:
+        self.points, self.cells = points, cells
+        self.membrane = cells.shape[1] == points.shape[1]
+        self.size = float(np.ptp(points, axis=0).max())
+        corners, count = cells.shape[1], len(points)
+        facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)]))
+        key = facets[:, 0]
+        for column in facets.T[1:]:
+            key = key * count + column
+        order = np.argsort(key, kind="stable")
+        first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
+        alone = order[first[np.diff(np.append(first, len(key))) == 1]]
+        self.facets, self.behind = facets[alone], alone % len(cells)  # (f, k − 1), (f,)
+        self.opposite = cells[self.behind, alone // len(cells)]
+
+    @cached_property
+    def nodes(self) -> Ints:
+        """Nodes of the skin; of a membrane, which may be closed, all."""
+        return np.arange(len(self.points)) if self.membrane else np.unique(self.facets)
+
+    def coincident(self) -> Ints:
+        """Pairs (p, 2) of nodes of the skin at one place."""
+        from scipy.spatial import cKDTree
+
+        if not len(self.nodes):
+            return np.zeros((0, 2), dtype=np.int64)
+        tree = cKDTree(self.points[self.nodes])
+        return self.nodes[tree.query_pairs(_CLOSE * self.size, output_type="ndarray")]
+
+    def unjoined(self) -> tuple[Ints, Ints]:
+        """Nodes that lie on a facet of which they are no corner, and nodes close before one."""
+        from scipy.spatial import cKDTree
+
+        if not len(self.facets):
+            return self.facets, self.facets
+        corners = self.points[self.facets]
+        middle = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        tree = cKDTree(self.points[self.nodes])
+        near = tree.query_ball_point(middle, (1 + 2 * _NARROW) * reach + _CLOSE * self.size)
+        which = np.repeat(np.arange(len(near)), [len(one) for one in near])
+        node = self.nodes[np.concatenate([*near, []]).astype(np.int64)]
+        other = (self.facets[which] != node[:, None]).all(axis=1)
+        which, node = which[other], node[other]
+        foot = _feet(self.points[node], corners[which])
+        away = np.linalg.norm(self.points[node] - foot, axis=1)
+        to_corner = np.linalg.norm(corners[which] - self.points[node, None], axis=2).min(axis=1)
+        close = _CLOSE * self.size
+        on = (away <= close) & (to_corner > close)
+        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)[which]
+        before = (away > close) & (away <= np.minimum(_GAP * self.size, _NARROW * edge))
+        before &= self._faces(which, self.points[node] - foot, away)
+        before[before] = ~self._neighbours(which[before], node[before])
+        return np.unique(node[on]), np.unique(node[before])
+
+    def _faces(self, which: Ints, way: Array, length: Array) -> NDArray[np.bool_]:
+        """Whether ways (n, d) of a length (n,) point out of the material behind facets (n,)."""
+        inner = self.points[self.opposite[which]]
+        out = _feet(inner, self.points[self.facets[which]], bounded=False) - inner
+        return np.sum(out * way, axis=1) > 0.5 * length * np.linalg.norm(out, axis=1)
+
+    def _neighbours(self, which: Ints, node: Ints) -> NDArray[np.bool_]:
+        """Whether a facet (n,) has a corner on a facet of a node (n,)."""
+        count, k = len(self.points), self.facets.shape[1]
+        joined = np.unique([self.facets[:, a] * count + self.facets[:, b]
+                            for a in range(k) for b in range(k) if a != b])  # fmt: skip
+        asked = self.facets[which] * count + node[:, None]
+        return np.asarray(np.isin(asked, joined).any(axis=1))
+
+    def overlapped(self) -> Ints:
+        """Cells (c,) through which edges or cells run that are no part of them.
+
+        Two bodies that overlap have an edge of one inside a cell of the other, or one holds the
+        other. Of a membrane all edges are tested, in space those of the skin do.
+        """
+        # commands that only read cases shall not load numba
+        from verify.compare.cell_tree import build_cell_tree, morton_order
+        from verify.compare.overlap_kernels import cells_run_through
+
+        rims = self.cells if self.membrane else self.facets
+        k = rims.shape[1]
+        edges = np.concatenate([rims[:, [a, b]] for b in range(k) for a in range(b)])
+        edges = np.divmod(np.unique(edges.min(axis=1) * len(self.points) + edges.max(axis=1)),
+                          len(self.points))  # fmt: skip
+        inner = np.unique(self.behind)
+        middle = self.points[self.cells[inner]].mean(axis=1)
+        starts, ends = (np.concatenate([self.points[end], middle]) for end in edges)
+        own = np.concatenate([np.full(len(edges[0]), -1), inner])
+        order = morton_order(0.5 * (starts + ends))  # near ones find their cells faster
+        corners = self.points[self.cells]
+        normals, offsets = self._half_spaces(corners)
+        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=self.membrane)
+        found = cells_run_through(
+            starts[order], ends[order], own[order],
+            tree.lower, tree.upper, tree.cells, normals, offsets,
+        )  # fmt: skip
+        return np.unique(found[found >= 0])
+
+    def _half_spaces(self, corners: Array) -> tuple[Array, Array]:
+        """Return normals (m, k, d) and offsets (m, k) of cells smaller by `_CLOSE`."""
+        normals, offsets = [], []
+        for k in range(corners.shape[1]):
+            facet, opposite = np.delete(corners, k, axis=1), corners[:, k]
+            way = opposite - _feet(opposite, facet, bounded=False)
+            way /= np.linalg.norm(way, axis=1, keepdims=True)
+            normals.append(way)
+            offsets.append(np.sum(way * facet[:, 0], axis=1) + _CLOSE * self.size)
+        if self.membrane:
+            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            across /= np.linalg.norm(across, axis=1, keepdims=True)
+            height = np.sum(across * corners[:, 0], axis=1)
+            normals += [across, -across]
+            offsets += [sign * height - _FLAT * self.size for sign in (1.0, -1.0)]
+        return np.stack(normals, axis=1), np.stack(offsets, axis=1)
+
+
+def _feet(points: Array, facets: Array, bounded: bool = True) -> Array:
+    """Nearest points (n, d) on segments or triangles (n, k, d), or on their line or plane."""
+    if facets.shape[1] == 2:
+        along = facets[:, 1] - facets[:, 0]
+        share = np.sum((points - facets[:, 0]) * along, axis=1) / np.sum(along**2, axis=1)
+        share = np.clip(share, 0.0, 1.0) if bounded else share
+        return np.asarray(facets[:, 0] + share[:, None] * along)
+    normal = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = np.sum((points - facets[:, 0]) * normal, axis=1)
+    foot = points - height[:, None] * normal
+    if not bounded:
+        return np.asarray(foot)
+    outside, best = np.zeros(len(points), dtype=bool), foot.copy()
+    least = np.full(len(points), np.inf)
+    for k in range(3):
+        start, end = facets[:, k], facets[:, (k + 1) % 3]
+        outside |= np.sum(np.cross(end - start, foot - start) * normal, axis=1) < 0.0
+        on_edge = _feet(points, np.stack([start, end], axis=1))
+        away = np.linalg.norm(points - on_edge, axis=1)
+        nearer = away < least
+        best[nearer], least[nearer] = on_edge[nearer], away[nearer]
+    return np.where(outside[:, None], best, foot)
