@@ -159,13 +159,13 @@ class _Skin:
 
         rims = self.cells if self.membrane else self.facets
         k = rims.shape[1]
-        edges = np.concatenate([rims[:, [a, b]] for b in range(k) for a in range(b)])
-        edges = np.divmod(np.unique(edges.min(axis=1) * len(self.points) + edges.max(axis=1)),
-                          len(self.points))  # fmt: skip
+        pairs = np.concatenate([rims[:, [a, b]] for b in range(k) for a in range(b)])
+        edges = np.unique(pairs.min(axis=1) * len(self.points) + pairs.max(axis=1))
+        nodes = np.divmod(edges, len(self.points))
         inner = np.unique(self.behind)
         middle = self.points[self.cells[inner]].mean(axis=1)
-        starts, ends = (np.concatenate([self.points[end], middle]) for end in edges)
-        own = np.concatenate([np.full(len(edges[0]), -1), inner])
+        starts, ends = (np.concatenate([self.points[end], middle]) for end in nodes)
+        own = np.concatenate([np.full(len(edges), -1), inner])
         order = morton_order(0.5 * (starts + ends))  # near ones find their cells faster
         corners = self.points[self.cells]
         normals, offsets = self._half_spaces(corners)
