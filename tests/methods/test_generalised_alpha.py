@@ -109,7 +109,8 @@ def test_what_linear_motion_dissipates_is_the_formula_of_the_scheme(rho, dim):
         du, dv = state.displacement - before.displacement, state.velocity - before.velocity
         da, a = scheme.acceleration - a, scheme.acceleration
         stretched = np.zeros(body.shape)
-        body.force.add_tangent_product(du, 1.0, stretched)
+        at = body.force.configuration(state.displacement)
+        body.force.add_tangent_product(at, du, 1.0, stretched)
         lost = scheme.step_size * (scheme.beta - 0.5 * scheme.gamma) * np.sum(
             da * body.mass.apply(dv)
         ) + (0.5 - scheme.alpha_f) * np.sum(du * (body.mass.apply(da) + stretched))

@@ -81,7 +81,7 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
     """They check no bounds: an array that was too short was written to beyond its end."""
     force = InternalForce(v, material(v.mesh.dim))
     pattern, good = block_pattern(v.cells, v.node_count), np.zeros(v.node_points.shape)
-    space = good.shape[1]
+    space, at = good.shape[1], force.configuration(good)
     blocks = np.zeros((len(pattern.columns), space, space))
     other = block_pattern(v.mesh.cells[:1] * 0 + np.arange(v.mesh.dim + 1), v.mesh.dim + 1)
     few = np.zeros((len(other.columns), space, space))
@@ -89,9 +89,9 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
         for call in (
             lambda x: force.evaluate(x),
             lambda x: force.evaluate(good, out=x),
-            lambda x: force.add_tangent_product(x, 1.0, good),
-            lambda x: force.add_tangent_product(good, 1.0, x),
-            lambda x: force.add_stiffness(pattern, blocks, 1.0, "consistent", x),
+            lambda x: force.configuration(x),
+            lambda x: force.add_tangent_product(at, x, 1.0, good),
+            lambda x: force.add_tangent_product(at, good, 1.0, x),
             lambda x: force.linearise(pattern, x, good, 1.0, 1.0, good, blocks),
             lambda x: force.linearise(pattern, good, x, 1.0, 1.0, good, blocks),
             lambda x: force.linearise(pattern, good, good, 1.0, 1.0, x, blocks),
@@ -103,11 +103,9 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
             force.linearise(pattern, wrong, good, 1.0, 1.0, good, blocks)
         if force.is_membrane:
             with pytest.raises(XfemError, match="of shape"):
-                force.add_stiffness(pattern, blocks, 1.0, "tension", wrong)
-            with pytest.raises(XfemError, match="of shape"):
-                force.add_tension_product(good, wrong, 1.0, good)
+                force.add_tension_product(at, wrong, 1.0, good)
     for wrong in (blocks[:-1], blocks.astype("f4"), blocks[:, :, :1]):
         with pytest.raises(XfemError, match="blocks of shape"):
-            force.add_stiffness(pattern, wrong)
+            force.add_stiffness(at, pattern, wrong)
     with pytest.raises(XfemError, match="expected that of the body"):
-        force.add_stiffness(other, few)
+        force.add_stiffness(at, other, few)

@@ -11,7 +11,7 @@ from turned_bodies import random_mesh, turn, turned_body, turned_sheet
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
 from verify.methods.generalised_alpha import GeneralisedAlpha
-from verify.xfem.body import DynamicBody
+from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.cuts import Plane
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
@@ -23,6 +23,7 @@ from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
+from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
@@ -52,6 +53,7 @@ BODIES = {
     "membrane": cut_membrane,
     "plate with slivers": lambda: _cut(rectangle_mesh((10, 10)), 1e-9),
     "block with slivers": lambda: _cut(box_mesh((5, 5, 5)), 1e-6),
+    "block with aggregated slivers": lambda: treat_slivers(_cut(box_mesh((5, 5, 5)), 1e-3))[0],
 }
 
 
@@ -127,3 +129,28 @@ def test_motion(scheme, name):
     # each step is solved to 1e-10 of its forces
     for one, other in ((plain.displacement, fast.displacement), (plain.velocity, fast.velocity)):
         assert np.abs(one - other).max() < 1e-7 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("kernels", KERNELS.values(), ids=KERNELS)
+@pytest.mark.parametrize("scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum])
+def test_bodies_that_share_their_elements_do_not_see_one_another_move(scheme, kernels):
+    """Damping of the stiffness and tangents take the rotations of their own body."""
+    phantom = BODIES["block"]()
+    mass, damping = side_wise_mass(phantom, DENSITY), RayleighDamping(0.0, 0.01)
+
+    def motion(with_another):
+        force = InternalForce(phantom, _stuff(phantom), kernels=kernels)
+        body = DynamicBody(force, mass, mass.weight([3.0, -2.0, 1.0]), damping=damping)
+        one, other = body.held_by(_held(phantom)), body.held_by(Supports.none(phantom))
+        state, turning = one.rest(), other.rest()
+        turning.velocity[:] = np.cross([20.0, 0.0, 0.0], phantom.node_points)
+        schemes = scheme(one, 0.02), scheme(other, 0.02)
+        for _ in range(3):
+            schemes[0].step(state)
+            if with_another:
+                schemes[1].step(turning)
+        return state.displacement
+
+    alone, beside = motion(False), motion(True)
+    # rotations start from others, and end within round-off; a step amplifies it by the tolerance
+    assert np.abs(beside - alone).max() < 1e-9 * np.abs(alone).max()

@@ -169,7 +169,7 @@ def test_a_ghost_penalty_costs_less_than_half_a_percent_of_accuracy_and_nothing_
     material = isotropic(1.0, 0.3, "plane strain")
     ghost = GhostPenalty(phantom, material)
     linear = phantom.node_points @ np.array([[0.1, 0.7], [-0.4, 0.2]])
-    assert np.abs(ghost.force(linear)[0]).max() < 1e-14
+    assert np.abs(ghost.matrix @ linear).max() < 1e-14
     supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(mesh), exact.f3)
     plain = solve_static(phantom, material, supports)
     errors = [relative_l2_error(phantom, plain.displacement, exact.f3)]

@@ -160,12 +160,6 @@ class OnePassTetrahedra:
             )
         )  # fmt: skip
 
-    def write_rotations(self, rotations: _Floats) -> None:
-        """Write the rotations (p, 3, 3) of the last pass."""
-        found = np.empty((len(self._cells), 3, 3))
-        rotation_matrices(_by_cell(self._quaternions)[: len(found)], found)
-        rotations[self._cells] = found
-
 
 @njit(cache=True)
 def rotation_matrices(quaternions, R):

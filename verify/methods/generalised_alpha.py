@@ -11,7 +11,7 @@ import numpy as np
 from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody, FreeMass, MotionState, RayleighDamping, StepForces
 from verify.xfem.errors import XfemError
-from verify.xfem.implicit import NewtonIntegrator
+from verify.xfem.implicit import NewtonIntegrator, Resistance
 from verify.xfem.linear_solvers import LinearSolver
 
 _JUMP = 1e-6  # of a load: it jumps if it changes by more within 1e-9 of a step
@@ -72,27 +72,27 @@ class GeneralisedAlpha(NewtonIntegrator):
         super().__init__(body, step_size, solver)
         self._mass = FreeMass(body)
         self.acceleration = np.zeros(body.shape)
-        self._end: _End | None = None
+        self._last: _End | None = None
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
         forces = super().step(state)
         self.acceleration = self._acceleration_after(state.displacement)
         load = self._load_at_end(state.time).copy()
-        self._end = _End(state.copy(), load, self.body.damping, self.step_size)
+        self._last = _End(state.copy(), load, self.body.damping, self.step_size)
         return forces
 
     def _prepare(self) -> None:
         start, body = self._start, self.body
-        internal = self._internal(start.displacement)
-        external = self._load_at_start()
-        self._before = StepForces(internal, external, body.viscous(start.velocity))
+        before, external = self._resistance_at_start(), self._load_at_start()
+        viscous = body.viscous(start.velocity, before.configuration)
+        self._before = StepForces(before.force, external, viscous)
         if not self._goes_on(external):
-            self.acceleration = self._balanced()
+            self.acceleration = self._balanced(before)
 
     def _goes_on(self, external: Floats) -> bool:
         """Whether the step begins where the last one ended, under the same conditions."""
-        end, start = self._end, self._start
+        end, start = self._last, self._start
         if (
             end is None
             or end.state.time != start.time
@@ -105,7 +105,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         largest = max(np.abs(external).max(), np.abs(end.external).max())
         return bool(np.abs(external - end.external).max() <= _JUMP * largest)
 
-    def _balanced(self) -> Floats:
+    def _balanced(self, resistance: Resistance) -> Floats:
         """Acceleration that balances the forces of the start; supports say their own.
 
         With damping c of the stiffness a mode out of balance would start with c/m v, and
@@ -121,7 +121,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         if body.damping.stiffness == 0.0 or self.alpha_m == self.alpha_f:
             return held + self._mass.solve(forces)
         forces[body.fixed] = 0.0
-        found = self._correction(start.displacement.copy(), forces)
+        found = self._correction(resistance, forces)
         return held + (1.0 - self.alpha_m) / (self.beta * self.step_size**2) * found
 
     def _acceleration_after(self, displacement: Floats) -> Floats:
@@ -140,17 +140,16 @@ class GeneralisedAlpha(NewtonIntegrator):
             velocity[self.body.fixed] = 0.0
         return velocity
 
-    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
+    def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
         body, before = self.body, self._before
-        internal = self._internal(displacement)
         new, old = 1.0 - self.alpha_f, self.alpha_f
-        after = self._acceleration_after(displacement)
+        after = self._acceleration_after(end.displacement)
         middle = (1.0 - self.alpha_m) * after + self.alpha_m * self.acceleration
         if not body.moving:  # nodes that are caught in flight stop within the step
             middle[body.fixed] = -self._start.velocity[body.fixed] / self.step_size
         return StepForces(
-            new * internal + old * before.internal,
+            new * end.force + old * before.internal,
             new * self._load_at_end(time) + old * before.external,
-            new * body.viscous(velocity) + old * before.viscous,
+            new * body.viscous(velocity, end.configuration) + old * before.viscous,
             body.mass.apply(middle),
         )

@@ -29,7 +29,6 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from verify.xfem.arrays import Floats, Ints, check_choice
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import (
-    AggregatedMass,
     Mass,
     assembled_mass,
     cell_densities,
@@ -66,7 +65,8 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
     check_choice(lumping, ShiftedLumping, "lumping")
     if phantom.aggregation is not None:
         whole = shifted_mass(phantom.corners, density, lumping)
-        return AggregatedMass.of(whole, phantom.aggregation)
+        found: Mass = phantom.aggregation.mass(whole)
+        return found
     count, nodes = phantom.node_count, len(phantom.mesh.points)
     unknowns = np.bincount(phantom.node_parent)
     if unknowns.max() > 2:

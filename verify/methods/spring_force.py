@@ -1,5 +1,7 @@
 """Mass–spring model of a cut body: springs on the edges of its cells."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,26 @@ from verify.xfem.linear_solvers import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]
+
+
+class Stretched(NamedTuple):
+    """Springs at a displacement.
+
+    Attributes
+    ----------
+    displacement : (N, d) float array
+    directions : (p, e, d) float array
+    excess : (p, e) float array
+        Of their length, over that length.
+    force : (N, d) float array
+    energy : float
+    """
+
+    displacement: _Floats
+    directions: _Floats
+    excess: _Floats
+    force: _Floats
+    energy: float
 
 
 class SpringForce(InternalForce):
@@ -68,41 +90,46 @@ class SpringForce(InternalForce):
         self._rest = ends[:, self._edges[:, 1]] - ends[:, self._edges[:, 0]]
         length = np.linalg.norm(self._rest, axis=2, keepdims=True)
         self._directions = self._rest / length
-        self._excess = np.zeros(self.springs.shape)
 
     @property
     def has_one_pass(self) -> bool:
         """Springs are no elements: the pass over tetrahedra is not theirs."""
         return False
 
-    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
-        """Return internal force (N, d) in newtons and energy in joules; see `InternalForce`."""
+    def configuration(self, displacement: _Floats) -> Any:
+        """Springs at a displacement (N, d), with their force and energy."""
         if displacement.shape != self._shape:
             raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
-        force = np.empty(self._shape) if out is None else out
-        force[:] = 0.0
+        directions, excess = self._directions.copy(), np.zeros(self.springs.shape)
+        force = np.zeros(self._shape)
         energy = spring_force(
             self.phantom.cells, self._edges, self._rest, self.springs, displacement,
-            self.is_corotational, self._directions, self._excess, force,
+            self.is_corotational, directions, excess, force,
         )  # fmt: skip
-        return force, float(energy)
+        return Stretched(displacement, directions, excess, force, float(energy))
 
-    def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
-        """Add `scale` K v (N, d), K along the springs of the last `evaluate`, to `out`."""
+    def evaluate_at(self, at: Any, out: _Floats | None = None) -> tuple[_Floats, float]:
+        """Return internal force (N, d) in newtons and energy in joules; see `InternalForce`."""
+        force = np.empty(self._shape) if out is None else out
+        force[:] = at.force
+        return force, at.energy
+
+    def add_tangent_product(self, at: Any, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d), K along the springs as they are, to `out`."""
         spring_product(
-            self.phantom.cells, self._edges, self.springs, self._directions, vector, scale, out
+            self.phantom.cells, self._edges, self.springs, at.directions, vector, scale, out
         )
 
     def add_stiffness(
         self,
+        at: Any,
         pattern: BlockPattern,
         blocks: _Floats,
         scale: float = 1.0,
         kind: TangentKind = "rotation-fixed",
-        displacement: _Floats | None = None,
         least: float = 0.0,
-    ) -> None:
-        """Add `scale` times the stiffness at the last `evaluate`; see `InternalForce`.
+    ) -> int:
+        """Add `scale` times the stiffness at a configuration; see `InternalForce`.
 
         "rotation-fixed" and "geometric" leave out what compressed springs take away from it
         across, so that they are never indefinite.
@@ -110,6 +137,7 @@ class SpringForce(InternalForce):
         check_choice(kind, TangentKind, "stiffness")
         targets = pattern.targets[: len(self.phantom.cells)]
         add_spring_stiffness(
-            targets, self._edges, self.springs, self._directions, self._excess,
+            targets, self._edges, self.springs, at.directions, at.excess,
             kind == "consistent", scale, blocks,
         )  # fmt: skip
+        return 0

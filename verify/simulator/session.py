@@ -190,7 +190,8 @@ class Session:
         force = InternalForce(phantom, stage.material, kernels=FAST)
         weight = mass.weight(stage.gravity)
         body = DynamicBody(force, mass, weight, self._load, grips.supports, stage.damping)
-        force.prepare(body.pattern)
+        if force.has_one_pass:
+            force.prepare(body.pattern)
         held = body.fixed.all(axis=1)  # these need not be solved for
         self._follow(body, grips, Cholesky(body.pattern, stage.mesh.space, held))
 

@@ -20,13 +20,14 @@ from verify.solvers.openings_of_scene import Openings, stops_of
 from verify.solvers.runs import Record
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_steps import integrator_of, largest_step
+from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.body import DynamicBody, Integrator, MotionState
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.mass import AggregatedMass, Mass
+from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]

@@ -55,17 +55,24 @@ on what the two after it define, and is easier read first):
     the result: standard finite elements with weights
 `elasticity`, `polar`, `loads`, `supports`
     material, nearest rotations, load vectors, prescribed displacements
-`contacts`, `aggregation`, `slivers`
-    which pieces touch; policies for slivers (may be skipped at first)
-`block_pattern`, `mass`, `ghost_penalty`
-    sparsity and supports in a matrix; masses, side-wise and consistent; a penalty on slivers
+`block_pattern`, `mass`
+    sparsity and supports in a matrix; masses, side-wise and consistent
 `element`, `linear_solvers`, `internal_force`
     force and tangents of an element, linear elasticity being R = I; SciPy behind one protocol, and
     the operations that `verify.accelerated` replaces; force, energy and stiffness of a body
-`statics`, `static_newton`, `rigid_motion`, `equilibrium`
-    linear statics; Newton's method on the potential energy and load steps at finite rotation
-`body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
-    a body in motion, its energies and its schemes; the state of a body that is cut on the way
+`statics`, `static_newton`
+    linear statics; Newton's method with a line search on the potential energy
+`body`, `energy_balance`, `explicit`, `implicit`, `real_time`
+    a body in motion, its energies and its schemes
+
+Extensions, which none of the modules above needs (a contract of the imports holds that):
+
+`contacts`, `aggregation`, `slivers`, `ghost_penalty`
+    which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
+`rigid_motion`, `equilibrium`
+    load steps at finite rotation: rigid motion first, second paths, stability
+`energy_momentum`, `inherit`
+    a scheme that keeps energy and momentum; the state of a body that is cut on the way
 `bases`, `critical_step`, `subdivision`
     other bases of the same space; largest step of explicit schemes; the cut body as a conforming
     mesh

@@ -12,18 +12,171 @@ its unknowns.
 How far a field is continued to a point is measured by its *reach*, Σ|λ_i| of the barycentric
 coordinates λ of the point in the root: one inside, the larger the farther away, and the norm of the
 extrapolation.
+
+Values at the corners of the pieces are u = C û, û those of the dof nodes. Force, stiffness, mass
+and load are those of the corners, and then f̂ = Cᵀf(C û), K̂ = CᵀKC, M̂ = CᵀMC: elements know nothing
+of it.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import splu
 
 from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.contacts import extension_of, face_contacts, renumber
-from verify.xfem.phantom import Aggregation, PhantomMesh
+from verify.xfem.mass import Mass
+from verify.xfem.phantom import PhantomMesh
 
 _ROUND_OFF = 1e-12  # of a barycentric coordinate; of positions, over the size of the cell
 _DIGITS = 9  # to which extrapolations are compared: symmetric meshes have many that are equal
+
+
+@dataclass(frozen=True)
+class Aggregation:
+    """Corners of a cut mesh that have no unknown of their own, u = C û.
+
+    Attributes
+    ----------
+    corners : PhantomMesh
+        The same body with a dof node for each corner.
+    extension : (N_corners, N) csr_array
+        C; it reproduces linear fields.
+    node : (N_corners,) int array
+        Dof node of each corner; −1 for one that follows others.
+    """
+
+    corners: PhantomMesh
+    extension: csr_array
+    node: Ints
+
+    @cached_property
+    def restriction(self) -> csr_array:
+        """(N, N_corners) Cᵀ."""
+        return csr_array(self.extension.T)
+
+    def mass(self, of_corners: Mass) -> "AggregatedMass":
+        """Mass CᵀMC."""
+        matrix = csr_array(self.restriction @ of_corners.matrix @ self.extension)
+        matrix.sum_duplicates()
+        weights = self.restriction @ of_corners.weights
+        return AggregatedMass(matrix, None, weights, of_corners, self)
+
+    def pattern(self, couplings: Ints) -> "AggregatedPattern":
+        """Sparsity of CᵀKC, with further couplings (k, 2) of dof nodes.
+
+        From K̂_ij = Σ C_ai C_bj K_ab, block by block: each corner block (a, b) is a term of as many
+        blocks (i, j) as the corners a and b follow nodes.
+        """
+        C, corners = self.extension, self.corners
+        of_corners = block_pattern(corners.cells, corners.node_count)
+        a = np.repeat(np.arange(corners.node_count), np.diff(of_corners.starts))
+        b, followed = of_corners.columns, np.diff(C.indptr)
+        terms = followed[a] * followed[b]
+        source = np.repeat(np.arange(len(b)), terms)
+        number = np.arange(len(source)) - np.repeat(np.cumsum(terms) - terms, terms)
+        a, b = a[source], b[source]
+        in_a, in_b = C.indptr[a] + number // followed[b], C.indptr[b] + number % followed[b]
+        count = C.shape[1]
+        pairs = C.indices[in_a] * np.int64(count) + C.indices[in_b]
+        first, second = couplings.T
+        more = np.concatenate([first * count + second, second * count + first])
+        keys = np.unique(np.concatenate([pairs, more]))
+        starts = np.searchsorted(keys, np.arange(count + 1) * count).astype(np.int32)
+        folding = csr_array(
+            (C.data[in_a] * C.data[in_b], (np.searchsorted(keys, pairs), source)),
+            shape=(len(keys), len(of_corners.columns)),
+        )
+        columns = (keys % count).astype(np.int32)
+        return AggregatedPattern(starts, columns, of_corners.targets, of_corners, folding)
+
+
+@dataclass(frozen=True)
+class AggregatedPattern(BlockPattern):
+    """Sparsity of CᵀKC.
+
+    Attributes
+    ----------
+    of_corners : BlockPattern
+        That of K.
+    folding : (B, B_corners) csr_array
+        Share of each block of K in those of CᵀKC.
+    """
+
+    of_corners: BlockPattern
+    folding: csr_array
+
+    @property
+    def corners(self) -> BlockPattern:
+        """That of K, to which elements add."""
+        return self.of_corners
+
+    def unfold(self, blocks: Floats) -> Floats:
+        """Zero blocks of K."""
+        return np.zeros((self.folding.shape[1], *blocks.shape[1:]))
+
+    def fold(self, added: Floats, blocks: Floats) -> None:
+        """Add CᵀKC to the blocks (B, d, d), from the blocks of K."""
+        blocks += (self.folding @ added.reshape(len(added), -1)).reshape(blocks.shape)
+
+
+@dataclass(frozen=True)
+class AggregatedMass(Mass):
+    """CᵀMC: the mass of the corners on unknowns that some of them follow, u = C û.
+
+    It couples the unknowns of root cells that others follow, and is diagonal elsewhere if M is.
+    Lumped anew it would not bound the explicit step: from K ≤ ω²M follows CᵀKC ≤ ω²CᵀMC, and
+    nothing of other masses.
+
+    Attributes
+    ----------
+    of_corners : Mass
+        M.
+    aggregation : Aggregation
+    """
+
+    of_corners: Mass
+    aggregation: Aggregation
+
+    @property
+    def keeps_element_steps(self) -> bool:
+        """Whether no cut makes the explicit step smaller than that of the smallest element."""
+        return self.of_corners.keeps_element_steps
+
+    def solve(self, forces: Floats) -> Floats:
+        """M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
+        coupled, factor = self._coupled
+        found = forces / self.matrix.diagonal()[:, None]
+        if len(coupled):
+            found[coupled] = factor.solve(forces[coupled])
+        return found
+
+    @cached_property
+    def _coupled(self):
+        """Unknowns that the matrix couples, and the factor of their block."""
+        rows, columns, _ = self.entries
+        coupled = np.unique(rows[rows != columns])
+        if len(coupled) == 0:
+            return coupled, None
+        return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
+
+    def project(self, corner_values: Floats, held: Bools, values: Floats) -> Floats:
+        """Values (N, d) nearest to those at the corners in the mass, given where held (N, d).
+
+        Of a velocity: linear and angular momentum of every part without a support stay.
+        """
+        moment = self.aggregation.restriction @ self.of_corners.apply(corner_values)
+        found = np.where(held, values, 0.0)
+        moment -= self.apply(found)
+        for axis in range(found.shape[1]):
+            free = np.flatnonzero(~held[:, axis])
+            if len(free):
+                factor = splu(csc_array(self.matrix[free][:, free]))
+                found[free, axis] = factor.solve(moment[free, axis])
+        return found
 
 
 def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Bools, Bools]:

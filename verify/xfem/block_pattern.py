@@ -1,9 +1,4 @@
-"""Sparsity of nodal blocks, where each element block goes, and supports in the matrix.
-
-Without aggregation the pattern is that of the cells. With it a corner without an unknown of its own
-couples all that it follows: the elements around such corners add to blocks of their own, from which
-`BlockPattern.fold` takes them to those of the unknowns.
-"""
+"""Sparsity of nodal blocks, where each element block goes, and supports in the matrix."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +10,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.errors import XfemError
-from verify.xfem.phantom import Aggregation, PhantomMesh
+from verify.xfem.phantom import PhantomMesh
 
 _Places = NDArray[np.int32]
 _ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
@@ -32,31 +27,24 @@ class BlockPattern:
     columns : (B,) int array
         Column of each block, ascending in a row.
     targets : (p, c, c) int array
-        Block to which the pair (row corner, column corner) of each cell adds; B and more are
-        blocks aside that `fold` takes to others.
-    folding : (B, S) csr_array, optional
-        Share of each of the S blocks aside in those of the pattern.
+        Block of `corners` to which the pair (row corner, column corner) of each cell adds.
     """
 
     starts: _Places
     columns: _Places
     targets: _Places
-    folding: csr_array | None = None
+
+    @property
+    def corners(self) -> "BlockPattern":
+        """Sparsity of what elements add up: this one, unless some corners follow others."""
+        return self
 
     def unfold(self, blocks: Floats) -> Floats:
-        """Return what elements are to be added to: the blocks themselves if none lie aside."""
-        if self.folding is None:
-            return blocks
-        return np.zeros((len(self.columns) + self.folding.shape[1], *blocks.shape[1:]))
+        """Room for the blocks of `corners`, zero or filled: these if the pattern is their own."""
+        return blocks
 
     def fold(self, added: Floats, blocks: Floats) -> None:
-        """Add what `unfold` has given, and elements have added to, to the blocks (B, d, d)."""
-        if self.folding is None:
-            return
-        count = len(self.columns)
-        blocks += added[:count]
-        aside = added[count:].reshape(len(added) - count, -1)
-        blocks += (self.folding @ aside).reshape(blocks.shape)
+        """Add to the blocks (B, d, d) what elements have added to that room."""
 
     @property
     def node_count(self) -> int:
@@ -160,50 +148,10 @@ def body_pattern(phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPa
         Further pairs of dof nodes that are to be coupled.
     """
     extra = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
-    if phantom.aggregation is None:
-        return block_pattern(_with_pairs(phantom.cells, extra), phantom.node_count)
-    own = phantom.corner_node[phantom.cells]
-    around = np.flatnonzero((own < 0).any(axis=1))
-    nodes, weights = _followed(phantom.aggregation, phantom.cells[around])
-    # a corner that follows others is represented by one of them
-    own[around] = np.take_along_axis(nodes, np.abs(weights).argmax(axis=2)[:, :, None], 2)[:, :, 0]
-    pairs = np.concatenate([extra, _pairs(nodes.reshape(len(around), -1), phantom.node_count)])
-    plain = block_pattern(_with_pairs(own, pairs), phantom.node_count)
-    count, corners = len(plain.columns), phantom.cells.shape[1]
-    targets = plain.targets.copy()
-    places = np.arange(len(around) * corners**2)
-    targets[around] = count + places.reshape(-1, corners, corners)
-    # entry (a, b) of the unknowns gets w_ia w_jb of the block (i, j) of a piece
-    shape = (len(around), corners, corners, nodes.shape[2], nodes.shape[2])
-    weight = (weights[:, :, None, :, None] * weights[:, None, :, None, :]).ravel()
-    row = np.broadcast_to(nodes[:, :, None, :, None], shape).ravel()
-    column = np.broadcast_to(nodes[:, None, :, None, :], shape).ravel()
-    source = np.repeat(places, nodes.shape[2] ** 2)
-    real = weight != 0.0
-    at = pattern_places(plain, row[real], column[real])
-    matrix = csr_array((weight[real], (at, source[real])), shape=(count, len(places)))
-    return BlockPattern(plain.starts, plain.columns, targets, matrix)
-
-
-def _followed(aggregation: Aggregation, cells: Ints) -> tuple[Ints, Floats]:
-    """Dof nodes (q, c, m) and weights of the corners of some pieces, padded with weight 0."""
-    starts = aggregation.extension.indptr
-    count = np.diff(starts)[cells]
-    most = count.max(initial=1)
-    within = np.minimum(np.arange(most), count[:, :, None] - 1)
-    at = starts[cells][:, :, None] + within
-    nodes = aggregation.extension.indices[at].astype(np.int64)
-    weights = np.where(np.arange(most) < count[:, :, None], aggregation.extension.data[at], 0.0)
-    return nodes, weights
-
-
-def _pairs(nodes: Ints, count: int) -> Ints:
-    """All pairs (k, 2) of different nodes in a row of `nodes` (q, m), each once."""
-    first, second = np.triu_indices(nodes.shape[1], 1)
-    pairs = np.sort(np.stack([nodes[:, first].ravel(), nodes[:, second].ravel()]), axis=0)
-    key = np.unique(pairs[0] * count + pairs[1])
-    pairs = np.stack([key // count, key % count], axis=1)
-    return pairs[pairs[:, 0] != pairs[:, 1]]
+    if phantom.aggregation is not None:
+        found: BlockPattern = phantom.aggregation.pattern(extra)
+        return found
+    return block_pattern(_with_pairs(phantom.cells, extra), phantom.node_count)
 
 
 def _with_pairs(cells: Ints, pairs: Ints) -> Ints:

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.arrays import Bools, Floats, check_floats, finite_array
 from verify.xfem.errors import XfemError
-from verify.xfem.internal_force import InternalForce
+from verify.xfem.internal_force import Configuration, InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.supports import Supports, check_fixed
@@ -160,8 +160,7 @@ class DynamicBody:
             raise XfemError(f"damping {self.damping!r}; expected RayleighDamping")
         if self.supports is None:
             self.supports = Supports.none(phantom)
-        couplings = self.force.ghost.couplings if self.force.ghost else None
-        self.pattern = self.mass.pattern(phantom, couplings)
+        self.pattern = self.mass.pattern(phantom, self.force.couplings)
         self._hold(self.supports)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -235,13 +234,17 @@ class DynamicBody:
             raise XfemError(f"load of shape {np.shape(load)} at t={time:g}; expected {self.shape}")
         return self.weight + load
 
-    def viscous(self, velocity: Floats) -> Floats:
-        """Damping force C v (N, d), K with the rotations of the last evaluation of the force."""
+    def viscous(self, velocity: Floats, at: Configuration | None) -> Floats:
+        """Damping force C v (N, d), K with the rotations of a configuration.
+
+        None will do without damping of the stiffness.
+        """
         if self.damping.mass == 0.0 and self.damping.stiffness == 0.0:
             return np.zeros(self.shape)
         force = self.damping.mass * self.mass.apply(velocity)
         if self.damping.stiffness > 0.0:
-            self.force.add_tangent_product(velocity, self.damping.stiffness, force)
+            assert at is not None
+            self.force.add_tangent_product(at, velocity, self.damping.stiffness, force)
         return force
 
 

@@ -134,7 +134,7 @@ class BalanceRecorder:
         """Strain energy, and the share of a ghost penalty in it."""
         force = self.body.force
         _, strain = force.evaluate(state.displacement)
-        return strain, force.penalty_energy
+        return strain, force.penalty_energy(state.displacement)
 
     def _row(self, state: MotionState) -> Floats:
         body = self.body

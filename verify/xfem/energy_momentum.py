@@ -28,9 +28,9 @@ from verify.xfem.arrays import Bools, Floats
 from verify.xfem.body import DynamicBody, StepForces
 from verify.xfem.element import Elements, add_moduli, polar_slope, restricted
 from verify.xfem.errors import XfemError
-from verify.xfem.implicit import NewtonIntegrator
-from verify.xfem.internal_force import TangentKind
-from verify.xfem.linear_solvers import LinearSolver
+from verify.xfem.implicit import NewtonIntegrator, Resistance
+from verify.xfem.internal_force import Configuration, TangentKind
+from verify.xfem.linear_solvers import LinearSolver, OnePass
 from verify.xfem.polar import SPINS, adjugate, nearest_rotations
 
 _REGULAR = 1e-6  # smallest pivot of A over its trace
@@ -207,83 +207,85 @@ class EnergyMomentum(NewtonIntegrator):
         if not body.force.has_stress:
             raise XfemError("springs have no stress field; expected an integrator that needs none")
         super().__init__(body, step_size)
-        self._first = body.force.rotations.copy()
+        self._before: Configuration | None = None  # at the start, once it is needed
         self._evaluations = 0
         self._takes_all = False  # of the derivative of the force
-        self.substituted = np.zeros(len(self._first), dtype=bool)
+        self.substituted = np.zeros(len(body.force.phantom.cells), dtype=bool)
 
     @cached_property
     def _general(self) -> LinearSolver:
         return self.body.force.kernels.general(self.body.pattern, self.body.shape[1])
 
     def _prepare(self) -> None:
-        force = self.body.force
-        if not force.has_one_pass:
-            force.evaluate(self._start.displacement)
-            self._first[:] = force.rotations
-        self._evaluations = 0
-        self._takes_all = False
+        self._before, self._evaluations, self._takes_all = None, 0, False
 
-    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
-        body, start = self.body, self._start
-        internal = np.zeros(body.shape)
-        if body.force.is_corotational:
-            self._evaluations += 1
-            if self._evaluations <= _FREE_EVALUATIONS:
-                self.substituted[:] = False
-            self._average(displacement, internal)
-        else:
-            mean = 0.5 * (start.displacement + displacement)
-            body.force.add_tangent_product(mean, 1.0, internal)
-        middle = start.time + 0.5 * self.step_size
-        viscous = body.viscous(0.5 * (start.velocity + velocity))
-        return StepForces(internal, body.external(middle), viscous)
-
-    def _ends(self, displacement: Floats) -> StepEnds:
-        """Both ends of the step, with the rotations of the last evaluation."""
-        force = self.body.force
-        F0 = force.deformation(self._start.displacement).copy()
-        return StepEnds(F0, force.deformation(displacement), self._first, force.rotations)
-
-    def _average(self, displacement: Floats, internal: Floats) -> None:
-        """Write the force of a step that ends like this; substituted cells are updated."""
-        force, before = self.body.force, self._start.displacement
+    def _resistance(self, displacement: Floats) -> Resistance:
+        """Resistance averaged over the step; substituted cells are updated."""
+        body, force, start = self.body, self.body.force, self._start.displacement
+        found = np.zeros(body.shape)
+        if not force.is_corotational:
+            at = force.configuration(displacement)
+            force.add_tangent_product(at, 0.5 * (start + displacement), 1.0, found)
+            return Resistance(displacement, found, at)
+        self._evaluations += 1
+        if self._evaluations <= _FREE_EVALUATIONS:
+            self.substituted[:] = False
         if force.has_one_pass:
-            force.linearise_average(
-                self.body.pattern, before, displacement, self.substituted, self._stiffness_share,
-                internal, self._blocks, not self._solver.reads_half, self.share,
-            )  # fmt: skip
-            self._is_linearised = True
-            return
-        force.evaluate(displacement)
-        P = averaged_stress(force.elements, self._ends(displacement), self.substituted)
+            return self._by_one_pass(displacement, self._averaged_in_one_pass(displacement))
+        at = force.configuration(displacement)
+        P = averaged_stress(force.elements, self._ends(at), self.substituted)
         P *= force.elements.volumes[:, None, None]
         gradients = force.elements.gradients[force.elements.parent]
-        internal[:] = force.nodal_force(gradients @ P.transpose(0, 2, 1))
-        force.add_penalty(0.5 * (before + displacement), 1.0, internal)
+        found += force.nodal_force(gradients @ P.transpose(0, 2, 1))  # f_i = w P b_i
+        force.add_penalty(0.5 * (start + displacement), 1.0, found)
+        return Resistance(displacement, found, at)
 
-    def _solved(self, displacement: Floats, residual: Floats, kind: TangentKind) -> Floats:
-        self._takes_all |= self._is_slow and self.body.force.is_corotational
+    def _averaged_in_one_pass(self, displacement: Floats) -> Floats:
+        """Averaged force (N, 3); the stiffness at the end is written to the blocks."""
+        force, before = self.body.force, self._start.displacement
+        start, end = force.phantom.extend(before), force.phantom.extend(displacement)
+        scale, found = self._stiffness_share, np.empty(self.body.shape)
+
+        def run(one: OnePass, f: Floats, K: Floats, whole: bool) -> None:
+            one.average(start, end, scale, self.share, self.substituted, f, K, whole)
+
+        reads_all = not self._solver.reads_half
+        force.in_one_pass(self.body.pattern, run, found, self._blocks, reads_all)
+        if force.ghost is not None:
+            force.add_penalty(0.5 * (before + displacement), 1.0, found)
+            force.ghost.add_stiffness(self.body.pattern, self._blocks, scale)
+        return found
+
+    def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
+        middle = self._start.time + 0.5 * self.step_size
+        mean = 0.5 * (self._start.velocity + velocity)
+        viscous = self.body.viscous(mean, end.configuration)
+        return StepForces(end.force, self.body.external(middle), viscous)
+
+    def _ends(self, after: Configuration) -> StepEnds:
+        """Both ends of the step."""
+        if self._before is None:
+            self._before = self.body.force.configuration(self._start.displacement)
+        return StepEnds(self._before.F, after.F, self._before.R, after.R)
+
+    def _solved(
+        self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
+    ) -> Floats:
+        self._takes_all |= is_slow and self.body.force.is_corotational
         if not self._takes_all:
-            return super()._solved(displacement, residual, kind)
-        self._is_linearised = False
-        self._assemble(displacement, kind)
+            return super()._solved(end, residual, kind, is_slow)
+        self._assemble(end._replace(blocks=None), kind)
         self._general.factorize(self._blocks)
         return self._general.solve(residual)
 
-    def _add_stiffness(self, displacement: Floats, kind: TangentKind) -> None:
-        force = self.body.force
+    def _add_stiffness(self, end: Resistance, kind: TangentKind) -> None:
         if not self._takes_all:
-            super()._add_stiffness(displacement, kind)
+            super()._add_stiffness(end, kind)
             return
-        v, pattern = force.phantom, self.body.pattern
-        if force.has_one_pass:
-            force.evaluate(self._start.displacement)
-            self._first[:] = force.rotations
-            force.evaluate(displacement)
-        added, elements = pattern.unfold(self._blocks), force.elements
-        moduli = averaged_moduli(elements, self._ends(displacement), self.substituted)
-        add_moduli(elements, moduli, 1.0, pattern.targets[: len(v.cells)], added)
+        force, pattern = self.body.force, self.body.pattern
+        added, ends = pattern.unfold(self._blocks), self._ends(self._configuration(end))
+        moduli = averaged_moduli(force.elements, ends, self.substituted)
+        add_moduli(force.elements, moduli, 1.0, pattern.targets[: len(moduli)], added)
         pattern.fold(added, self._blocks)
         if force.ghost is not None:
-            force.ghost.add_stiffness(self.body.pattern, self._blocks, self.share)
+            force.ghost.add_stiffness(pattern, self._blocks, self.share)

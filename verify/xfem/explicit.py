@@ -39,8 +39,9 @@ class _Explicit:
         self, displacement: Floats, velocity: Floats, time: float
     ) -> tuple[Floats, StepForces]:
         body = self.body
-        internal, _ = body.force.evaluate(displacement)
-        forces = StepForces(internal, body.external(time), body.viscous(velocity))
+        at = body.force.configuration(displacement)
+        internal, _ = body.force.evaluate_at(at)
+        forces = StepForces(internal, body.external(time), body.viscous(velocity, at))
         return self._mass.solve(forces.external - forces.internal - forces.viscous), forces
 
     def _finish(

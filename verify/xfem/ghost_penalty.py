@@ -124,11 +124,6 @@ class GhostPenalty:
         entries = self.matrix.tocoo()
         return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
-    def force(self, displacement: Floats) -> tuple[Floats, float]:
-        """Force (N, d) of the penalty, in newtons, and its energy."""
-        force = self.matrix @ displacement
-        return force, 0.5 * float((force * displacement).sum())
-
     def mass(self, mass: Mass, density: Floats | float) -> Mass:
         """Mass with the counterpart γ Σ ρ h³ A |⟦∂v/∂n⟧|²; not diagonal any more.
 

@@ -1,6 +1,7 @@
 """Implicit schemes whose step Newton's method solves to a tolerance: Euler, trapezoidal rule."""
 
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from verify.xfem.body import (
     check_step,
 )
 from verify.xfem.errors import SingularStiffnessError, XfemError
-from verify.xfem.internal_force import TangentKind, inverted_cells
+from verify.xfem.internal_force import Configuration, TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
 
 _HALVINGS = 10
@@ -26,6 +27,53 @@ _INEXACT = 1e-6  # residual that conjugate gradients leave of a correction of wh
 _COARSE, _FINE = 1e-2, 1e-10  # most and least of it
 _SPARE = 0.2  # of what is expected to be left anyhow: what conjugate gradients may leave
 _ROUND_OFF = 64.0 * np.finfo(float).eps
+
+
+class Resistance(NamedTuple):
+    """Internal force of a step that ends at a displacement.
+
+    Attributes
+    ----------
+    displacement : (N, d) float array
+    force : (N, d) float array
+    configuration : Configuration or None
+        Of the end; None if it was not found and is not needed.
+    blocks : (B, d, d) float array or None
+        Derivative by the displacement where one pass finds both, in the memory of the integrator:
+        until the next evaluation, or until a matrix is made of it.
+    """
+
+    displacement: Floats
+    force: Floats
+    configuration: Configuration | None
+    blocks: Floats | None = None
+
+
+class Iterate(NamedTuple):
+    """A guess of the end of a step, and what is left of its equation.
+
+    Attributes
+    ----------
+    resistance : Resistance
+    velocity : (N, d) float array
+    forces : StepForces
+    residual : (N, d) float array
+        In newtons.
+    norm, scale : float
+        Of the residual, and what it compares to, as accelerations.
+    """
+
+    resistance: Resistance
+    velocity: Floats
+    forces: StepForces
+    residual: Floats
+    norm: float
+    scale: float
+
+    @property
+    def displacement(self) -> Floats:
+        """(N, d) that of the resistance."""
+        return self.resistance.displacement
 
 
 class NewtonIntegrator(ABC):
@@ -74,15 +122,13 @@ class NewtonIntegrator(ABC):
         self._inverse_mass = (1.0 / mass)[:, None]
         self._noise = self._round_off()
         self._factorised: tuple[float, RayleighDamping] | None = None
-        self._is_slow = False  # whether the last correction of this step took too little off
         self._left: list[float] = []  # of the residual by each correction of the last step
-        self._is_linearised = False  # whether the stiffness of the last evaluation is in the blocks
-        self._at, self._found = np.empty(0), np.empty(0)  # last evaluation: where, and the force
+        self._end: Resistance | None = None  # of the last step
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     @abstractmethod
-    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
-        """Evaluate the forces of a step that ends like this, and leave the rotations there."""
+    def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
+        """Return the forces of a step that ends like this."""
 
     def _prepare(self) -> None:  # noqa: B027
         """Evaluate what is needed of the start of the step; nothing by default."""
@@ -95,31 +141,45 @@ class NewtonIntegrator(ABC):
         """External force (N, d) of a step that ends at a time, before what jumps then."""
         return self.body.external(time - _JUST * self.step_size)
 
-    def _internal(self, displacement: Floats) -> Floats:
-        """Return the internal force (N, d); where one pass finds it, also the stiffness."""
-        body = self.body
-        if not (body.force.has_one_pass and body.force.is_corotational):
-            return body.force.evaluate(displacement)[0]
-        scale = self._stiffness_share
-        # damping wants rotations too, and others may have turned them since
-        if scale != self.share or not np.array_equal(self._at, displacement):
-            self._found = np.empty(body.shape)
-            body.force.linearise(
-                body.pattern, displacement, displacement, 0.0, scale, self._found, self._blocks,
-                not self._solver.reads_half, self.share,
-            )  # fmt: skip
-            self._at, self._is_linearised = displacement.copy(), True
-        return self._found
+    def _resistance(self, displacement: Floats) -> Resistance:
+        """Resistance of a step that ends like this, with its derivative if one pass finds both."""
+        body, force = self.body, self.body.force
+        if not (force.has_one_pass and force.is_corotational):
+            at = force.configuration(displacement)
+            return Resistance(displacement, force.evaluate_at(at)[0], at)
+        found = np.empty(body.shape)
+        force.linearise(
+            body.pattern, displacement, displacement, 0.0, self._stiffness_share, found,
+            self._blocks, not self._solver.reads_half, self.share,
+        )  # fmt: skip
+        return self._by_one_pass(displacement, found)
+
+    def _by_one_pass(self, displacement: Floats, force: Floats) -> Resistance:
+        """Resistance whose derivative is in the blocks; damping wants rotations too."""
+        damped = self.body.damping.stiffness > 0.0
+        at = self.body.force.configuration(displacement) if damped else None
+        return Resistance(displacement, force, at, self._blocks)
+
+    def _resistance_at_start(self) -> Resistance:
+        """Take the resistance at the end of the last step, if this one goes on from there."""
+        start, end = self._start.displacement, self._end
+        if end is not None and np.array_equal(end.displacement, start):
+            return end
+        return self._resistance(start)
 
     @property
     def _stiffness_share(self) -> float:
         """Of the rotation-fixed tangent, in the matrix of a correction."""
         return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
 
-    def _add_stiffness(self, displacement: Floats, kind: TangentKind) -> None:
+    def _configuration(self, end: Resistance) -> Configuration:
+        found = end.configuration
+        return self.body.force.configuration(end.displacement) if found is None else found
+
+    def _add_stiffness(self, end: Resistance, kind: TangentKind) -> None:
         """Add the derivative of the internal force of the step to the blocks."""
-        force = self.body.force
-        force.add_stiffness(self.body.pattern, self._blocks, self.share, kind, displacement)
+        at, pattern = self._configuration(end), self.body.pattern
+        self.body.force.add_stiffness(at, pattern, self._blocks, self.share, kind)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -128,14 +188,14 @@ class NewtonIntegrator(ABC):
         self._prepare()
         with np.errstate(over="ignore", invalid="ignore"):
             try:
-                result = self._solve(state.displacement + self.step_size * state.velocity)
+                end = self._solve(state.displacement + self.step_size * state.velocity)
             except StepFailedError:
                 # where the predictor has turned cells inside out, start from where they are
-                result = self._solve(state.displacement.copy())
-        displacement, velocity, forces = result
-        state.displacement[:], state.velocity[:] = displacement, velocity
+                end = self._solve(state.displacement.copy())
+        state.displacement[:], state.velocity[:] = end.displacement, end.velocity
         state.time = self._start.time + self.step_size
-        return forces
+        self._end = end.resistance._replace(blocks=None)
+        return end.forces
 
     def _velocity(self, displacement: Floats) -> Floats:
         velocity = (self.rate / self.step_size) * (displacement - self._start.displacement)
@@ -145,15 +205,15 @@ class NewtonIntegrator(ABC):
             velocity[self.body.fixed] = 0.0
         return velocity
 
-    def _residual(self, displacement: Floats) -> tuple[Floats, float, StepForces, float]:
-        """Residual force (N, d), its norm, the forces, and the scale to which it compares.
+    def _iterate(self, displacement: Floats) -> Iterate:
+        """Evaluate the equation of a step that ends at a displacement (N, d).
 
         Norms are of accelerations. The forces on a sliver of 1e-12, in space 1e-38 of those on its
         neighbours, would not be seen among these: its unknowns would go anywhere, and step by step
         they would grow until its energy is that of the body.
         """
-        velocity = self._velocity(displacement)
-        forces = self._forces(displacement, velocity, self._start.time + self.step_size)
+        velocity, end = self._velocity(displacement), self._resistance(displacement)
+        forces = self._forces(end, velocity, self._start.time + self.step_size)
         inertia = forces.inertia
         if inertia is None:
             inertia = self.body.mass.apply(velocity - self._start.velocity) / self.step_size
@@ -161,7 +221,7 @@ class NewtonIntegrator(ABC):
         residual[self.body.fixed] = 0.0
         parts = (forces.external, forces.internal, forces.viscous, inertia)
         scale = max(self._size(part) for part in parts)
-        return residual, self._size(residual), forces, scale
+        return Iterate(end, velocity, forces, residual, self._size(residual), scale)
 
     @property
     def _weight(self) -> float:
@@ -170,46 +230,42 @@ class NewtonIntegrator(ABC):
     def _size(self, force: Floats) -> float:
         return float(np.linalg.norm(self._inverse_mass * force))
 
-    def _solve(self, displacement: Floats) -> tuple[Floats, Floats, StepForces]:
-        """Displacement, velocity and forces of the end of the step, from a first guess (N, d)."""
+    def _solve(self, displacement: Floats) -> Iterate:
+        """End of the step, from a first guess (N, d)."""
         body = self.body
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
-        residual, norm, forces, scale = self._residual(displacement)
+        now, is_slow = self._iterate(displacement), False
         left: list[float] = []
-        leaps, self._is_slow = 0, False
+        leaps = 0
         for number in range(self.iterations):
             # round-off of positions, seen through the stiffness
-            noise = np.abs(body.force.phantom.node_points + displacement).max() * self._noise
-            if self._excess(residual, noise) <= self.tolerance * scale:
+            reach = np.abs(body.force.phantom.node_points + now.displacement).max()
+            noise = reach * self._noise
+            if self._excess(now.residual, noise) <= self.tolerance * now.scale:
                 self._left = left
-                return displacement, self._velocity(displacement), forces
-            aim = self._aim(number, self.tolerance * scale / norm)
-            correction = self._correction(displacement, residual, aim)
-            nearly = self._excess(residual, 100.0 * noise) <= 1e3 * self.tolerance * scale
-            accepted = False
+                return now
+            aim = self._aim(number, self.tolerance * now.scale / now.norm)
+            correction = self._correction(now.resistance, now.residual, aim, is_slow)
+            nearly = self._excess(now.residual, 100.0 * noise) <= 1e3 * self.tolerance * now.scale
             for halving in range(_HALVINGS):
-                trial = displacement + 0.5**halving * correction
-                residual, size, forces, scale = self._residual(trial)
-                if size < norm:
-                    accepted = True
+                trial = self._iterate(now.displacement + 0.5**halving * correction)
+                if trial.norm < now.norm:
                     break
-            if not accepted and nearly:
-                _, _, forces, _ = self._residual(displacement)
-                return displacement, self._velocity(displacement), forces
-            if not accepted:
+            else:
+                if nearly:
+                    return self._iterate(now.displacement)
                 # a dead end of the residual, not a root: leap over it
                 leaps += 1
-                trial = displacement + correction
-                residual, size, forces, scale = self._residual(trial)
-            left.append(size / norm)
-            self._is_slow = not size < _SLOW * norm
-            displacement, norm = trial, size
+                trial = self._iterate(now.displacement + correction)
+            left.append(trial.norm / now.norm)
+            is_slow = not trial.norm < _SLOW * now.norm
+            now = trial
         raise StepFailedError(
             f"{type(self).__name__}: step from t = {self._start.time:.6g} s by "
-            f"{self.step_size:.6g} s not solved: residual {norm:.3g} m/s² against forces "
-            f"over masses of {scale:.3g} m/s²; expected {self.tolerance:g} of them. "
-            f"{self._why(displacement, leaps)}"
+            f"{self.step_size:.6g} s not solved: residual {now.norm:.3g} m/s² against forces "
+            f"over masses of {now.scale:.3g} m/s²; expected {self.tolerance:g} of them. "
+            f"{self._why(now.displacement, leaps)}"
         )
 
     def _aim(self, number: int, enough: float) -> float:
@@ -233,7 +289,8 @@ class NewtonIntegrator(ABC):
         """(N, 1) error of the acceleration of each node for positions of size one, rounded."""
         body = self.body
         self._blocks[:] = 0.0
-        body.force.add_stiffness(body.pattern, self._blocks, self.share)
+        rest = body.force.configuration(np.zeros(body.shape))
+        body.force.add_stiffness(rest, body.pattern, self._blocks, self.share)
         stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
@@ -258,16 +315,27 @@ class NewtonIntegrator(ABC):
         return f"{'; '.join(found)}. A shorter step may help"
 
     def _correction(
-        self, displacement: Floats, residual: Floats, tolerance: float = _INEXACT
+        self, end: Resistance, residual: Floats, tolerance: float = _INEXACT, is_slow: bool = False
     ) -> Floats:
+        """Correction (N, d) of an end of the step by its residual.
+
+        Parameters
+        ----------
+        end : Resistance
+        residual : (N, d) float array
+        tolerance : float
+            Residual that conjugate gradients may leave.
+        is_slow : bool
+            Whether the last correction of this step took too little off.
+        """
         self.solves += 1
         self._solver.tolerance = tolerance
         try:
             try:
-                return self._solved(displacement, residual, "consistent")
+                return self._solved(end, residual, "consistent", is_slow)
             except SingularStiffnessError:
                 # the exact one may be indefinite far from equilibrium; that without turns is not
-                return self._solved(displacement, residual, "geometric")
+                return self._solved(end._replace(blocks=None), residual, "geometric", is_slow)
         except SingularStiffnessError as failure:
             raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         except XfemError as failure:
@@ -276,26 +344,27 @@ class NewtonIntegrator(ABC):
                 "step is too long, or a load is not finite"
             ) from failure
 
-    def _solved(self, displacement: Floats, residual: Floats, kind: TangentKind) -> Floats:
+    def _solved(
+        self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
+    ) -> Floats:
         given = None if self.body.force.is_corotational else (self.step_size, self.body.damping)
         if given is None or given != self._factorised:  # the matrix of linear motion stays
             self._factorised = None
-            self._assemble(displacement, kind)
+            self._assemble(end, kind)
             self._solver.factorize(self._blocks)
             self._factorised = given
         return self._solver.solve(residual)
 
-    def _assemble(self, displacement: Floats, kind: TangentKind) -> None:
+    def _assemble(self, end: Resistance, kind: TangentKind) -> None:
+        """Fill the blocks with the matrix of a correction: of stiffness, damping and mass."""
         body, h = self.body, self.step_size
         per_velocity = self.share * self.rate / h
-        if not self._is_linearised or kind != "consistent":
+        if end.blocks is None:
             self._blocks[:] = 0.0
-            self._add_stiffness(displacement, kind)
+            self._add_stiffness(end, kind)
             if body.damping.stiffness > 0.0:
-                body.force.add_stiffness(
-                    body.pattern, self._blocks, per_velocity * body.damping.stiffness
-                )
-        self._is_linearised, self._at = False, np.empty(0)
+                scale, at = per_velocity * body.damping.stiffness, self._configuration(end)
+                body.force.add_stiffness(at, body.pattern, self._blocks, scale)
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern, body.fixed, self._blocks, self._held)
@@ -311,9 +380,9 @@ class ImplicitEuler(NewtonIntegrator):
     rate = 1.0
     share = 1.0
 
-    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
-        internal = self._internal(displacement)
-        return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
+    def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
+        viscous = self.body.viscous(velocity, end.configuration)
+        return StepForces(end.force, self._load_at_end(time), viscous)
 
 
 class Trapezoidal(NewtonIntegrator):
@@ -328,14 +397,13 @@ class Trapezoidal(NewtonIntegrator):
 
     def _prepare(self) -> None:
         start = self._start
-        internal = self._internal(start.displacement)
-        viscous = self.body.viscous(start.velocity)
-        self._before = StepForces(internal, self._load_at_start(), viscous)
+        before = self._resistance_at_start()
+        viscous = self.body.viscous(start.velocity, before.configuration)
+        self._before = StepForces(before.force, self._load_at_start(), viscous)
 
-    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
-        internal = self._internal(displacement)
+    def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
         return StepForces(
-            0.5 * (self._before.internal + internal),
+            0.5 * (self._before.internal + end.force),
             0.5 * (self._before.external + self._load_at_end(time)),
-            0.5 * (self._before.viscous + self.body.viscous(velocity)),
+            0.5 * (self._before.viscous + self.body.viscous(velocity, end.configuration)),
         )

@@ -12,10 +12,10 @@ changes, both by what the field of the slivers was off the root's.
 
 import numpy as np
 
+from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import Ints
 from verify.xfem.body import DynamicBody, MotionState, check_state
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import AggregatedMass
 from verify.xfem.phantom import PhantomMesh
 
 

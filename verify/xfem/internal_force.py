@@ -1,14 +1,17 @@
 """Internal force, energy and stiffness of a cut body, linear or corotational (2.42, 2.66-70).
 
 Every piece, being a cell of the phantom-node mesh, has one polar rotation of its own.
-`verify.xfem.element` has the equations.
+`verify.xfem.element` has the equations. Force and stiffness are found at the corners of the pieces,
+f and K; where corners follow others, u = C û, those of the dof nodes are Cᵀf and CᵀKC.
 """
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from verify.xfem.arrays import Bools, Floats, Ints, check_choice, check_floats
+from verify.xfem.arrays import Floats, Ints, check_choice, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.element import (
@@ -21,7 +24,6 @@ from verify.xfem.element import (
     positive_tension,
 )
 from verify.xfem.errors import XfemError
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
@@ -30,6 +32,47 @@ Kinematics = Literal["corotational", "linear"]
 TangentKind = Literal["rotation-fixed", "geometric", "consistent", "tension"]
 
 _CHUNK = 512  # cells whose moduli are held at once
+
+
+class Configuration(NamedTuple):
+    """Cells of a body at a displacement.
+
+    Attributes
+    ----------
+    displacement : (N, d) float array
+        Of the dof nodes, in metres.
+    F : (p, d, d) float array
+        Deformation gradients, of membranes zero across their plane.
+    R : (p, d, d) float array
+        Rotations nearest to them; of linear kinematics the identity.
+    """
+
+    displacement: Floats
+    F: Floats
+    R: Floats
+
+
+class Penalty(Protocol):
+    """A potential ½ u·Ku beside the elasticity, K without rotations and alike in each component.
+
+    Attributes
+    ----------
+    phantom : PhantomMesh
+    matrix : (N, N) csr_array
+        K, in N/m.
+    couplings : (k, 2) int array
+        Dof nodes that no cell couples.
+    """
+
+    phantom: PhantomMesh
+    couplings: Ints
+
+    @property
+    def matrix(self) -> csr_array: ...  # noqa: D102
+
+    def add_stiffness(self, pattern: BlockPattern, blocks: Floats, scale: float = 1.0) -> None:
+        """Add `scale` K to nodal blocks (B, d, d)."""
+        ...
 
 
 class InternalForce:
@@ -45,23 +88,23 @@ class InternalForce:
         Linear keeps every rotation at the identity. A linear membrane resists in its plane alone.
     kernels : Kernels
         Of which `one_pass` serves tetrahedra here; the rest is for what solves with this force.
-    ghost : GhostPenalty, optional
-        Of the same body: a potential without rotations, in energy, force and every tangent.
+    ghost : Penalty, optional
+        Of the same body, as `verify.xfem.ghost_penalty`: in energy, force and every tangent.
 
     Attributes
     ----------
     elements : Elements
-    penalty_energy : float
-        Share of the penalty in the energy that the last `evaluate` returned, in joules.
-    left_out : int
-        Cells whose rotation was not differentiable at the last consistent tangent, and which
-        therefore entered with the rotation-fixed one.
 
     Raises
     ------
     XfemError
         If the material fits neither () nor (m,), the kinematics is unknown, or the penalty is of
         another body. By every method: if an array has another shape or type than the body's.
+
+    Notes
+    -----
+    What a method returns depends on its arguments alone. Rotations in space start from those found
+    last, which makes them quicker to find, and differ by round-off.
     """
 
     has_stress = True  # that can be averaged over a step; springs (`verify.methods`) have none
@@ -72,30 +115,19 @@ class InternalForce:
         material: Material,
         kinematics: Kinematics = "corotational",
         kernels: Kernels = PLAIN,
-        ghost: GhostPenalty | None = None,
+        ghost: Penalty | None = None,
     ) -> None:
         if ghost is not None and ghost.phantom is not phantom:
             raise XfemError("the ghost penalty belongs to another body; expected one of this one")
         check_choice(kinematics, Kinematics, "kinematics")
-        self.phantom, self.kinematics, self.kernels = phantom, kinematics, kernels
-        self.ghost, self.penalty_energy = ghost, 0.0
+        self.phantom, self.kinematics = phantom, kinematics
+        self.kernels, self.ghost = kernels, ghost
         self.elements = elements_of(phantom, material)
-        self.left_out = 0
         cells, space = len(phantom.cells), phantom.mesh.space
-        self._rotations = np.tile(np.eye(space), (cells, 1, 1))
-        self._quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1))  # where rotations start
-        self._gradient = np.empty((cells, space, space))
+        self._unturned = np.tile(np.eye(space), (cells, 1, 1))
+        self._quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1))
         self._shape = (phantom.node_count, space)
-        self._pass: OnePass | None = None
-        self._passed = False  # whether the last rotations are those of the pass
-
-    @property
-    def rotations(self) -> Floats:
-        """(p, d, d) rotation of each cell at the last evaluation."""
-        if self._passed and self._pass is not None:
-            self._pass.write_rotations(self._rotations)
-            self._passed = False
-        return self._rotations
+        self._pass: OnePass | None = None  # of the sparsity that was asked for last
 
     @property
     def is_corotational(self) -> bool:
@@ -109,18 +141,38 @@ class InternalForce:
 
     @property
     def has_one_pass(self) -> bool:
-        """Whether `linearise` takes the one pass of the kernels: tetrahedra, none aggregated."""
-        solid = self.phantom.mesh.dim == 3 and self.phantom.aggregation is None
-        return solid and self.kernels.one_pass is not None
+        """Whether force and stiffness are found in one pass of the kernels: of tetrahedra."""
+        return self.phantom.mesh.dim == 3 and self.kernels.one_pass is not None
+
+    @property
+    def couplings(self) -> Ints | None:
+        """(k, 2) dof nodes that the penalty alone couples, if there is one."""
+        return None if self.ghost is None else self.ghost.couplings
+
+    def configuration(self, displacement: Floats) -> Configuration:
+        """Deformation gradients and rotations at a displacement (N, d)."""
+        F = self.deformation(displacement)
+        if not self.is_corotational:
+            return Configuration(displacement, F, self._unturned)
+        R = np.empty_like(F)
+        if self._shape[1] == 2:
+            rotations_in_plane(F, R)
+        else:
+            rotations_in_space(F, self._quaternions, R)
+        return Configuration(displacement, F, R)
 
     def deformation(self, displacement: Floats) -> Floats:
-        """Deformation gradients (p, d, d), of membranes zero across their plane; overwritten."""
+        """Deformation gradients (p, d, d) at a displacement (N, d), of membranes as above."""
+        return self._gradient(displacement, 1.0)
+
+    def _gradient(self, displacement: Floats, share: float) -> Floats:
         self._check(displacement=displacement)
-        deform(self.elements, self.phantom.extend(displacement), 1.0, self._gradient)
-        return self._gradient
+        found = np.empty_like(self._unturned)
+        deform(self.elements, self.phantom.extend(displacement), share, found)
+        return found
 
     def evaluate(self, displacement: Floats, out: Floats | None = None) -> tuple[Floats, float]:
-        """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
+        """Return internal force (N, d) in newtons and energy in joules, that of a penalty included.
 
         Parameters
         ----------
@@ -129,27 +181,29 @@ class InternalForce:
         out : (N, d) float array, optional
             Overwritten with the force.
         """
+        return self.evaluate_at(self.configuration(displacement), out)
+
+    def evaluate_at(self, at: Configuration, out: Floats | None = None) -> tuple[Floats, float]:
+        """As `evaluate`, with the rotations at hand."""
         force = np.empty(self._shape) if out is None else out
         self._check(force=force)
-        F = self.deformation(displacement)
-        if self.is_corotational:
-            if self._shape[1] == 2:
-                rotations_in_plane(F, self._rotations)
-            else:
-                rotations_in_space(F, self._quaternions, self._rotations)
-            self._passed = False
         force[:] = 0.0
-        energy = self._add_force(F, 1.0, 1.0, force)
-        if self.ghost is not None:
-            penalty, self.penalty_energy = self.ghost.force(displacement)
-            force += penalty
-        return force, energy + self.penalty_energy
+        energy = self._add_force(at.R, at.F, 1.0, 1.0, force)
+        self.add_penalty(at.displacement, 1.0, force)
+        return force, energy + self.penalty_energy(at.displacement)
 
-    def add_tangent_product(self, vector: Floats, scale: float, out: Floats) -> None:
-        """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`."""
+    def penalty_energy(self, displacement: Floats) -> float:
+        """Energy of the penalty in joules, which `evaluate` includes; zero without one."""
+        if self.ghost is None:
+            return 0.0
+        return 0.5 * float(np.vdot(displacement, self.ghost.matrix @ displacement))
+
+    def add_tangent_product(
+        self, at: Configuration, vector: Floats, scale: float, out: Floats
+    ) -> None:
+        """Add `scale` K v (N, d), K the rotation-fixed tangent of a configuration, to `out`."""
         self._check(vector=vector, force=out)
-        deform(self.elements, self.phantom.extend(vector), 0.0, self._gradient)
-        self._add_force(self._gradient, 0.0, scale, out)
+        self._add_force(at.R, self._gradient(vector, 0.0), 0.0, scale, out)
         self.add_penalty(vector, scale, out)
 
     def add_penalty(self, vector: Floats, scale: float, out: Floats) -> None:
@@ -157,9 +211,9 @@ class InternalForce:
         if self.ghost is not None:
             out += scale * (self.ghost.matrix @ vector)
 
-    def _add_force(self, F: Floats, share: float, scale: float, out: Floats) -> float:
+    def _add_force(self, R: Floats, F: Floats, share: float, scale: float, out: Floats) -> float:
         corner_force = np.zeros_like(self.phantom.corners.node_points)
-        energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
+        energy = add_force(self.elements, R, F, share, scale, corner_force)
         out += self.phantom.restrict(corner_force)
         return float(energy)
 
@@ -178,17 +232,18 @@ class InternalForce:
 
     def add_stiffness(
         self,
+        at: Configuration,
         pattern: BlockPattern,
         blocks: Floats,
         scale: float = 1.0,
         kind: TangentKind = "rotation-fixed",
-        displacement: Floats | None = None,
         least: float = 0.0,
-    ) -> None:
-        """Add `scale` times a tangent at the last evaluation to the nodal blocks.
+    ) -> int:
+        """Add `scale` times a tangent to the nodal blocks.
 
         Parameters
         ----------
+        at : Configuration
         pattern : BlockPattern
             Its first cells must be those of the body.
         blocks : (B, d, d) float array
@@ -196,46 +251,46 @@ class InternalForce:
             Rotations held; the same and the geometric stiffness of membranes, which has no
             negative mode either; the second derivative of the potential; the geometric stiffness
             of a membrane alone.
-        displacement : (N, d) float array, optional
-            That of the last evaluation; needed for all but the rotation-fixed tangent.
         least : float
             Tension over μ that every direction of a membrane is taken to have at least: without it
             what is slack has no stiffness across its plane.
 
+        Returns
+        -------
+        int
+            Cells without a differentiable rotation, which entered the consistent tangent with the
+            rotation-fixed one.
+
         Raises
         ------
         XfemError
-            If the kind is unknown, needs a displacement that is not given or a membrane, or an
-            array is not of the body.
+            If the kind is unknown or needs a membrane, or an array is not of the body.
         """
         self._check_blocks(pattern, blocks)
         check_choice(kind, TangentKind, "stiffness")
         kind = kind if self.is_corotational or kind == "tension" else "rotation-fixed"
-        if kind != "rotation-fixed" and displacement is None:
-            raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
         targets, added = pattern.targets[: len(self.phantom.cells)], pattern.unfold(blocks)
+        left_out = 0
         if kind in ("rotation-fixed", "geometric"):
-            add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
+            add_rotation_fixed(self.elements, at.R, scale, targets, added)
         if kind == "tension" or (kind == "geometric" and self.is_membrane):
-            assert displacement is not None
-            tension, n = self._tension(displacement, least)
-            moduli = np.einsum("pk,pl,pnm->pknlm", n, n, tension)
+            tension, n = self._tension(at, least)
+            moduli = np.einsum("pk,pl,pnm->pknlm", n, n, tension)  # A = n nᵀ ⊗ S
             add_moduli(self.elements, moduli, scale, targets, added)
         if kind == "consistent":
-            assert displacement is not None
-            F, R, self.left_out = self.deformation(displacement), self.rotations, 0
-            for start in range(0, len(F), _CHUNK):
+            for start in range(0, len(at.F), _CHUNK):
                 some = slice(start, start + _CHUNK)
                 elements = self.elements.part(some)
-                moduli, left_out = consistent_moduli(elements, R[some], F[some])
+                moduli, singular = consistent_moduli(elements, at.R[some], at.F[some])
                 add_moduli(elements, moduli, scale, targets[some], added)
-                self.left_out += left_out
+                left_out += singular
         pattern.fold(added, blocks)
         if self.ghost is not None:
             self.ghost.add_stiffness(pattern, blocks, scale)
+        return left_out
 
     def add_tension_product(
-        self, displacement: Floats, vector: Floats, scale: float, out: Floats
+        self, at: Configuration, vector: Floats, scale: float, out: Floats
     ) -> None:
         """Add `scale` times the geometric stiffness of a membrane times a vector (N, 3) to `out`.
 
@@ -245,8 +300,9 @@ class InternalForce:
             If the body is no membrane, or an array not of it.
         """
         self._check(vector=vector, force=out)
-        tension, n = self._tension(displacement, 0.0)
+        tension, n = self._tension(at, 0.0)
         b, w = self.elements.gradients[self.elements.parent], scale * self.elements.volumes
+        # f_i = w n (b_i · S ∇φ), ∇φ = Σ b_j (n · v_j)
         across = self.phantom.extend(vector)[self.phantom.cells] @ n[:, :, None]
         pull = b @ tension @ (b.transpose(0, 2, 1) @ across)
         out += self.nodal_force(w[:, None, None] * pull * n[:, None, :])
@@ -258,13 +314,13 @@ class InternalForce:
         columns = forces.reshape(-1, forces.shape[2]).T
         return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))
 
-    def _tension(self, displacement: Floats, least: float) -> tuple[Floats, Floats]:
+    def _tension(self, at: Configuration, least: float) -> tuple[Floats, Floats]:
         """Positive tension (p, 3, 3) of a membrane, and its turned normals (p, 3)."""
         if not self.is_membrane:
             raise XfemError("geometric stiffness of a solid; expected a membrane in space")
-        R, elements = self.rotations, self.elements
-        tension = positive_tension(elements, R, self.deformation(displacement), least)
-        return tension, np.einsum("pkl,pl->pk", R, elements.normals[elements.parent])
+        tension = positive_tension(self.elements, at.R, at.F, least)
+        normals = self.elements.normals[self.elements.parent]
+        return tension, np.einsum("pkl,pl->pk", at.R, normals)
 
     def stiffness(
         self,
@@ -273,22 +329,10 @@ class InternalForce:
         kind: TangentKind = "consistent",
     ) -> Floats:
         """(B, d, d) nodal blocks of a tangent in N/m, at a displacement or at rest."""
-        at = np.zeros(self._shape) if displacement is None else displacement
-        self.evaluate(at)
+        at = self.configuration(np.zeros(self._shape) if displacement is None else displacement)
         blocks = np.zeros((len(pattern.columns), self._shape[1], self._shape[1]))
-        self.add_stiffness(pattern, blocks, 1.0, kind, at)
+        self.add_stiffness(at, pattern, blocks, 1.0, kind)
         return blocks
-
-    def prepare(self, pattern: BlockPattern) -> None:
-        """Do what `linearise` does otherwise when it is first called with a sparsity."""
-        if self.has_one_pass:
-            self._one_pass(pattern)
-
-    def _one_pass(self, pattern: BlockPattern) -> OnePass:
-        if self._pass is None or self._pass.pattern is not pattern:
-            assert self.kernels.one_pass is not None
-            self._pass = self.kernels.one_pass(self.elements, pattern, self.is_corotational)
-        return self._pass
 
     def linearise(
         self,
@@ -301,8 +345,8 @@ class InternalForce:
         blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
-    ) -> None:
-        """Overwrite force and stiffness as an implicit step wants them; update rotations.
+    ) -> Configuration | None:
+        """Overwrite force and stiffness as an implicit step wants them.
 
         Parameters
         ----------
@@ -321,60 +365,73 @@ class InternalForce:
             Without it what is below the diagonal may be anything.
         rotational : float
             Of what the consistent tangent has beyond the rotation-fixed one.
+
+        Returns
+        -------
+        Configuration or None
+            What was found on the way; nothing by the one pass of the kernels.
         """
         rotational = rotational if self.is_corotational else 0.0
         if self.has_one_pass:
-            self._check(displacement=displacement, velocity=velocity, force=force)
-            self._check_blocks(pattern, blocks)
-            moved = displacement, velocity, implicit
-            one_pass = self._one_pass(pattern)
-            self.left_out = one_pass(*moved, scale, force, blocks, whole, rotational)
-            self._passed = self.is_corotational
+            self._check(displacement=displacement, velocity=velocity)
+            u, v = self.phantom.extend(displacement), self.phantom.extend(velocity)
+
+            def run(one: OnePass, f: Floats, K: Floats, all_blocks: bool) -> None:
+                one(u, v, implicit, scale, f, K, all_blocks, rotational)
+
+            self.in_one_pass(pattern, run, force, blocks, whole)
             if self.ghost is not None:
                 self.add_penalty(displacement + implicit * velocity, 1.0, force)
                 self.ghost.add_stiffness(pattern, blocks, scale)
-            return
-        self.evaluate(displacement, force)
+            return None
+        at = self.configuration(displacement)
+        self.evaluate_at(at, force)
         if implicit != 0.0:
-            self.add_tangent_product(velocity, implicit, force)
+            self.add_tangent_product(at, velocity, implicit, force)
         blocks[:] = 0.0
         if scale != rotational:
-            self.add_stiffness(pattern, blocks, scale - rotational)
+            self.add_stiffness(at, pattern, blocks, scale - rotational)
         if rotational != 0.0:
-            self.add_stiffness(pattern, blocks, rotational, "consistent", displacement)
+            self.add_stiffness(at, pattern, blocks, rotational, "consistent")
+        return at
 
-    def linearise_average(
+    def in_one_pass(
         self,
         pattern: BlockPattern,
-        start: Floats,
-        end: Floats,
-        substituted: Bools,
-        scale: float,
+        run: Callable[[OnePass, Floats, Floats, bool], None],
         force: Floats,
         blocks: Floats,
         whole: bool = True,
-        rotational: float = 0.0,
     ) -> None:
-        """Overwrite the force averaged over a step, and the stiffness at its end, in one pass.
+        """Overwrite force and stiffness of the dof nodes by a pass over the corners.
 
         Parameters
         ----------
-        start, end : (N, 3) float array
-            Displacements.
-        substituted : (p,) bool array
-            Cells that have taken the substitute for the averaged stress; updated.
-        pattern, scale, force, blocks, whole, rotational
+        pattern : BlockPattern
+        run : callable
+            Overwrites force and blocks of the corners by the pass that it is given.
+        force, blocks, whole
             As for `linearise`.
         """
-        assert self.has_one_pass
-        self._check(start=start, end=end, force=force)
+        self._check(force=force)
         self._check_blocks(pattern, blocks)
-        average = self._one_pass(pattern).average
-        self.left_out = average(start, end, scale, rotational, substituted, force, blocks, whole)
-        self._passed = True
-        if self.ghost is not None:
-            self.add_penalty(0.5 * (start + end), 1.0, force)
-            self.ghost.add_stiffness(pattern, blocks, scale)
+        one, corners = self.prepare(pattern), pattern.corners
+        if corners is pattern:
+            run(one, force, blocks, whole)
+            return
+        corner_force = np.empty_like(self.phantom.corners.node_points)
+        added = pattern.unfold(blocks)
+        run(one, corner_force, added, True)
+        force[:] = self.phantom.restrict(corner_force)
+        blocks[:] = 0.0
+        pattern.fold(added, blocks)
+
+    def prepare(self, pattern: BlockPattern) -> OnePass:
+        """Make the pass for a sparsity, which `linearise` does otherwise when first called."""
+        assert self.kernels.one_pass is not None
+        if self._pass is None or self._pass.pattern is not pattern.corners:
+            self._pass = self.kernels.one_pass(self.elements, pattern.corners, self.is_corotational)
+        return self._pass
 
 
 def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:

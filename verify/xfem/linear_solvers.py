@@ -220,8 +220,8 @@ def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> Floats:
 class OnePass(Protocol):
     """Force and stiffness of corotational tetrahedra in one pass over the elements.
 
-    `InternalForce.linearise` and `linearise_average` of `verify.xfem.internal_force` ask for it and
-    say what the arguments are.
+    `InternalForce.linearise` of `verify.xfem.internal_force` says what the arguments are; where
+    corners follow others, nodes and blocks are those of the corners.
     """
 
     pattern: BlockPattern
@@ -236,8 +236,8 @@ class OnePass(Protocol):
         blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
-    ) -> int:
-        """Overwrite force (N, 3) and blocks (B, 3, 3); return the cells without rotational part."""
+    ) -> object:
+        """Overwrite force (N, 3) and blocks (B, 3, 3)."""
         ...
 
     def average(
@@ -250,12 +250,12 @@ class OnePass(Protocol):
         force: Floats,
         blocks: Floats,
         whole: bool = True,
-    ) -> int:
-        """Overwrite the force averaged over a step, and the stiffness at its end."""
-        ...
+    ) -> object:
+        """Overwrite the force averaged over a step, and the stiffness at its end.
 
-    def write_rotations(self, rotations: Floats) -> None:
-        """Write the rotations (p, 3, 3) of the last pass."""
+        `start` and `end` (N, 3) are displacements, `substituted` (p,) cells that have taken the
+        substitute for the averaged stress, which is updated.
+        """
         ...
 
 

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from verify.xfem.arrays import Bools, Floats, Ints, finite_array
+from verify.xfem.arrays import Floats, Ints, finite_array
 from verify.xfem.block_pattern import BlockPattern, body_pattern, find_places, pattern_places
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.phantom import Aggregation, PhantomMesh
+from verify.xfem.phantom import PhantomMesh
 
 
 @dataclass(frozen=True)
@@ -121,70 +121,6 @@ class Mass:
         return pattern_places(pattern, rows, columns)
 
 
-@dataclass(frozen=True)
-class AggregatedMass(Mass):
-    """CᵀMC: the mass of the corners on unknowns that some of them follow, u = C û.
-
-    It couples the unknowns of root cells that others follow, and is diagonal elsewhere if M is.
-    Lumped anew it would not bound the explicit step: from K ≤ ω²M follows CᵀKC ≤ ω²CᵀMC, and
-    nothing of other masses.
-
-    Attributes
-    ----------
-    of_corners : Mass
-        M.
-    aggregation : Aggregation
-    """
-
-    of_corners: Mass
-    aggregation: Aggregation
-
-    @staticmethod
-    def of(of_corners: Mass, aggregation: Aggregation) -> "AggregatedMass":
-        """Aggregate a mass of the corners."""
-        extension, back = aggregation.extension, aggregation.restriction
-        matrix = csr_array(back @ of_corners.matrix @ extension)
-        matrix.sum_duplicates()
-        return AggregatedMass(matrix, None, back @ of_corners.weights, of_corners, aggregation)
-
-    @property
-    def keeps_element_steps(self) -> bool:
-        """Whether no cut makes the explicit step smaller than that of the smallest element."""
-        return self.of_corners.keeps_element_steps
-
-    def solve(self, forces: Floats) -> Floats:
-        """M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
-        coupled, factor = self._coupled
-        found = forces / self.matrix.diagonal()[:, None]
-        if len(coupled):
-            found[coupled] = factor.solve(forces[coupled])
-        return found
-
-    @cached_property
-    def _coupled(self):
-        """Unknowns that the matrix couples, and the factor of their block."""
-        rows, columns, _ = self.entries
-        coupled = np.unique(rows[rows != columns])
-        if len(coupled) == 0:
-            return coupled, None
-        return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
-
-    def project(self, corner_values: Floats, held: Bools, values: Floats) -> Floats:
-        """Values (N, d) nearest to those at the corners in the mass, given where held (N, d).
-
-        Of a velocity: linear and angular momentum of every part without a support stay.
-        """
-        moment = self.aggregation.restriction @ self.of_corners.apply(corner_values)
-        found = np.where(held, values, 0.0)
-        moment -= self.apply(found)
-        for axis in range(found.shape[1]):
-            free = np.flatnonzero(~held[:, axis])
-            if len(free):
-                factor = splu(csc_array(self.matrix[free][:, free]))
-                found[free, axis] = factor.solve(moment[free, axis])
-        return found
-
-
 def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
     """(m,) density of the uncut cells.
 
@@ -215,7 +151,8 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
         If the density is not positive and finite, or neither one value nor one per cell.
     """
     if phantom.aggregation is not None:
-        return AggregatedMass.of(side_wise_mass(phantom.corners, density), phantom.aggregation)
+        found: Mass = phantom.aggregation.mass(side_wise_mass(phantom.corners, density))
+        return found
     corners = phantom.cells.shape[1]
     share = phantom.volumes * cell_densities(phantom.mesh, density)[phantom.parent] / corners
     weights = np.bincount(phantom.cells.ravel(), np.repeat(share, corners))
@@ -245,7 +182,8 @@ def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     Its explicit step vanishes with the smallest piece. Parameters are those of `side_wise_mass`.
     """
     if phantom.aggregation is not None:
-        return AggregatedMass.of(consistent_mass(phantom.corners, density), phantom.aggregation)
+        found: Mass = phantom.aggregation.mass(consistent_mass(phantom.corners, density))
+        return found
     return assembled_mass(phantom, density, second_moments(phantom))
 
 

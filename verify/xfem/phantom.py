@@ -8,6 +8,7 @@ Heaviside enrichment (2.48), in side-wise unknowns. Force, mass and solvers need
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -46,28 +47,37 @@ class SubCells:
     zero_points: ZeroPoints
 
 
-@dataclass(frozen=True)
-class Aggregation:
-    """Corners of a cut mesh that have no unknown of their own.
+class Constraint(Protocol):
+    """Corners of a cut mesh that follow dof nodes, u = C û; see `verify.xfem.aggregation`.
 
     Attributes
     ----------
     corners : PhantomMesh
         The same body with a dof node for each corner.
     extension : (N_corners, N) csr_array
-        Corner values from those of the dof nodes; it reproduces linear fields.
+        C: corner values from those of the dof nodes; it reproduces linear fields.
+    restriction : (N, N_corners) csr_array
+        Cᵀ.
     node : (N_corners,) int array
         Dof node of each corner; −1 for one that follows others.
     """
 
-    corners: "PhantomMesh"
-    extension: csr_array
-    node: Ints
+    @property
+    def corners(self) -> "PhantomMesh": ...  # noqa: D102
+    @property
+    def extension(self) -> csr_array: ...  # noqa: D102
+    @property
+    def restriction(self) -> csr_array: ...  # noqa: D102
+    @property
+    def node(self) -> Ints: ...  # noqa: D102
 
-    @cached_property
-    def restriction(self) -> csr_array:
-        """(N, N_corners) transpose of the extension."""
-        return csr_array(self.extension.T)
+    def pattern(self, couplings: Ints) -> Any:
+        """Sparsity of CᵀKC, with further couplings (k, 2) of dof nodes."""
+        ...
+
+    def mass(self, of_corners: Any) -> Any:
+        """Mass CᵀMC of the dof nodes from that of the corners."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,7 @@ class PhantomMesh:
         Nodal level-set values within round-off taken as exactly zero.
     dropped : int
         Pieces left out because their volume is exactly zero.
-    aggregation : Aggregation, optional
+    aggregation : Constraint, optional
         Corners that follow the dof nodes of a root cell.
     """
 
@@ -119,7 +129,7 @@ class PhantomMesh:
     sub_cells: SubCells
     snapped: int
     dropped: int
-    aggregation: "Aggregation | None" = None
+    aggregation: Constraint | None = None
 
     @property
     def node_count(self) -> int:

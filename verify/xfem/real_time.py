@@ -18,6 +18,7 @@ from verify.xfem.body import (
     check_step,
 )
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import Configuration
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.supports import Supports
 
@@ -65,15 +66,13 @@ class RealTimeEuler:
         force, h = self.body.force, self.step_size
         external = self.body.external(state.time + h).copy()
         before = state.copy()
-        self.advance(state)
-        # rotations are still those at the start of the step, with which it was linearised
+        at = self._advance(state) or force.configuration(before.displacement)
         internal = self._internal.copy()
-        force.add_tangent_product(before.velocity, -(h + self.body.damping.stiffness), internal)
-        force.add_tangent_product(state.velocity, h, internal)
+        force.add_tangent_product(at, before.velocity, -(h + self.body.damping.stiffness), internal)
+        force.add_tangent_product(at, state.velocity, h, internal)
         if force.is_membrane:
-            change = state.velocity - before.velocity
-            force.add_tension_product(before.displacement, change, h, internal)
-        return StepForces(internal, external, self.body.viscous(state.velocity))
+            force.add_tension_product(at, state.velocity - before.velocity, h, internal)
+        return StepForces(internal, external, self.body.viscous(state.velocity, at))
 
     def advance(self, state: MotionState) -> None:
         """Advance by one step without accounting for the forces: the hot path.
@@ -83,9 +82,12 @@ class RealTimeEuler:
         StepFailedError
             If the solver fails or the result is not finite; the state is left as it was.
         """
+        self._advance(state)
+
+    def _advance(self, state: MotionState) -> Configuration | None:
         check_state(state, self.body.shape)
         driven = self._driven(state)
-        self.linearise(state, bool(driven.any()) or not self.solver.reads_half)
+        at = self.linearise(state, bool(driven.any()) or not self.solver.reads_half)
         self._support(driven)
         try:
             self.solver.factorize(self.blocks)
@@ -102,6 +104,7 @@ class RealTimeEuler:
         state.velocity += self._change
         state.displacement += self.step_size * state.velocity
         state.time += self.step_size
+        return at
 
     def _solve(self) -> None:
         """Write the change of velocity; an iterative solver starts from where the last three point.
@@ -116,25 +119,29 @@ class RealTimeEuler:
         self._changes.insert(0, self._changes.pop())
         self._changes[0][:] = self._change
 
-    def linearise(self, state: MotionState, whole: bool = True) -> None:
-        """Write M + hC + h²K, or its upper half, into `blocks`, the right-hand side into `load`."""
+    def linearise(self, state: MotionState, whole: bool = True) -> Configuration | None:
+        """Write M + hC + h²K, or its upper half, into `blocks`, the right-hand side into `load`.
+
+        Returns the configuration of the start, unless the kernels do without it.
+        """
         body, h = self.body, self.step_size
         damping = body.damping
         implicit = h + damping.stiffness
-        body.force.linearise(
+        at = body.force.linearise(
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
             self._internal, self.blocks, whole,
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
-            at = state.displacement
+            assert at is not None
             body.force.add_tension_product(at, state.velocity, h, self._internal)
-            body.force.add_stiffness(body.pattern, self.blocks, h * h, "tension", at)
+            body.force.add_stiffness(at, body.pattern, self.blocks, h * h, "tension")
         add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:
             self.load -= damping.mass * body.mass.apply(state.velocity)
         self.load *= h
+        return at
 
     def _driven(self, state: MotionState) -> Floats:
         """Change of velocity (k, d) with which supported nodes go where they are prescribed."""

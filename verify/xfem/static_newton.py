@@ -53,8 +53,7 @@ class Newton:
 
     def __init__(self, force: InternalForce, fixed: Bools) -> None:
         self._force, self._fixed = force, fixed
-        ghost = force.ghost
-        self._pattern = body_pattern(force.phantom, None if ghost is None else ghost.couplings)
+        self._pattern = body_pattern(force.phantom, force.couplings)
         space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         self._internal = np.empty(fixed.shape)
@@ -250,7 +249,8 @@ class Newton:
         at = displacement
         force.linearise(pattern, at, at, 0.0, 1.0, self._internal, blocks, rotational=rotational)
         if rotational == 0.0 and force.is_membrane:
-            force.add_stiffness(pattern, blocks, 1.0, "tension", displacement, least)
+            found = force.configuration(displacement)
+            force.add_stiffness(found, pattern, blocks, 1.0, "tension", least)
 
     def _solved(self, load: Floats) -> Floats:
         """Solve with the blocks.

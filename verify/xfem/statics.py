@@ -11,8 +11,7 @@ from verify.xfem.arrays import Bools, Floats, check_choice, finite_array
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import NotConvergedError
-from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.internal_force import InternalForce
+from verify.xfem.internal_force import InternalForce, Penalty
 from verify.xfem.linear_solvers import PLAIN, Kernels, LinearSolver
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
@@ -64,7 +63,7 @@ def solve_static(
     supports: Supports,
     load: Floats | None = None,
     solver: Method = "auto",
-    ghost: GhostPenalty | None = None,
+    ghost: Penalty | None = None,
     kernels: Kernels = PLAIN,
 ) -> StaticSolution:
     """Solve K u = f.
@@ -81,8 +80,8 @@ def solve_static(
         Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
         ``auto`` takes the faster one: iterations for solids of 2000 nodes and more, without a ghost
         penalty; and the factorisation after all if they do not converge (thin bodies that bend).
-    ghost : GhostPenalty, optional
-        Added to the stiffness.
+    ghost : Penalty, optional
+        A `verify.xfem.ghost_penalty`, added to the stiffness.
     kernels : Kernels
         Whose linear solvers are taken.
 
@@ -101,7 +100,7 @@ def solve_static(
     check_choice(solver, Method, "solver")
     stiffness = InternalForce(phantom, material, "linear", kernels, ghost)
     clock = [perf_counter()]
-    pattern = body_pattern(phantom, ghost.couplings if ghost else None)
+    pattern = body_pattern(phantom, stiffness.couplings)
     iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(phantom))
     limit = _MOST if solver == "auto" else 5 * _MOST
     inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, limit if iterates else 0)
@@ -116,17 +115,18 @@ def solve_static(
     displacement = inverse.solve(right, insists=solver == "iterative") + supports.values
     clock.append(perf_counter())
     internal, energy = stiffness.evaluate(displacement)
+    penalty = stiffness.penalty_energy(displacement)
     unbalanced = internal - force
     # in a rigid motion all forces are round-off of the products that they are sums of
     products = stiffest * np.abs(displacement).max()
     scale = max(np.abs(internal).max(), np.abs(force).max(), products, np.finfo(float).tiny)
     return StaticSolution(
         displacement=displacement,
-        strain_energy=energy - stiffness.penalty_energy,
+        strain_energy=energy - penalty,
         reaction=np.where(supports.fixed, unbalanced, 0.0),
         residual=float(np.abs(unbalanced[~supports.fixed]).max(initial=0.0) / scale),
         timings=dict(zip(_PHASES, np.diff(clock).tolist(), strict=True)),
-        penalty_energy=stiffness.penalty_energy,
+        penalty_energy=penalty,
         solver="direct" if "direct" in inverse.used else "iterative",
     )
 
