@@ -7,7 +7,7 @@ from thesis_stages import CASES, stage
 from verify.scene import load_scene
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.solvers.cuts_of_scene import cuts_of
-from verify.solvers.openings_of_scene import opening_times
+from verify.solvers.openings_of_scene import Openings
 from verify.xfem.phantom import cut_mesh
 
 
@@ -24,7 +24,7 @@ def test_played_and_judged_open_the_same_elements_at_the_same_steps(name) -> Non
     scene, played = load_scene(CASES / f"{name}.toml"), stage(name)
     cuts = cuts_of(scene, 0.1)
     phantom = cut_mesh(played.mesh, cuts)
-    opening = opening_times(scene.cuts, phantom, [0.0] * len(cuts))
+    opening = Openings(scene.cuts, cuts, [0.0] * len(cuts)).of_cells(phantom)
     alone = (~np.isnan(opening)).sum(axis=1) == 1
     cutter = SemiProgressiveCutter(played.mesh)
     for path in played.strokes:

@@ -19,7 +19,7 @@ from tool_path_scenes import (
 from verify.compare.ledger import energy_scale, total_energy
 from verify.scene import load_scene
 from verify.solvers.interface import find_solver
-from verify.solvers.openings_of_scene import opening_times
+from verify.solvers.openings_of_scene import Openings
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_steps import SCHEMES
 from verify.xfem.cuts import Polyline
@@ -94,7 +94,7 @@ def test_an_element_opens_when_the_blade_has_passed_all_edges_that_it_crosses(tm
     mesh = rectangle_mesh((9, 6), (0, 0), (1.0, 0.7))
     start, end = np.array([-0.1, 0.21]), np.array([1.1, 0.52])
     phantom = cut_mesh(mesh, [Polyline([start, end])])
-    times = opening_times(scene.cuts, phantom, [0.0])[:, 0]
+    times = Openings(scene.cuts, [], [0.0]).of_cells(phantom)[:, 0]
     along, length = (end - start) / np.linalg.norm(end - start), np.linalg.norm(end - start)
     split = np.bincount(phantom.parent) > 1
     assert (np.isnan(times) == ~split).all()

@@ -20,13 +20,12 @@ from reference.tied_solver import lasting_ties
 from reference.weak_place import naming_weak_places
 from verify.declared_mass import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
-from verify.scene.cuts import Cut
 from verify.scene.initial import starts_open
 from verify.solvers.runs import Record
+from verify.solvers.timeline import march, step_sizes, timeline_of
 
 Array = NDArray[np.float64]
-_SAME = 1e-12  # of the duration: times that close are one
-_PASSED = 1e-9  # of the duration: what is passed so little later counts as passed
+_JUST = 1e-12  # of the duration: loads are taken that much later, after a jump
 _MOST_TIES = 6000  # of which the dense factor has 0.3 GB
 _SOLVES = 20  # that take as long as a factorisation
 SCHEMES = ("newmark", "energy_momentum", "implicit_euler", "generalised_alpha")
@@ -47,7 +46,7 @@ class Marching:
     delay : float
         By which facets on tool paths open late, s.
     halvings : int
-        How often every step is halved that would be taken.
+        As of `timeline.march`.
     """
 
     name: str
@@ -55,13 +54,6 @@ class Marching:
     spectral_radius: float = 0.8
     delay: float = 0.0
     halvings: int = 0
-
-    def count(self, span: float) -> int:
-        """Count the equal steps over a time between two stops, s.
-
-        The steps are halved and not `largest`: where stops cut it short that would change nothing.
-        """
-        return max(1, int(np.ceil(span / self.largest * (1 - 1e-9)))) * 2**self.halvings
 
     def scheme(self) -> tuple[Scheme, bool]:
         """Give the scheme, and whether the internal force is the mean of a step."""
@@ -112,11 +104,14 @@ def move(
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
-    return _Mover(scene, space, exact, marching, record, comm, pressure).run(trial)
+    return TiedMotion(scene, space, exact, marching, record, comm, pressure).run(trial)
 
 
-class _Mover:
-    """One motion, from stop to stop: outputs, openings of whole cuts, kinks of histories."""
+class TiedMotion:
+    """A body on a mesh with all its cuts, tied where they are closed: a `timeline.Mover`.
+
+    Parameters are those of `move`.
+    """
 
     def __init__(
         self,
@@ -130,50 +125,109 @@ class _Mover:
     ) -> None:
         self.scene, self.space, self.exact = scene, space, exact
         self.comm, self.marching, self.record = comm, marching, record
+        self.timeline = timeline_of(scene, kinks=True)
         pressure = pressure and scene.analysis.kinematics == "linear"
         self.unknowns = MIXED if pressure else "displacement"
-        self.times = np.array(scene.analysis.output_times)
-        self.end = float(self.times[-1])
         phases = ("loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
         with record.timed("loading"):
             self.body = MovingBody(scene, space, exact, pressure)
             self.facing = facing_nodes(space)
-            self.opening = self._snapped(opening_times(scene, space.mesh, marching.delay))
+            self.opening = opening_times(scene, space.mesh, marching.delay)
             self.closed = np.ones(len(self.opening), dtype=bool)
             self.planned = self._plan()
         self.ledger = Ledger()
         self.steppers: dict[float, Stepper] = {}
-        self.steps = self.openings = 0
-        scheme, _ = marching.scheme()
+        self.outputs: list[State] = []
+        self.openings = 0
+        self.begun = False  # whether something has jumped since the last step
+        self.scheme, self.averaged = marching.scheme()
         # of others the old acceleration has no part in the step, or only with the forces of then
-        self.softly = scene.analysis.damping[1] > 0.0 and scheme.alpha_m != scheme.alpha_f
+        self.softly = scene.analysis.damping[1] > 0.0 and (
+            self.scheme.alpha_m != self.scheme.alpha_f
+        )
 
     def run(self, trial: bool) -> dict[str, Any]:
-        """Run to the end, or for one step; return the fields."""
-        record = self.record
+        """March to the end, or for one step; return the fields."""
+        record, marching = self.record, self.marching
         with naming_weak_places(self.scene, self.space, self.body.ties):
             with record.timed("initial state"):
-                state = self._initial()
-            states = self._march(state, trial)
-        shape = (len(states), -1, self.space.dimension)
-        linear = self.scene.analysis.kinematics == "linear"
+                self.state = self._initial()
+            self.ledger.open(self.body, self.state)
+            sizes = march(self.timeline, self, marching.halvings, trial)
         for stepper in self.steppers.values():
             stepper.close()
         newton = sum(stepper.solves for stepper in self.steppers.values())
-        record.iterations |= {"steps": self.steps, "newton": newton}
-        record.notes |= self._notes()
+        record.iterations |= {"steps": len(sizes), "newton": newton}
+        record.notes |= {
+            "scheme": marching.name,
+            "mass": CONSISTENT,
+            "time step": step_sizes(sizes),
+            "unknowns": self.unknowns,
+        }
+        if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
+            record.notes["openings"] = str(self.openings)
+        linear = self.scene.analysis.kinematics == "linear"
         return {
-            "times": self.times[: len(states)],
-            "displacement": np.reshape([state.displacement for state in states], shape),
-            "velocity": np.reshape([state.velocity for state in states], shape),
-            "acceleration": np.reshape([state.acceleration for state in states], shape)
-            if linear
-            else None,
+            "times": self.timeline.outputs[: len(self.outputs)],
+            "displacement": self._over_time("displacement"),
+            "velocity": self._over_time("velocity"),
+            "acceleration": self._over_time("acceleration") if linear else None,
             "mass": CONSISTENT,
             "ledger": self.ledger.columns(),
             "unknowns": self.space.node_points.size,
         }
+
+    @property
+    def time(self) -> float:
+        """Time of the state, s."""
+        return self.state.time
+
+    @property
+    def largest(self) -> float:
+        """Largest time step, s."""
+        return self.marching.largest
+
+    def open(self, time: float) -> bool:
+        """Untie what the cuts have passed at a time."""
+        self.state.time = time  # without the round-off of the sum of steps
+        return self._untie(time)
+
+    def begin(self) -> None:
+        """Take up what jumps: velocities of supports, and accelerations."""
+        body, state = self.body, self.state
+        with self.record.timed("loading"):
+            state.velocity[body.held] = body.prescribed(state.time)[1]
+            self.ledger.started(body, state)
+            state.acceleration = body.accelerations(self._unbalanced(self._later))
+        self.begun = True
+
+    def put_out(self) -> None:
+        """Keep the state, with the acceleration that balances its forces.
+
+        Where accelerations and forces are those of the same share of a step, it has it already:
+        what is in balance at the start of a step is at its end.
+        """
+        found = self.state.copy()
+        linear = self.scene.analysis.kinematics == "linear"
+        if linear and not self.begun and self.scheme.alpha_m != self.scheme.alpha_f:
+            found.acceleration = self.body.accelerations(self._unbalanced(found.time))
+        self.outputs.append(found)
+        self.ledger.enter(self.body, self.state)
+
+    def step(self, size: float) -> None:
+        """Advance the state by a time, s, and account for it."""
+        if size not in self.steppers:
+            self.steppers[size] = Stepper(self.body, self.scheme, self.averaged, size)
+        if self.begun and self.softly:
+            with self.record.timed("loading"):
+                self.steppers[size].restart(self.state, self._unbalanced(self._later))
+        self.begun = False
+        with self.record.timed("steps"):
+            before = self.state.copy()
+            forces = self.steppers[size].step(self.state)
+        with self.record.timed("accounting"):
+            self.ledger.record(self.body, before, self.state, forces)
 
     def _plan(self) -> bool:
         """Choose between one factorisation with all that is ever tied, and one per opening.
@@ -192,16 +246,8 @@ class _Mover:
         self.body.plan(lasting)
         return True
 
-    def _snapped(self, times: Array) -> Array:
-        """Give output times for those that are the same up to round-off."""
-        if not len(times):
-            return times
-        nearest = self.times[np.abs(self.times[:, None] - times).argmin(axis=0)]
-        return np.where(np.abs(nearest - times) <= _SAME * self.end, nearest, times)
-
-    def _open(self, time: float) -> bool:
-        """Open what is due at a time; say whether anything was."""
-        due = self.closed & (self.opening <= time + _PASSED * self.end)
+    def _untie(self, time: float) -> bool:
+        due = self.closed & (self.opening <= time + self.timeline.close)
         if not due.any():
             return False
         with self.record.timed("loading"):
@@ -219,7 +265,7 @@ class _Mover:
         """State at the time 0, before what opens then."""
         initial, body, d = self.scene.initial, self.body, self.space.dimension
         balanced = isinstance(initial, Equilibrium)
-        if not (starts_open(initial) and self._open(0.0)):
+        if not (starts_open(initial) and self._untie(0.0)):
             self._tie(self.closed)
         u, v = np.zeros((2, self.space.node_points.size))
         if isinstance(initial, Moving):
@@ -246,79 +292,14 @@ class _Mover:
         found = MovingBody(self.scene, before, self.exact).equilibrium()
         return inherit(before, self.space, found.reshape(-1, self.space.dimension)).ravel()
 
-    def _march(self, state: State, trial: bool) -> list[State]:
-        """Step from stop to stop; return the states at the outputs."""
-        own = [float(getattr(cut, "opens_at", 0.0)) for cut in self.scene.cuts if not _grows(cut)]
-        breaks = self._breaks()
-        stops = np.unique([0.0, *self._snapped(np.array(own)), *self.times, *breaks])
-        outputs = []
-        self.ledger.open(self.body, state)
-        for k, stop in enumerate(stops):
-            state.time = float(stop)  # without the round-off of the sum of steps
-            begun = self._open(state.time) or k == 0
-            if begun:
-                self._begin(state)
-            if stop in self.times:
-                outputs.append(self._balanced(state, begun))
-                self.ledger.enter(self.body, state)
-            if k == len(stops) - 1:
-                break
-            if not begun and np.abs(breaks - stop).min(initial=np.inf) <= _SAME * self.end:
-                self._begin(state)
-                begun = True
-            self._advance(state, float(stops[k + 1]), begun, 1 if trial else None)
-            if trial:
-                break
-        return outputs
+    @property
+    def _later(self) -> float:
+        """Time just after the state's, when what jumps then has jumped."""
+        return self.state.time + _JUST * float(self.timeline.outputs[-1])
 
-    def _advance(self, state: State, end: float, begun: bool, most: int | None) -> None:
-        """Step to a time by equal steps, and open on the way what was passed."""
-        span = end - state.time
-        count = self.marching.count(span)
-        size = float(f"{span / count:.14g}")  # the same up to round-off: one stepper
-        if size not in self.steppers:
-            scheme, averaged = self.marching.scheme()
-            self.steppers[size] = Stepper(self.body, scheme, averaged, size)
-        for n in range(most or count):
-            if n and self._open(state.time):
-                self._begin(state, balanced=not self.softly)
-                begun = True
-            if begun and self.softly:
-                with self.record.timed("loading"):
-                    forces = self._unbalanced(state, state.time + _SAME * self.end)
-                    self.steppers[size].restart(state, forces)
-            self._step(self.steppers[size], state)
-            begun = False
-
-    def _begin(self, state: State, balanced: bool = True) -> None:
-        """Take up what jumps: velocities of supports and, if balanced, accelerations."""
-        body = self.body
-        with self.record.timed("loading"):
-            state.velocity[body.held] = body.prescribed(state.time)[1]
-            self.ledger.started(body, state)
-            if balanced:
-                state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
-
-    def _balanced(self, state: State, begun: bool) -> State:
-        """Copy a state, with the acceleration that balances its forces.
-
-        Where accelerations and forces are those of the same share of a step, it has it already:
-        what is in balance at the start of a step is at its end.
-        """
-        found = state.copy()
-        scheme, _ = self.marching.scheme()
-        linear = self.scene.analysis.kinematics == "linear"
-        if linear and not begun and scheme.alpha_m != scheme.alpha_f:
-            found.acceleration = self._acceleration(state, state.time)
-        return found
-
-    def _acceleration(self, state: State, time: float) -> Array:
-        """Acceleration of a state in balance with the loads at a time."""
-        return self.body.accelerations(self._unbalanced(state, time))
-
-    def _unbalanced(self, state: State, time: float) -> Array:
-        """Sum the forces of a state at a time that inertia has to balance, N."""
-        body = self.body
+    def _unbalanced(self, time: float) -> Array:
+        """Sum the forces of the state at a time that inertia has to balance, N."""
+        body, state = self.body, self.state
         law, (mass, stiffness) = body.law, self.scene.analysis.damping
         forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
@@ -326,29 +307,7 @@ class _Mover:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
         return forces
 
-    def _step(self, stepper: Stepper, state: State) -> None:
-        with self.record.timed("steps"):
-            before = state.copy()
-            forces = stepper.step(state)
-        with self.record.timed("accounting"):
-            self.ledger.record(self.body, before, state, forces)
-        self.steps += 1
-
-    def _breaks(self) -> Array:
-        """Return times at which the history of a load or support has a kink or jumps."""
-        parts = [*self.scene.supports, *self.scene.loads]
-        found = np.array([t for part in parts for t, _ in getattr(part, "history", None) or ()])
-        slack = _SAME * self.end
-        return self._snapped(found[(found > slack) & (found < self.end - slack)])
-
-    def _notes(self) -> dict[str, str]:
-        sizes = sorted(self.steppers)
-        said = " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
-        notes = {"scheme": self.marching.name, "mass": "consistent", "time step": said}
-        if any(map(_grows, self.scene.cuts)):
-            notes["openings"] = str(self.openings)
-        return {**notes, "unknowns": self.unknowns}
-
-
-def _grows(cut: Cut) -> bool:
-    return isinstance(cut, ToolPathCut)
+    def _over_time(self, name: str) -> Array:
+        """Return a field (t, n, d) at the outputs."""
+        shape = (len(self.outputs), -1, self.space.dimension)
+        return np.reshape([getattr(state, name) for state in self.outputs], shape)

@@ -18,9 +18,10 @@ from verify.solvers.body_of_scene import background_mesh, density_of, material_o
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.interface import check_choices
 from verify.solvers.methods_motion import MethodOpening
-from verify.solvers.motion_of_scene import Marching, Motion
+from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
+from verify.solvers.timeline import timeline_of
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import solution_on, springs_left_out
 from verify.solvers.xfem_static import Law, solve_equilibrium
@@ -164,9 +165,10 @@ class MethodSolver:
             forces.append(self._law(body.resisting, material, kinematics, kernels=FAST))
             return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
-        openings = openings_of(scene, size)
+        timeline = timeline_of(scene, kinks=False)
+        openings = openings_of(scene, size, timeline)
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-        motion = Motion(scene, openings, opening, marching, exact_of(scene), record)
+        motion = CutMotion(scene, timeline, opening, marching, exact_of(scene), record)
         phantom, fields = motion.run(trial)
         record.regularisations += springs_left_out(forces[-1])
         self._say(record, opening.final)

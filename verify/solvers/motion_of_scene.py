@@ -1,8 +1,6 @@
-"""Motion of a cut body: stages between the openings of cuts, steps between the output times."""
+"""Motion of a body on virtual nodes, which is made anew whenever its cuts open further."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from time import perf_counter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -16,8 +14,8 @@ from verify.scene.initial import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_in_motion import body_in_motion, initial_state
 from verify.solvers.body_of_scene import density_of, material_of
-from verify.solvers.openings_of_scene import Openings, stops_of
 from verify.solvers.runs import Record
+from verify.solvers.timeline import Timeline, march, step_sizes
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
@@ -93,8 +91,8 @@ class _Output(NamedTuple):
     acceleration: _Floats | None
 
 
-class Motion:
-    """One motion, stage by stage: a stage begins at a step at which something opens.
+class CutMotion:
+    """A body on virtual nodes in motion, made anew when something opens: a `timeline.Mover`.
 
     Every output is on the mesh of the body with all its cuts: before a cut opens, what will be
     its two sides moves together.
@@ -102,8 +100,7 @@ class Motion:
     Parameters
     ----------
     scene : Scene
-    openings : Openings
-        When its cuts open.
+    timeline : Timeline
     opening : OpeningBody
     marching : Marching
     exact : object or None
@@ -115,30 +112,35 @@ class Motion:
     def __init__(
         self,
         scene: Scene,
-        openings: Openings,
+        timeline: Timeline,
         opening: OpeningBody,
         marching: Marching,
         exact: Any,
         record: Record,
     ) -> None:
-        self.scene, self.opening, self.marching, self.exact = scene, opening, marching, exact
-        self.record = record
+        self.scene, self.timeline, self.opening = scene, timeline, opening
+        self.marching, self.exact, self.record = marching, exact, record
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
-        self.times, self.due = openings.outputs, openings.due
-        self.stops = stops_of(scene, openings)
-        self.account = Account(opening.removal)
-        self.steps = self.solves = 0
-        self.step_sizes: set[float] = set()
-        self.said = ""
+        with record.timed(opening.phase):
+            self._events = opening.events()
+        closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
+        self._opened = -np.inf if closed_before else timeline.close
+        self._account = Account(opening.removal)
+        self._outputs: list[_Output] = []
+        self._solves = 0
+        body = self._made(self._opened)
+        with record.timed("initial state"):
+            state = initial_state(scene, body, exact)
+        self._take(body, state)
 
     def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
-        """Run all stages and carry the fields of each to the finally cut mesh.
+        """March, and carry the fields of all outputs to the finally cut mesh.
 
         Parameters
         ----------
         trial : bool
-            Whether to stop after the first step: what compiles, compiles in it.
+            As of `timeline.march`.
 
         Returns
         -------
@@ -154,82 +156,71 @@ class Motion:
         XfemError, StepFailedError, NotInEquilibriumError
             From the library.
         """
+        sizes = march(self.timeline, self, trial=trial)
+        self._leave()
+        self._say(sizes)
         with self.record.timed(self.opening.phase):
-            events = self.opening.events()
-        initial = self.scene.initial
-        closed_before = isinstance(initial, Equilibrium) and not starts_open(initial)
-        opened = -np.inf if closed_before else self.due
-        phantom = self._cut(opened)
-        body = self._body(phantom)
-        with self.record.timed("initial state"):
-            state = initial_state(self.scene, body, self.exact)
-        fields: list[_Output] = []
-        while True:
-            due = state.time + self.due
-            if np.any((events > opened) & (events <= due)):
-                further = self._body(self._cut(due))
-                inherited = self.opening.inherited(phantom, state, further)
-                self.account.open(body, state, further, inherited)
-                body, state = further, inherited
-                phantom = body.force.phantom
-            opened = due
-            until = float(events[events > due].min(initial=np.inf))
-            fields += self._stage(body, state, until, trial)
-            if trial or state.time >= float(self.times[-1]) - self.due:
-                return self._answer(fields)
+            phantom = self.opening.at(np.inf)
+        self.record.regularisations += self.opening.regularisations()
+        return phantom.corners, self._fields(phantom)
 
-    def _cut(self, time: float) -> PhantomMesh:
+    @property
+    def time(self) -> float:
+        """Time of the state, s."""
+        return self.state.time
+
+    @property
+    def largest(self) -> float:
+        """Largest time step of the body as it is cut now, s."""
+        return self._largest
+
+    def open(self, time: float) -> bool:
+        """Cut the body as far as the cuts have come at a time, and hand the state on."""
+        before, self._opened = self._opened, time + self.timeline.close
+        if not np.any((self._events > before) & (self._events <= self._opened)):
+            return False
+        further = self._made(self._opened)
+        state = self.opening.inherited(self.body.force.phantom, self.state, further)
+        self._leave()
+        self._account.open(self.body, self.state, further, state)
+        self._take(further, state)
+        return True
+
+    def begin(self) -> None:
+        """Do nothing: integrators see what jumps by themselves, and are new at an opening."""
+
+    def put_out(self) -> None:
+        """Keep the state, with its acceleration where that is to be had."""
+        body = self.body
+        alone = body.mass.diagonal is not None or not body.moving
+        linear = self.scene.analysis.kinematics == "linear"
+        acceleration = acceleration_of(body, self.state) if linear and alone else None
+        self._outputs.append(_Output(body.force.phantom, self.state.copy(), acceleration))
+        self._instants.append(self._taken)
+
+    def step(self, size: float) -> None:
+        """Advance the state by a time, s, and account for it."""
+        if size not in self._integrators:
+            self._integrators[size] = self._integrator(size)
+        with self.record.timed("steps"):
+            forces = self._integrators[size].step(self.state)
+        with self.record.timed("accounting"):
+            self._recorder.record(self.state, forces)
+        self._taken += 1
+
+    def _made(self, time: float) -> DynamicBody:
         with self.record.timed(self.opening.phase):
-            return self.opening.at(time)
-
-    def _body(self, phantom: PhantomMesh) -> DynamicBody:
+            phantom = self.opening.at(time)
         with self.record.timed("loading"):
             return body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
 
-    def _stage(
-        self, body: DynamicBody, state: MotionState, until: float, trial: bool
-    ) -> list[_Output]:
-        """Step to the end, or to the first step that begins at `until` or later.
-
-        Returns the states at the output times on the way.
-        """
-        ledger, largest = BalanceRecorder(body, state), self._largest_step(body)
-        timings = self.record.timings
-        integrators: dict[float, Integrator] = {}
-        outputs, instants, taken = [], [], 0
-        for a, b in pairwise([state.time, *self.stops[self.stops > state.time + self.due]]):
-            if np.abs(self.times - a).min() <= self.due:
-                outputs.append(self._kept(body, state))
-                instants.append(taken)
-            count = max(1, int(np.ceil((b - a) / largest * (1 - 1e-9))))
-            size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one integrator
-            if size not in integrators:
-                integrators[size] = self._integrator(body, size)
-            for _ in range(count):
-                clock = perf_counter()
-                forces = integrators[size].step(state)
-                stepped = perf_counter()
-                ledger.record(state, forces)
-                timings["steps"] += stepped - clock
-                timings["accounting"] += perf_counter() - stepped
-                taken += 1
-                if over := trial or state.time >= until - self.due:
-                    break
-            if over:
-                break
-        if state.time >= self.times[-1] - self.due:
-            outputs.append(self._kept(body, state))
-            instants.append(taken)
-        self.account.enter(ledger.close(), instants)
-        self.steps += taken
-        self.step_sizes |= integrators.keys()
-        newton = [one for one in integrators.values() if isinstance(one, NewtonIntegrator)]
-        self.solves += sum(one.solves for one in newton)
-        return outputs
-
-    def _largest_step(self, body: DynamicBody) -> float:
+    def _take(self, body: DynamicBody, state: MotionState) -> None:
+        """Go on with a body and its state."""
+        self.body, self.state = body, state
+        self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
+        self._instants, self._taken = list[int](), 0
         mesh, marching = body.force.phantom.mesh, self.marching
-        largest, self.said = largest_step(
+        self._largest, self.record.notes["step from"] = largest_step(
             body,
             material_of(self.scene, mesh),
             density_of(self.scene, mesh),
@@ -237,47 +228,43 @@ class Motion:
             marching.step_factor,
             self.scene.analysis.time_step,
         )
-        return largest
 
-    def _kept(self, body: DynamicBody, state: MotionState) -> _Output:
-        """Copy a state, with its acceleration where that is to be had."""
-        alone = body.mass.diagonal is not None or not body.moving
-        linear = self.scene.analysis.kinematics == "linear"
-        acceleration = acceleration_of(body, state) if linear and alone else None
-        return _Output(body.force.phantom, state.copy(), acceleration)
+    def _leave(self) -> None:
+        """Enter what has happened to the body."""
+        self._account.enter(self._recorder.close(), self._instants)
+        newton = [o for o in self._integrators.values() if isinstance(o, NewtonIntegrator)]
+        self._solves += sum(one.solves for one in newton)
 
-    def _integrator(self, body: DynamicBody, size: float) -> Integrator:
+    def _integrator(self, size: float) -> Integrator:
         scheme = self.marching.scheme
         try:
-            return integrator_of(body, size, scheme, self.marching.spectral_radius)
+            return integrator_of(self.body, size, scheme, self.marching.spectral_radius)
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{scheme}': {error}") from None
 
-    def _answer(self, fields: list[_Output]) -> tuple[PhantomMesh, dict[str, Any]]:
-        phantom, record = self._cut(np.inf), self.record
-        olds = {id(one.phantom): one.phantom for one in fields}
+    def _fields(self, phantom: PhantomMesh) -> dict[str, Any]:
+        """Carry all outputs to the unknowns of the body with all its cuts."""
+        outputs = self._outputs
+        olds = {id(one.phantom): one.phantom for one in outputs}
         sources = {key: self.opening.source(old, phantom) for key, old in olds.items()}
 
-        def carried(one: _Output, values: _Floats) -> _Floats:
+        def carried(name: str) -> _Floats | None:
             # before a cut opens nothing follows a root cell there: corners say it all
-            found: _Floats = one.phantom.extend(values)[sources[id(one.phantom)]]
-            return found
+            values = [
+                getattr(one if name == "acceleration" else one.state, name) for one in outputs
+            ]
+            if any(value is None for value in values):
+                return None
+            pairs = zip(outputs, values, strict=True)
+            return np.array([o.phantom.extend(value)[sources[id(o.phantom)]] for o, value in pairs])
 
-        accelerations = [
-            carried(one, one.acceleration) for one in fields if one.acceleration is not None
-        ]
-        record.iterations["steps"] = self.steps
-        if self.solves:
-            record.iterations["newton"] = self.solves
-        record.notes |= self._notes()
-        record.regularisations += self.opening.regularisations()
-        return phantom.corners, {
-            "times": self.times[: len(fields)],
-            "displacement": np.array([carried(one, one.state.displacement) for one in fields]),
-            "velocity": np.array([carried(one, one.state.velocity) for one in fields]),
-            "acceleration": np.array(accelerations) if len(accelerations) == len(fields) else None,
+        return {
+            "times": self.timeline.outputs[: len(outputs)],
+            "displacement": carried("displacement"),
+            "velocity": carried("velocity"),
+            "acceleration": carried("acceleration"),
             "mass": self._mass(phantom),
-            "ledger": self.account.columns(),
+            "ledger": self._account.columns(),
             "unknowns": phantom.node_points.size,
         }
 
@@ -288,16 +275,16 @@ class Motion:
         _, mass = self.opening.inertia(phantom)
         return mass.of_corners.matrix if isinstance(mass, AggregatedMass) else mass.matrix
 
-    def _notes(self) -> dict[str, str]:
-        sizes = sorted(self.step_sizes)
-        notes = {
+    def _say(self, sizes: list[float]) -> None:
+        """Record steps and choices."""
+        record = self.record
+        record.iterations["steps"] = len(sizes)
+        if self._solves:
+            record.iterations["newton"] = self._solves
+        record.notes |= {
             "scheme": self.marching.scheme,
             "mass": self.opening.mass,
-            "time step": " … ".join(dict.fromkeys(f"{s:.6g} s" for s in (sizes[0], sizes[-1])))
-            if sizes
-            else "none",
-            "step from": self.said,
+            "time step": step_sizes(sizes),
         }
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
-            notes["a tool path opens"] = self.opening.rule
-        return notes
+            record.notes["a tool path opens"] = self.opening.rule

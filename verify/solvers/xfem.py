@@ -12,10 +12,11 @@ from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.interface import check_choices
-from verify.solvers.motion_of_scene import Marching, Motion
+from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
 from verify.solvers.supports_of_scene import supports_of
+from verify.solvers.timeline import timeline_of
 from verify.solvers.xfem_answer import joined, solution_on, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
@@ -218,9 +219,10 @@ def _run(
     """Cut, load, solve."""
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
-        openings = openings_of(scene, size)
+        timeline = timeline_of(scene, kinks=False)
+        openings = openings_of(scene, size, timeline)
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
-        motion = Motion(scene, openings, opening, given.marching(), exact, record)
+        motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)
     with record.timed("enrichment"):
         phantom, slivers, changes = _cut(scene, mesh, size, exact, given)

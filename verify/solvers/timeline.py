@@ -1,0 +1,157 @@
+"""One timeline for all that moves: outputs, openings, jumps of histories, and the steps between."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.scene import Scene, ToolPathCut
+from verify.scene.history import jumps
+
+Array = NDArray[np.float64]
+_CLOSE = 1e-9  # of the duration: times that close are one, steps added up are off by less
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """When something happens in a dynamic scene, s; times that are close are one.
+
+    Attributes
+    ----------
+    outputs : (t,) array
+        Ascending; the last is the end.
+    opens : (c,) array
+        When each cut of the scene opens as a whole; of a tool path, when its blade sets out.
+    breaks : (b,) array
+        When a load or support jumps, or where asked for has a kink.
+    stops : (s,) array
+        Times at which a step has to end, from 0 to the end: outputs, breaks, and whole cuts.
+    close : float
+        Times that differ by no more are one.
+    """
+
+    outputs: Array
+    opens: Array
+    breaks: Array
+    stops: Array
+    close: float
+
+
+def timeline_of(scene: Scene, kinks: bool) -> Timeline:
+    """Return the timeline of a dynamic scene; with or without `kinks` of histories."""
+    outputs = np.array(scene.analysis.output_times)
+    end = float(outputs[-1])
+    close = _CLOSE * end
+
+    def snapped(times: Iterable[Any], to: Array) -> Array:
+        given = np.array(list(times), dtype=float)
+        nearest = to[np.abs(to[:, None] - given).argmin(axis=0)]
+        return np.where(np.abs(nearest - given) <= close, nearest, given)
+
+    opens = snapped((getattr(cut, "opens_at", 0.0) for cut in scene.cuts), outputs)
+    whole = opens[[not isinstance(cut, ToolPathCut) for cut in scene.cuts]]
+    tables = [getattr(part, "history", None) or () for part in (*scene.supports, *scene.loads)]
+    found = [t for table in tables for t in ([t for t, _ in table] if kinks else jumps(table))]
+    breaks = snapped(found, np.concatenate([outputs, whole]))
+    stops = np.unique([0.0, *outputs, *whole, *breaks])
+    return Timeline(outputs, opens, breaks, stops[stops <= end], close)
+
+
+class Mover(Protocol):
+    """A body in motion and its state: what every solver offers the march."""
+
+    @property
+    def time(self) -> float:
+        """Time of the state, s."""
+        ...
+
+    @property
+    def largest(self) -> float:
+        """Largest time step of the body as it is open now, s."""
+        ...
+
+    def open(self, time: float) -> bool:
+        """Open what the cuts have passed at a time, the state's up to steps added up.
+
+        Returns
+        -------
+        bool
+            Whether anything has opened.
+        """
+        ...
+
+    def begin(self) -> None:
+        """Take up what has jumped: at the start, at an opening or at a break."""
+        ...
+
+    def put_out(self) -> None:
+        """Keep the state for the output, and enter it into the account."""
+        ...
+
+    def step(self, size: float) -> None:
+        """Advance the state by a time, s, and account for it."""
+        ...
+
+
+def march(timeline: Timeline, mover: Mover, halvings: int = 0, trial: bool = False) -> list[float]:
+    """Step from stop to stop by equal steps, and open on the way what the cuts have passed.
+
+    Parameters
+    ----------
+    timeline : Timeline
+    mover : Mover
+        At the time 0, before what opens then.
+    halvings : int
+        How often every step is halved that would be taken. The largest step is not: where stops
+        cut it short that would change nothing.
+    trial : bool
+        Whether to stop after the first step: what compiles, compiles in it.
+
+    Returns
+    -------
+    list of float
+        Sizes of all steps, s.
+    """
+    sizes: list[float] = []
+    for k, stop in enumerate(timeline.stops.tolist()):
+        begun = mover.open(stop) or k == 0
+        if begun:
+            mover.begin()
+        if stop in timeline.outputs:
+            mover.put_out()
+        if k == len(timeline.stops) - 1:
+            break
+        if not begun and stop in timeline.breaks:
+            mover.begin()
+        sizes += _steps_to(float(timeline.stops[k + 1]), mover, halvings, trial)
+        if trial:
+            break
+    return sizes
+
+
+def _steps_to(stop: float, mover: Mover, halvings: int, trial: bool) -> list[float]:
+    """Step to a stop; count the steps anew where an opening has changed the largest one."""
+    sizes: list[float] = []
+    left, size, largest = 0, 0.0, np.nan
+    while left or not sizes:
+        if mover.largest != largest:
+            largest, span = mover.largest, stop - mover.time
+            left = max(1, int(np.ceil(span / largest * (1 - 1e-9)))) * 2**halvings
+            size = float(f"{span / left:.14g}")  # the same up to round-off: one integrator
+        mover.step(size)
+        sizes.append(size)
+        left -= 1
+        if trial:
+            break
+        if left and mover.open(mover.time):
+            mover.begin()
+    return sizes
+
+
+def step_sizes(sizes: list[float]) -> str:
+    """Say the smallest and the largest of some steps."""
+    if not sizes:
+        return "none"
+    return " … ".join(dict.fromkeys(f"{size:.6g} s" for size in (min(sizes), max(sizes))))
