@@ -1,10 +1,15 @@
 """The examples of the guides to the compact solver run as printed, each page in one go."""
 
+import doctest
 import re
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
+
+import verify.xfem as xfem
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -50,3 +55,17 @@ def test_every_page_has_examples_and_links_that_lead_somewhere(page):
     assert "```python" in text
     for target in re.findall(r"\]\(([^)#]+\.md)", text):
         assert ((DOCS / page).parent / target).exists(), target
+
+
+def test_what_a_user_calls_has_an_example_in_its_docstring():
+    named = set(xfem.__all__) - {"XfemError"}
+    assert [name for name in sorted(named) if ">>> " not in getattr(xfem, name).__doc__] == []
+    assert set(re.findall(r"`(\w+)`", xfem.__doc__.partition("Example")[0])) == named
+
+
+@pytest.mark.parametrize(
+    "name", ["verify.xfem", *(f"verify.xfem.{one.name}" for one in iter_modules(xfem.__path__))]
+)
+def test_the_examples_of_docstrings_run_as_printed(name):
+    failed, _ = doctest.testmod(import_module(name))
+    assert failed == 0

@@ -4,6 +4,35 @@ It knows no scene, no file format and no other solver, and needs numpy, scipy an
 Alternatives of other authors are in `verify.methods`. Numbers in brackets such as (2.48) are
 equations of the thesis that ``docs/theory/xfem.md`` cites; the page derives what the code does.
 
+What a user calls, each with an example in its docstring, is in this package itself:
+
+mesh
+    `SimplexMesh`, `rectangle_mesh`, `box_mesh`
+cut
+    `Plane`, `Polyline`, `TriangulatedSurface`; `cut_mesh`, `treat_slivers`; `subdivide` for a
+    conforming mesh of the result
+pose
+    `isotropic`, `Supports`, `body_force`, `traction`
+statics
+    `solve_static` in linear kinematics, `static_equilibrium` at finite rotation
+motion
+    `InternalForce` and `side_wise_mass` make a `DynamicBody`; `CentralDifferences` and
+    `EnergyMomentum` are schemes, `run` takes steps, `critical_step` limits those of the first
+
+Example
+-------
+A clamped plate, cut half through, under its own weight:
+
+>>> import verify.xfem as xfem
+>>> cut = xfem.Polyline([[-1.0, 0.45], [0.5, 0.45]])
+>>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((8, 8)), [cut])
+>>> held = xfem.Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 1] > 0.999)
+>>> material = xfem.isotropic(1e4, 0.3, "plane strain")
+>>> weight = xfem.body_force(phantom, [0.0, -9.8e3])
+>>> solution = xfem.solve_static(phantom, material, held, weight)
+>>> bool(solution.residual < 1e-12)
+True
+
 Words that docstrings take for granted:
 
 cell, element
@@ -76,28 +105,50 @@ Extensions, which none of the modules above needs (a contract of the imports hol
 `bases`, `critical_step`, `subdivision`
     other bases of the same space; largest step of explicit schemes; the cut body as a conforming
     mesh
-
-Example
--------
-A clamped plate, cut half through, under its own weight:
-
->>> from verify.xfem.structured_meshes import rectangle_mesh
->>> from verify.xfem.cuts import Polyline
->>> from verify.xfem.phantom import cut_mesh
->>> from verify.xfem.elasticity import isotropic
->>> from verify.xfem.supports import Supports
->>> from verify.xfem.loads import body_force
->>> from verify.xfem.statics import solve_static
->>> phantom = cut_mesh(rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
->>> top = phantom.mesh.points[:, 1] > 0.999
->>> held = Supports.none(phantom).prescribe(phantom, top)
->>> solution = solve_static(
-...     phantom, isotropic(1e4, 0.3, "plane strain"), held, body_force(phantom, [0.0, -9.8e3])
-... )
->>> bool(solution.residual < 1e-12)
-True
 """
 
+from verify.xfem.body import DynamicBody
+from verify.xfem.critical_step import critical_step
+from verify.xfem.cuts import Plane, Polyline, TriangulatedSurface
+from verify.xfem.elasticity import isotropic
+from verify.xfem.energy_balance import run
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads import body_force, traction
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
+from verify.xfem.slivers import treat_slivers
+from verify.xfem.statics import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
 
-__all__ = ["XfemError"]
+__all__ = [
+    "CentralDifferences",
+    "DynamicBody",
+    "EnergyMomentum",
+    "InternalForce",
+    "Plane",
+    "Polyline",
+    "SimplexMesh",
+    "Supports",
+    "TriangulatedSurface",
+    "XfemError",
+    "body_force",
+    "box_mesh",
+    "critical_step",
+    "cut_mesh",
+    "isotropic",
+    "rectangle_mesh",
+    "run",
+    "side_wise_mass",
+    "solve_static",
+    "static_equilibrium",
+    "subdivide",
+    "traction",
+    "treat_slivers",
+]

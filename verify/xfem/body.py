@@ -134,6 +134,16 @@ class DynamicBody:
     XfemError
         If a shape does not match the body, or a membrane is to be linear: nothing would resist
         across its plane.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> force = xfem.InternalForce(phantom, xfem.isotropic(1e4, 0.3, "plane strain"))
+    >>> mass = xfem.side_wise_mass(phantom, 1000.0)
+    >>> body = xfem.DynamicBody(force, mass, mass.weight([0.0, -9.8]))
+    >>> body.rest().velocity.shape, body.external(0.0).sum(axis=0).round(9).tolist()
+    ((35, 2), [0.0, -9800.0])
     """
 
     force: InternalForce

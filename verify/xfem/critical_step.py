@@ -51,6 +51,19 @@ def critical_step(
     ------
     XfemError
         If sizes do not match or everything is fixed.
+
+    Examples
+    --------
+    Two masses of 0.5 kg at a spring of 1 N/m, once per component: ω² = 4.
+
+    >>> import numpy as np
+    >>> from scipy.sparse import csr_array, diags_array
+    >>> import verify.xfem as xfem
+    >>> from verify.xfem.mass import Mass
+    >>> masses = np.array([0.5, 0.5])
+    >>> mass = Mass(csr_array(diags_array(masses)), csr_array(diags_array(masses**-0.5)), masses)
+    >>> round(xfem.critical_step(csr_array([[1.0, -1.0], [-1.0, 1.0]]), mass), 9)
+    1.0
     """
     if not (issparse(stiffness) or isinstance(stiffness, np.ndarray)):
         raise XfemError(f"stiffness of type {type(stiffness).__name__}; expected a sparse array")

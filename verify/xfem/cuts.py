@@ -56,6 +56,13 @@ class Plane:
     ------
     XfemError
         If the normal vanishes, or shapes do not match.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> cut = xfem.Plane([0.5, 0.0], [1.0, 0.0])
+    >>> cut.level_set([[0.75, 3.0], [0.25, 3.0]]).tolist()
+    [0.25, -0.25]
     """
 
     point: Floats

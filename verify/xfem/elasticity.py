@@ -62,6 +62,12 @@ def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
     ------
     XfemError
         If a parameter is outside its bounds, shapes do not match or the state is unknown.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> round(float(xfem.isotropic(2.6e3, 0.3, "plane strain").mu), 9)
+    1000.0
     """
     E, nu = real_array(young, "Young's modulus"), real_array(poisson, "Poisson's ratio")
     check_choice(state, State, "state")

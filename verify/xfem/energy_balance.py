@@ -176,6 +176,18 @@ def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: in
         From the step that failed; the state is that of the last good one.
     XfemError
         If the number of steps is negative.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [])
+    >>> force = xfem.InternalForce(phantom, xfem.isotropic(1e4, 0.3, "plane strain"))
+    >>> mass = xfem.side_wise_mass(phantom, 1000.0)
+    >>> body = xfem.DynamicBody(force, mass, mass.weight([0.0, -10.0]))
+    >>> state = body.rest()
+    >>> energies = xfem.run(xfem.CentralDifferences(body, 1e-3), body, state, 100)
+    >>> float(energies.kinetic[-1].round(6)), bool(energies.drift < 1e-10)
+    (500.0, True)
     """
     if steps < 0:
         raise XfemError(f"{steps} steps; expected none or more")

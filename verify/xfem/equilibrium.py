@@ -308,6 +308,19 @@ def static_equilibrium(
         If something is not held.
     XfemError
         If a shape is wrong, a number not finite, or the load steps are not positive.
+
+    Examples
+    --------
+    A strip that is bent by its own weight, by more than linear statics could:
+
+    >>> import verify.xfem as xfem
+    >>> strip = xfem.cut_mesh(xfem.rectangle_mesh((16, 2), upper=(4.0, 0.25)), [])
+    >>> force = xfem.InternalForce(strip, xfem.isotropic(1e5, 0.3, "plane strain"))
+    >>> held = xfem.Supports.none(strip).prescribe(strip, strip.mesh.points[:, 0] == 0.0)
+    >>> load = xfem.body_force(strip, [0.0, -1e3])
+    >>> found = xfem.static_equilibrium(force, held.fixed, load=load)
+    >>> found.check.stable, bool(abs(found.reactions[:, 1].sum() - 1e3) < 1e-6)
+    (True, True)
     """
     phantom = force.phantom
     shape = (phantom.node_count, phantom.mesh.space)

@@ -81,6 +81,21 @@ class CentralDifferences(_Explicit):
         In seconds; stable below `verify.xfem.critical_step.critical_step` if linear. Damping
         is taken at the velocity of the start in the first half of a step, at that of its middle in
         the second.
+
+    Examples
+    --------
+    A piece without supports falls freely:
+
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [])
+    >>> force = xfem.InternalForce(phantom, xfem.isotropic(1e4, 0.3, "plane strain"))
+    >>> mass = xfem.side_wise_mass(phantom, 1000.0)
+    >>> body = xfem.DynamicBody(force, mass, mass.weight([0.0, -10.0]))
+    >>> scheme, state = xfem.CentralDifferences(body, 1e-3), body.rest()
+    >>> for _ in range(100):
+    ...     forces = scheme.step(state)
+    >>> state.displacement[:, 1].round(9).tolist()[:2]
+    [-0.05, -0.05]
     """
 
     def __init__(self, body: DynamicBody, step_size: float) -> None:

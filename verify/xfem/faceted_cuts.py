@@ -276,6 +276,13 @@ class Polyline(FacetCut):
     XfemError
         If there are too few vertices, a segment without length, a segment that turns back on
         the one before, or segments that intersect.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> cut = xfem.Polyline([[0.0, 0.5], [0.5, 0.5]])
+    >>> cut.level_set([[0.25, 0.75]]).tolist(), cut.depth([[0.75, 0.5]]).tolist()
+    ([0.25], [-0.25])
     """
 
     vertices: Floats
@@ -354,6 +361,14 @@ class TriangulatedSurface(FacetCut):
     XfemError
         If a triangle has no area, or an edge is used twice in the same direction (orientation
         not consistent, or more than two triangles at an edge).
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> square = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [1.0, 1.0, 0.5], [0.0, 1.0, 0.5]]
+    >>> cut = xfem.TriangulatedSurface(square, [[0, 1, 2], [0, 2, 3]])
+    >>> cut.level_set([[0.6, 0.3, 0.75]]).tolist()
+    [0.25]
     """
 
     points: Floats

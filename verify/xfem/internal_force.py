@@ -105,6 +105,17 @@ class InternalForce:
     -----
     What a method returns depends on its arguments alone. Rotations in space start from those found
     last, which makes them quicker to find, and differ by round-off.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [])
+    >>> force = xfem.InternalForce(phantom, xfem.isotropic(1e4, 0.3, "plane strain"))
+    >>> quarter_turn = phantom.node_points @ [[0.0, 1.0], [-1.0, 0.0]] - phantom.node_points
+    >>> nodal, energy = force.evaluate(quarter_turn)
+    >>> bool(np.abs(nodal).max() < 1e-10), bool(energy < 1e-20)
+    (True, True)
     """
 
     has_stress = True  # that can be averaged over a step; springs (`verify.methods`) have none

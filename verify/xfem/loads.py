@@ -71,6 +71,13 @@ def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int =
     ------
     XfemError
         If the density has a wrong shape or is not finite, or the degree makes no sense.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> xfem.body_force(phantom, [0.0, -9.8]).sum(axis=0).round(12).tolist()
+    [0.0, -9.8]
     """
     load = np.zeros_like(phantom.corners.node_points)
     piece, barycentric, share = phantom.solid_simplices
@@ -110,6 +117,14 @@ def traction(
     ------
     XfemError
         If a facet does not exist, or the density or the degree makes no sense.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.0, 0.6], [0.0, 1.0])])
+    >>> load = xfem.traction(phantom, phantom.mesh.boundary_facets, [2.0, 0.0])
+    >>> load.sum(axis=0).round(12).tolist()
+    [8.0, 0.0]
     """
     chosen = index_array(facets, "loaded facets")
     mesh = phantom.mesh

@@ -149,6 +149,13 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     ------
     XfemError
         If the density is not positive and finite, or neither one value nor one per cell.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> round(float(xfem.side_wise_mass(phantom, 1000.0).weights.sum()), 9)
+    1000.0
     """
     if phantom.aggregation is not None:
         found: Mass = phantom.aggregation.mass(side_wise_mass(phantom.corners, density))

@@ -39,6 +39,13 @@ class SimplexMesh:
         If shapes or indices are wrong, a coordinate is not finite, a cell is degenerate, or a node
         belongs to no cell; when neighbours are first asked for, if a facet is shared by more than
         two cells or a cell is given twice.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> mesh = xfem.SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
+    >>> float(mesh.measures[0])
+    0.5
     """
 
     points: Floats

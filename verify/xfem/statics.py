@@ -93,6 +93,20 @@ def solve_static(
         If the stiffness is not positive definite for another reason.
     XfemError
         If shapes do not match or a load is not finite.
+
+    Examples
+    --------
+    Two halves that a cut leaves are pulled apart: both are rigid.
+
+    >>> import verify.xfem as xfem
+    >>> mesh = xfem.rectangle_mesh((4, 4))
+    >>> phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> x = mesh.points[:, 0]
+    >>> held = xfem.Supports.none(phantom).prescribe(phantom, x == 0.0)
+    >>> held = held.prescribe(phantom, x == 1.0, [0.1, 0.0])
+    >>> solution = xfem.solve_static(phantom, xfem.isotropic(1e4, 0.3, "plane strain"), held)
+    >>> bool(solution.strain_energy < 1e-20), round(float(solution.displacement.max()), 12)
+    (True, 0.1)
     """
     shape = phantom.node_points.shape
     force = finite_array(np.zeros(shape) if load is None else load, "load", shape)

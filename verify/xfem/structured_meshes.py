@@ -36,6 +36,12 @@ def rectangle_mesh(
     ------
     XfemError
         If a number of divisions or a side is not positive, or the diagonal is unknown.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> len(xfem.rectangle_mesh((4, 2)).cells)
+    16
     """
     nodes, points = _grid(divisions, lower, upper)
     a, b = nodes[:-1, :-1], nodes[1:, :-1]
@@ -75,6 +81,12 @@ def box_mesh(
     ------
     XfemError
         If a number of divisions or a side is not positive.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> len(xfem.box_mesh((2, 2, 2)).cells)
+    48
     """
     nodes, points = _grid(divisions, lower, upper)
     counts = [k - 1 for k in nodes.shape]

@@ -46,7 +46,16 @@ class Subdivision:
 
 
 def subdivide(phantom: PhantomMesh) -> Subdivision:
-    """Make the conforming sub-division of a cut mesh."""
+    """Make the conforming sub-division of a cut mesh.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> body = xfem.subdivide(phantom)
+    >>> len(body.cells), len(body.cut_facets)
+    (48, 8)
+    """
     if phantom.aggregation is not None:
         divided = subdivide(phantom.corners)
         interpolation = csr_array(divided.interpolation @ phantom.aggregation.extension)

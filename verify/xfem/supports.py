@@ -31,6 +31,15 @@ class Supports:
     fixed : (N, d) bool array
     values : (N, d) float array
         Prescribed displacement in metres; zero where not fixed.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [])
+    >>> left = phantom.mesh.points[:, 0] == 0.0
+    >>> supports = xfem.Supports.none(phantom).prescribe(phantom, left, 0.1, components=(0,))
+    >>> int(supports.fixed.sum()), float(supports.values.max())
+    (5, 0.1)
     """
 
     fixed: Bools
