@@ -1,0 +1,123 @@
+"""The one timeline of all that moves: what is one time, where steps end, when something opens."""
+
+import numpy as np
+import pytest
+from scenes import scene
+
+from verify.solvers.timeline import march, step_sizes, timeline_of
+
+OFF = 1e-10  # s, of a motion of one second: less than what steps added up are off by
+
+
+class Noted:
+    """Body that notes what the march asks of it; things open at `events`, the step then shrinks."""
+
+    def __init__(self, largest, events=(), shrinks=1.0):
+        self.time, self.largest, self.shrinks = 0.0, largest, shrinks
+        self.events, self.done = sorted(events), []
+
+    def open(self, time):
+        due = [event for event in self.events if event <= time + 1e-9]
+        self.events = self.events[len(due) :]
+        self.done += [("open", time)] if due else []
+        self.largest *= self.shrinks if due else 1.0
+        return bool(due)
+
+    def begin(self):
+        self.done.append(("begin", self.time))
+
+    def put_out(self):
+        self.done.append(("output", self.time))
+
+    def step(self, size):
+        self.time += size
+        self.done.append(("step", size))
+
+    def times(self, what):
+        return [time for name, time in self.done if name == what]
+
+
+def timeline(outputs=2, kinks=False, opens=(), history=None):
+    cuts = [
+        {"kind": "polyline", "name": f"c{k}", "points": [[0.1, y], [0.4, y]], "opens_at": time}
+        for k, (y, time) in enumerate(zip(np.linspace(0.2, 0.8, len(opens)), opens, strict=True))
+    ]
+    load = {"kind": "gravity", "acceleration": [0, -1]}
+    drawn = {"kind": "traction", "where": "top", "traction": [0, 1.0], "history": history}
+    moving = scene(
+        cuts=cuts,
+        loads=[load, drawn] if history else [load],
+        material={"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0},
+        analysis={
+            "kind": "dynamic", "kinematics": "linear", "duration": 1.0, "time_step": 0.01,
+            "outputs": outputs,
+        },
+    )  # fmt: skip
+    return timeline_of(moving, kinks)
+
+
+def test_times_that_are_one_up_to_added_steps_are_one_stop():
+    found = timeline(
+        outputs=3, opens=[0.5 + OFF, 0.3], history=[[0.3 - OFF, 0.0], [0.3 - OFF, 1.0]]
+    )
+    np.testing.assert_array_equal(found.stops, [0.0, 0.3, 0.5, 1.0])
+    np.testing.assert_array_equal(found.opens, [0.5, 0.3])
+    assert found.breaks.tolist() == [0.3]
+
+
+def test_times_that_are_farther_apart_stay_two_stops():
+    found = timeline(outputs=3, opens=[0.5 + 1e-6])
+    assert found.stops.tolist() == [0.0, 0.5, 0.5 + 1e-6, 1.0]
+
+
+@pytest.mark.parametrize("kinks, stops", [(False, [0.0, 0.6, 1.0]), (True, [0.0, 0.2, 0.6, 1.0])])
+def test_kinks_end_a_step_where_they_are_asked_for_and_jumps_always(kinks, stops):
+    table = [[0.2, 0.0], [0.6, 1.0], [0.6, 0.5]]
+    assert timeline(kinks=kinks, history=table).stops.tolist() == stops
+
+
+def test_steps_between_stops_are_equal_and_no_larger_than_asked_for():
+    body = Noted(0.3)
+    sizes = march(timeline(opens=[0.35], outputs=2), body)
+    np.testing.assert_allclose(sizes, [0.175] * 2 + [0.65 / 3] * 3, rtol=1e-13)
+    assert body.times("output") == pytest.approx([0.0, 1.0])
+    assert step_sizes(sizes) == "0.175 s … 0.216667 s"
+
+
+def test_halvings_halve_also_the_steps_that_stops_cut_short():
+    stops = timeline(opens=[0.1], outputs=2)
+    for halvings in (0, 1, 2):
+        sizes = march(stops, Noted(0.3), halvings)
+        np.testing.assert_allclose(sizes[0], 0.1 / 2**halvings)
+        assert len(sizes) == (1 + 3) * 2**halvings
+
+
+def test_what_opens_on_the_way_opens_at_the_first_step_that_begins_then_or_later():
+    body = Noted(0.1, events=[0.0, 0.2, 0.41, 1.0])
+    march(timeline(outputs=2), body)
+    assert body.times("open") == pytest.approx([0.0, 0.2, 0.5, 1.0])
+    assert body.times("begin") == pytest.approx([0.0, 0.2, 0.5, 1.0])
+
+
+def test_an_output_is_after_what_opens_then():
+    body = Noted(0.1, events=[1.0])
+    march(timeline(outputs=2), body)
+    assert [name for name, _ in body.done][-3:] == ["open", "begin", "output"]
+
+
+def test_steps_are_counted_anew_where_an_opening_makes_them_smaller():
+    body = Noted(0.25, events=[0.4], shrinks=0.4)
+    sizes = march(timeline(outputs=2), body, halvings=1)
+    np.testing.assert_allclose(sizes, [0.125] * 4 + [0.05] * 10, rtol=1e-13)
+    assert body.time == pytest.approx(1.0, abs=1e-12)
+
+
+def test_an_opening_that_leaves_the_step_as_it_is_leaves_the_halved_steps_too():
+    body = Noted(0.3, events=[0.1])
+    assert len(march(timeline(outputs=2), body, halvings=2)) == 16
+
+
+def test_a_trial_is_one_step():
+    body = Noted(0.1, events=[0.0])
+    assert len(march(timeline(outputs=2), body, trial=True)) == 1
+    assert len(body.times("output")) == 1
