@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
 from verify.scene.history import factor_at, first_factor
 from verify.solvers.loads_of_scene import forces_of, is_moving, nodal_forces
-from verify.solvers.supports_of_scene import initial_path, motion_of_supports
+from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports
 from verify.xfem.body import DynamicBody, MotionState, RayleighDamping
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
@@ -78,7 +78,7 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
     for entry, forces in nodal_forces(scene, phantom, exact):
         if not isinstance(entry, Gravity):
             load += first_factor(entry.history) * forces
-    path = initial_path(scene, phantom, exact)
+    path = path_of_supports(scene, phantom, exact)
     check_bodies(phantom, path(1.0))
     return static_equilibrium(
         body.force, body.fixed, lambda share: path(share).values, load

@@ -44,13 +44,10 @@ def supports_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> Supports:
 
 
 def path_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable[[float], Supports]:
-    """Supports at a share of the path of a static scene: of displacements and angles."""
-    held = _held(scene, phantom, exact)
-    return lambda share: Supports(*_filled(phantom, held, [one.values(share) for one in held]))
+    """Supports at a share of the path to equilibrium: of displacements and angles.
 
-
-def initial_path(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable[[float], Supports]:
-    """Supports at a share of the first factor of their history."""
+    At its end they have the first factor of their history, which is 1 in a static scene.
+    """
     held = _held(scene, phantom, exact)
     factors = [first_factor(one.support.history) for one in held]
 

@@ -12,7 +12,7 @@ from verify.solution import Regularisation
 from verify.solvers.body_of_scene import material_of
 from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.runs import Record, at_rest
-from verify.solvers.supports_of_scene import path_of_supports, supports_of
+from verify.solvers.supports_of_scene import path_of_supports
 from verify.solvers.xfem_answer import penalised, springs_left_out
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
@@ -71,7 +71,8 @@ def solve_equilibrium(
         From the library.
     """
     with record.timed("loading"):
-        supports = supports_of(scene, phantom, exact)
+        path = path_of_supports(scene, phantom, exact)
+        supports = path(1.0)
         load = loads_of(scene, phantom, exact)
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
@@ -94,7 +95,6 @@ def solve_equilibrium(
     check_bodies(body, supports)
     with record.timed("solve"):
         force = law(body, material, kinematics, kernels=kernels)
-        path = path_of_supports(scene, phantom, exact)
         found = static_equilibrium(
             force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
         )
