@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import nodes_on_part
-from reference.dynamics_law import law_of
-from reference.dynamics_ties import TiedUnknowns
-from reference.elasticity import load_form, mass_form
 from reference.large_strain import solve_large_strain
-from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
+from reference.law import law_of, mass_matrix
+from reference.loads import load_forces
+from reference.nodal_algebra import NodalMatrix, NodalSolver
 from reference.space import ConformingSpace
-from reference.tied_solver import TiedSolver
+from reference.ties import TiedSolver
+from reference.unknowns import TiedUnknowns
 from verify.scene import Gravity, Scene
 from verify.scene.history import factor_at, first_factor
 from verify.scene.prescribed import PrescribedMotion
@@ -66,19 +66,12 @@ class MovingBody:
     def __init__(
         self, scene: Scene, space: ConformingSpace, exact: Any, pressure: bool = False
     ) -> None:
-        import ufl
-
         self.scene, self.space, self.exact = scene, space, exact
-        V = space.function_space
-        where = str(scene.file or "")
-        inertia = mass_form(scene.material, ufl.TrialFunction(V), ufl.TestFunction(V), where)
-        self.inertia = assembled_matrix(inertia)
+        self.inertia = mass_matrix(scene.material, space, str(scene.file or ""))
         self.mass = NodalMatrix(self.inertia, space)
         self.law = law_of(scene.material, space, scene.analysis.kinematics, pressure)
         if self.law.unknowns is not space:
-            W = self.law.unknowns.function_space
-            pair = ufl.TrialFunctions(W)[0], ufl.TestFunctions(W)[0]
-            self.inertia = assembled_matrix(mass_form(scene.material, *pair))
+            self.inertia = mass_matrix(scene.material, self.law.unknowns)
         self.weight = np.zeros(space.node_points.size)
         self._driven: list[tuple[Array, Any]] = []
         self._timed: list[Any] = []  # loads that are another field at every time
@@ -95,7 +88,7 @@ class MovingBody:
         for one in self._supports:
             mark[one.place] = True
         self._own_held = np.flatnonzero(mark.ravel()).astype(np.int32)
-        self.ties = TiedUnknowns(self.law.unknowns, space)
+        self.ties = TiedUnknowns(self.law.unknowns)
         self._lasting: NDArray[np.int64] | None = None
         diagonal = self.mass.petsc.getDiagonal()
         self._mass_diagonal = space.everywhere(diagonal.array).ravel()
@@ -145,16 +138,15 @@ class MovingBody:
             If it is not found.
         """
         factors = [first_factor(one.support.history) for one in self._supports]
+        load = self._first_loads()
         if self.scene.analysis.kinematics == "linear":
-            return self._linear_equilibrium(factors)
+            return self._linear_equilibrium(factors, load)
 
         def prescribed(share: float) -> Array:
             pairs = zip(self._supports, factors, strict=True)
             return self._filled([one.values(share * factor, 0.0) for one, factor in pairs])
 
-        found = solve_large_strain(
-            self.scene.material, self.space, self.held, prescribed, self._first_loads
-        )
+        found = solve_large_strain(self.scene.material, self.space, self.held, prescribed, load)
         return found.displacement.ravel()
 
     def accelerations(self, forces: Array) -> Array:
@@ -218,12 +210,7 @@ class MovingBody:
         whole = NodalSolver(matrix, self.law.unknowns, self._own_held, kind, largest=1e-3)
         return TiedSolver(whole, self.ties, self._lasting, self._own_held)
 
-    def _linear_equilibrium(self, factors: list[float]) -> Array:
-        load = self.weight.copy()
-        for forces, history in self._driven:
-            load += first_factor(history) * forces
-        for timed in self._timed:
-            load += first_factor(timed.history) * self._forces(timed)
+    def _linear_equilibrium(self, factors: list[float], load: Array) -> Array:
         u = np.zeros_like(load)
         pairs = zip(self._supports, factors, strict=True)
         u[self.held] = self._filled([one.values(factor, 0.0) for one, factor in pairs])
@@ -235,24 +222,20 @@ class MovingBody:
         solver.destroy()
         return found
 
-    def _first_loads(self, v: Any) -> Any:
-        """Linear form of all loads with their first factors."""
-        form = self._load_form(None, v)
-        for load in self.scene.loads:
-            form += first_factor(getattr(load, "history", None)) * self._load_form(load, v)
-        return form
+    def _first_loads(self) -> Array:
+        """Sum the nodal forces (k,) of all loads with their first factors, N."""
+        load = self.weight.copy()
+        for forces, history in self._driven:
+            load += first_factor(history) * forces
+        for timed in self._timed:
+            load += first_factor(timed.history) * self._forces(timed)
+        return load
 
     def _forces(self, load: Any, time: float = 0.0) -> Array:
         """Nodal forces (k,) of a load at a time, N, without the factor of its history."""
-        import ufl
-
-        v = ufl.TestFunction(self.space.function_space)
-        return nodal_forces(self._load_form(load, v, time), self.space)
-
-    def _load_form(self, load: Any, v: Any, time: float = 0.0) -> Any:
-        alone = self.scene.model_copy(update={"loads": [load] if load is not None else []})
+        alone = self.scene.model_copy(update={"loads": [load]})
         alone._file, alone._name = self.scene.file, self.scene.name
-        return load_form(alone, self.space, v, self.exact, time)
+        return load_forces(alone, self.space, self.exact, time)
 
     def _found(self) -> list[_Held]:
         """Find what each support holds."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reference.dynamics import Scheme
 from reference.dynamics_body import MovingBody
 from reference.nodal_algebra import NodalSolver
-from reference.tied_solver import TiedSolver
+from reference.ties import TiedSolver
 
 Array = NDArray[np.float64]
 

@@ -3,20 +3,17 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.inside_out import Orientation, place_text
+from reference.law import ENERGIES, Law
 from reference.space import ConformingSpace
 from reference.strain_equations import StrainEquations
 from verify.scene import Material
 
 Array = NDArray[np.float64]
-Energy = Literal[
-    "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
-]
 _SMALLEST_STEP = 1e-4
 # of a path; one in smaller steps has met what no mesh resolves
 _MOST = {"accepted steps": 100, "refused steps": 50, "Newton iterations": 1000}
@@ -75,8 +72,9 @@ def solve_large_strain(
     space: ConformingSpace,
     unknowns: NDArray[np.int32],
     prescribed: Callable[[float], Array],
-    load: Any = None,
-    energy: Energy = "corotated",
+    load: Array | None = None,
+    energy: str = "corotated",
+    pressure: bool = False,
     first_step: float = 0.25,
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
@@ -96,11 +94,13 @@ def solve_large_strain(
         Constrained scalar unknowns.
     prescribed : callable
         Their values (k,) in m at a load factor in [0, 1].
-    load : callable, optional
-        Gives the linear form of the dead loads for a test function; scaled by the load factor.
-    energy : Energy
-        Density: μ‖U−I‖² + ½λ tr²(U−I), or one of those in plane strain or in space. Mixed: with
-        the pressure as an unknown, of quadratic elements, for nearly incompressible material.
+    load : (n · d,) array, optional
+        Nodal forces of the dead loads, N; scaled by the load factor.
+    energy : str
+        A name in `reference.law.ENERGIES`.
+    pressure : bool
+        Whether the pressure is an unknown, of quadratic elements, for nearly incompressible
+        material.
     first_step : float
         First increment of the load factor.
 
@@ -114,7 +114,11 @@ def solve_large_strain(
     """
 
     def path(step: float) -> LargeStrainSolve:
-        return _follow(material, space, unknowns, prescribed, load, energy, step)
+        start = perf_counter()
+        law, inverted = Law(material, space, energy, pressure), ENERGIES[energy].inverted
+        equations = StrainEquations(law, space, unknowns, load, inverted)
+        found = _follow(equations, prescribed, step)
+        return replace(found, timings={"solve": perf_counter() - start})
 
     one = path(first_step)
     if not one.negative_modes:
@@ -141,17 +145,9 @@ def solve_large_strain(
 
 
 def _follow(
-    material: Material,
-    space: ConformingSpace,
-    unknowns: NDArray[np.int32],
-    prescribed: Callable[[float], Array],
-    load: Any,
-    energy: Energy,
-    first_step: float,
+    equations: StrainEquations, prescribed: Callable[[float], Array], first_step: float
 ) -> LargeStrainSolve:
     """Go from load factor 0 to 1 in steps that adapt."""
-    start = perf_counter()
-    equations = StrainEquations(material, space, unknowns, load, energy)
     factor, step, steps = 0.0, first_step, 0
     refused: list[str] = []
     x = equations.solution.x.petsc_vec
@@ -190,7 +186,7 @@ def _follow(
         steps,
         refused,
         equations.negative_modes(),
-        {"solve": perf_counter() - start},
+        {},
     )
     equations.destroy()
     return result

@@ -1,19 +1,20 @@
-"""Solving symmetric positive definite systems: directly, or by multigrid to a true residual."""
+"""Solving symmetric systems: directly, or by multigrid to a true residual."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.space import ConformingSpace
+from reference.unknowns import Unknowns
 
 LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
 _RUNS = 6
 _ROUND_OFFS = 4.0  # a row has some tens of entries: 1.1 to 3 were measured on thin strips
-_MULTIGRID = {
-    "ksp_norm_type": "unpreconditioned",
+_GAMG = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
     "pc_gamg_aggressive_coarsening": 1,
@@ -23,6 +24,20 @@ _MULTIGRID = {
     "mg_levels_esteig_ksp_type": "cg",
     "mg_coarse_pc_type": "lu",
     "mg_coarse_pc_factor_mat_solver_type": "mumps",
+}
+_MULTIGRID = {"ksp_norm_type": "unpreconditioned", **_GAMG}
+# of a saddle point: multigrid for the displacements, and a mass for the pressures
+_BLOCKS = {
+    "pc_type": "fieldsplit",
+    "pc_fieldsplit_type": "schur",
+    "pc_fieldsplit_schur_fact_type": "diag",
+    "pc_fieldsplit_schur_precondition": "user",
+    "fieldsplit_u_ksp_type": "preonly",
+    **{f"fieldsplit_u_{name}": value for name, value in _GAMG.items()},
+    "fieldsplit_p_ksp_type": "chebyshev",
+    "fieldsplit_p_ksp_max_it": 4,
+    "fieldsplit_p_ksp_convergence_test": "skip",
+    "fieldsplit_p_pc_type": "jacobi",
 }
 
 
@@ -214,6 +229,70 @@ def solve_by_multigrid(matrix: Any, x: Any, vector: Any, tolerance: float) -> An
         solver.destroy()
 
 
+def solve_saddle(
+    matrix: Any,
+    weight: Any,
+    space: ConformingSpace,
+    mixed: Unknowns,
+    x: Any,
+    vector: Any,
+    tolerance: float,
+) -> Answer:
+    """Solve by MINRES with GAMG for the displacements and a mass for the pressures.
+
+    Parameters
+    ----------
+    matrix, x, vector : PETSc Mat and Vecs
+        x holds the values of the constrained unknowns and zeros else.
+    weight : PETSc Mat
+        Of the pressures, on all unknowns: like minus their Schur complement.
+    space : ConformingSpace
+        Of the displacements.
+    mixed : Unknowns
+        Of `mixed_unknowns`.
+    tolerance : float
+        Of the true residual, relative to that of the start.
+
+    Raises
+    ------
+    RuntimeError
+        If the tolerance is not reached; with PETSc's reason.
+    """
+    from petsc4py import PETSc
+
+    # GAMG wants the components of a node side by side, so the order of `space` is kept in the block
+    own, at = mixed.own_unknowns(space.nodal)
+    of_u, of_p = mixed.indices(own[np.argsort(at)]), mixed.indices(mixed.pressures)
+    of_u.setBlockSize(space.dimension)
+    block = matrix.createSubMatrix(of_u, of_u)
+    near = near_null_space(block, space)
+    of_u.compose("nearnullspace", near)
+    mass = weight.createSubMatrix(of_p, of_p)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("minres")
+    solver.setInitialGuessNonzero(True)
+    split: Any = solver.getPC()
+    split.setType("fieldsplit")
+    split.setFieldSplitIS(("u", of_u), ("p", of_p))
+    split.setFieldSplitSchurPreType(PETSc.PC.FieldSplitSchurPreType.USER, mass)
+    wanted = 0.1 * tolerance
+
+    def aim(_loads: float, left: float) -> None:
+        # MINRES minimises the preconditioned residual, and judges by it
+        nonlocal wanted
+        wanted *= min(0.1, 0.5 * tolerance / left) if left else 1.0
+        solver.setTolerances(rtol=wanted, atol=0.0, max_it=_MOST_ITERATIONS)
+
+    method = "MINRES with GAMG and pressures"
+    try:
+        with _options(solver, "mixed_", _BLOCKS):
+            return iterate(solver, matrix, x, vector, tolerance, aim, method, persist=True)
+    finally:
+        for entry in (solver, near, block, mass, of_u, of_p):
+            entry.destroy()
+
+
 def iterate(
     solver: Any,
     matrix: Any,
@@ -281,15 +360,25 @@ def _round_off(matrix: Any, x: Any, work: Any) -> float:
 
 def set_multigrid(solver: Any) -> None:
     """Let a PETSc KSP be preconditioned by GAMG, its norm that of the true residual."""
+    with _options(solver, "reference_", _MULTIGRID):
+        pass
+
+
+@contextmanager
+def _options(solver: Any, prefix: str, given: dict[str, Any]) -> Iterator[None]:
+    """Set a PETSc KSP by options, which what it makes later may read until the end."""
     from petsc4py import PETSc
 
-    solver.setOptionsPrefix("reference_")
     options: Any = PETSc.Options()
-    for name, value in _MULTIGRID.items():
-        options[f"reference_{name}"] = value
+    solver.setOptionsPrefix(prefix)
+    for name, value in given.items():
+        options[prefix + name] = value
     solver.setFromOptions()
-    for name in _MULTIGRID:
-        options.delValue(f"reference_{name}")
+    try:
+        yield
+    finally:
+        for name in given:
+            options.delValue(prefix + name)
 
 
 def near_null_space(matrix: Any, space: ConformingSpace) -> Any:
@@ -341,6 +430,14 @@ def _factorised(matrix: Any, kind: str) -> Any:
     solver.getPC().setFactorSolverType("mumps")
     solver.setUp()
     return solver
+
+
+def mean_stiffness(matrix: Any) -> float:
+    """Give a mean diagonal entry: a constrained unknown shall not stand out among the others."""
+    diagonal = matrix.getDiagonal()
+    mean = float(diagonal.sum()) / diagonal.getSize()
+    diagonal.destroy()
+    return mean
 
 
 def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:

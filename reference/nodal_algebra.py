@@ -9,16 +9,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import mean_stiffness
 from reference.linear_solvers import (
     LARGEST_CORRECTION,
     direct_solver,
     general_solver,
+    mean_stiffness,
     preconditioned_gradients,
     solve_directly,
     symmetric_solver,
 )
-from reference.space import ConformingSpace, SharedUnknowns
+from reference.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 _MOST = 10_000  # iterations
@@ -35,18 +35,18 @@ class NodalMatrix:
     Parameters
     ----------
     petsc_matrix : PETSc Mat
-    space : ConformingSpace
+    unknowns : Unknowns
     """
 
-    def __init__(self, petsc_matrix: Any, space: ConformingSpace) -> None:
-        self.petsc, self._space = petsc_matrix, space
+    def __init__(self, petsc_matrix: Any, unknowns: Unknowns) -> None:
+        self.petsc, self._unknowns = petsc_matrix, unknowns
         self._in, self._out = petsc_matrix.createVecs()
 
     def __matmul__(self, values: Array) -> Array:
         """Multiply an array (k,)."""
-        self._in.array[:] = self._space.own_part(values)
+        self._in.array[:] = self._unknowns.own_part(values)
         self.petsc.mult(self._in, self._out)
-        return self._space.everywhere(self._out.array).ravel()
+        return self._unknowns.everywhere(self._out.array).ravel()
 
 
 class NodalSolver:
@@ -60,7 +60,7 @@ class NodalSolver:
     ----------
     matrix : PETSc Mat
         Changed, and destroyed with the solver.
-    unknowns : ConformingSpace or MixedSpace
+    unknowns : Unknowns
         Of the matrix.
     held : (h,) int array
         Scalar displacements, by nodes.
@@ -74,7 +74,7 @@ class NodalSolver:
     def __init__(
         self,
         matrix: Any,
-        unknowns: SharedUnknowns,
+        unknowns: Unknowns,
         held: NDArray[np.int32],
         kind: Literal["definite", "symmetric", "general"] = "definite",
         largest: float = LARGEST_CORRECTION,
@@ -158,18 +158,10 @@ def assembled_matrix(form: Any) -> Any:
     return matrix
 
 
-def nodal_forces(form: Any, space: ConformingSpace) -> Array:
+def nodal_forces(form: Any, unknowns: Unknowns) -> Array:
     """Assemble a linear form (of UFL, or compiled); (k,)."""
     from dolfinx import fem, la
 
     vector = fem.assemble_vector(fem.form(form))
     vector.scatter_reverse(la.InsertMode.add)
-    return space.everywhere(np.asarray(vector.array, dtype=float)).ravel()
-
-
-def nodal_integral(form: Any, space: ConformingSpace) -> float:
-    """Integrate a compiled form without arguments over the whole body."""
-    from dolfinx import fem
-
-    comm = space.function_space.mesh.comm
-    return float(comm.allreduce(float(np.real(fem.assemble_scalar(form)))))
+    return unknowns.everywhere(vector.array).ravel()

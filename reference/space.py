@@ -1,6 +1,5 @@
 """The finite element space of a conforming mesh: nodes, cells and boundary as arrays."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
 from reference.meshing.edge_splitting import mesh_edges
+from reference.unknowns import Unknowns
 
 # basix numbers the mid-nodes by the opposite edge, VTK along the outline
 _TO_VTK = {
@@ -22,59 +22,8 @@ _TO_VTK = {
 _VTK_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # the first three in the plane
 
 
-class SharedUnknowns(ABC):
-    """Scalar unknowns of a function space, of which every MPI rank owns some.
-
-    Attributes
-    ----------
-    function_space : dolfinx.fem.FunctionSpace
-    """
-
-    function_space: Any
-
-    @property
-    def first(self) -> int:
-        """Global number of the first unknown of this rank."""
-        dofmap = self.function_space.dofmap
-        return int(dofmap.index_map.local_range[0] * dofmap.index_map_bs)
-
-    @property
-    def own_size(self) -> int:
-        """Number of unknowns that this rank owns."""
-        dofmap = self.function_space.dofmap
-        return int(dofmap.index_map.size_local * dofmap.index_map_bs)
-
-    @abstractmethod
-    def own_unknowns(
-        self, unknowns: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Find which of some scalar displacements, numbered by nodes, are this rank's own.
-
-        Returns
-        -------
-        own : (l,) array
-            Their numbers on this rank.
-        at : (l,) array
-            Their places in `unknowns`.
-        """
-
-    @abstractmethod
-    def own_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the unknowns that this rank owns of nodal vectors (n, d), equal on all ranks."""
-
-    @abstractmethod
-    def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gather nodal vectors (n, d) on all ranks from the unknowns of each, its own first."""
-
-    def rows(self, unknowns: NDArray[np.int32]) -> Any:
-        """Give those of some scalar displacements that this rank owns as PETSc numbers them."""
-        from petsc4py import PETSc
-
-        return (self.own_unknowns(unknowns)[0] + self.first).astype(PETSc.IntType)
-
-
-@dataclass(frozen=True)
-class ConformingSpace(SharedUnknowns):
+@dataclass(eq=False)
+class ConformingSpace(Unknowns):
     """Vector Lagrange elements on a conforming mesh.
 
     Every rank of a parallel run knows the whole mesh and all its nodes; DOLFINx holds a part.
@@ -83,7 +32,6 @@ class ConformingSpace(SharedUnknowns):
     ----------
     mesh : ConformingMesh
     degree : int
-    function_space : dolfinx.fem.FunctionSpace
     cell_nodes : (m, k) int array
         Nodes of each cell of `mesh` in VTK's order.
     node_points : (n, d) float array
@@ -96,7 +44,6 @@ class ConformingSpace(SharedUnknowns):
 
     mesh: ConformingMesh
     degree: int
-    function_space: Any
     cell_nodes: NDArray[np.int64]
     node_points: NDArray[np.float64]
     dolfinx_cell: NDArray[np.int64]
@@ -186,38 +133,6 @@ class ConformingSpace(SharedUnknowns):
         """Number of (vector) unknowns that this rank owns."""
         return int(self.function_space.dofmap.index_map.size_local)
 
-    def own_unknowns(
-        self, unknowns: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Find which of some scalar unknowns are this rank's own; see the base class."""
-        d = self.dimension
-        place = np.full(self.node_points.size, -1, dtype=np.int64)
-        place[unknowns] = np.arange(len(unknowns))
-        at = place[(self.node_of_dof[: self.owned, None] * d + np.arange(d)).ravel()]
-        own = np.flatnonzero(at >= 0)
-        return own, at[own]
-
-    def own_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the unknowns that this rank owns of nodal vectors; see the base class."""
-        own = self.node_of_dof[: self.owned]
-        return np.asarray(values.reshape(-1, self.dimension)[own].ravel(), dtype=float)
-
-    def local_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give all unknowns of this rank, those of others last, of nodal vectors (n, d)."""
-        return np.asarray(values.reshape(-1, self.dimension)[self.node_of_dof].ravel(), dtype=float)
-
-    def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gather nodal vectors on all ranks; see the base class."""
-        d = self.dimension
-        values = np.zeros((len(self.node_points), d))
-        values[self.node_of_dof[: self.owned]] = local[: self.owned * d].reshape(-1, d)
-        comm = self.function_space.mesh.comm
-        if comm.size > 1:
-            from mpi4py import MPI
-
-            comm.Allreduce(MPI.IN_PLACE, values)  # a sum with zeros: exact, the same everywhere
-        return values
-
 
 def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> ConformingSpace:
     """Build the vector space of polynomials of `degree` (1 or 2) on `mesh`.
@@ -259,7 +174,35 @@ def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> Con
         number = np.argsort(node_of_dof)
         cell_nodes, node_points = number[cell_nodes], node_points[node_of_dof]
         node_of_dof = np.arange(len(node_points))
-    return ConformingSpace(mesh, degree, space, cell_nodes, node_points, dolfinx_cell, node_of_dof)
+    nodal = node_of_dof[: index_map.size_local, None] * d + np.arange(d)
+    return ConformingSpace(
+        space, node_points.shape, nodal.ravel(), mesh, degree, cell_nodes, node_points,
+        dolfinx_cell, node_of_dof,
+    )  # fmt: skip
+
+
+def mixed_unknowns(space: ConformingSpace) -> Unknowns:
+    """Add a pressure to quadratic displacements: continuous, linear (Taylor–Hood).
+
+    Both jump across the cut, whose nodes are doubled. On every rank its pressures are own unknowns
+    that are no nodal displacements.
+    """
+    import basix.ufl
+    from dolfinx import fem
+
+    V, d = space.function_space, space.dimension
+    cell = "triangle" if d == 2 else "tetrahedron"
+    pair = [
+        basix.ufl.element("Lagrange", cell, 2, shape=(d,)),
+        basix.ufl.element("Lagrange", cell, 1),
+    ]
+    both = fem.functionspace(V.mesh, basix.ufl.mixed_element(pair))
+    index_map = both.dofmap.index_map
+    nodal = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int64)
+    nodes = space.node_of_dof[np.asarray(V.dofmap.list, dtype=np.int64)]
+    for k in range(d):
+        nodal[both.sub(0).sub(k).dofmap.list] = nodes * d + k
+    return Unknowns(both, space.shape, nodal[: index_map.size_local])
 
 
 def _nodes(mesh: ConformingMesh, degree: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

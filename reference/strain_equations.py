@@ -5,25 +5,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.deformation import MembraneStretch
 from reference.dolfinx_versions import take_whole_steps
-from reference.elasticity import mean_stiffness
 from reference.inside_out import OrientationCheck, place_text
+from reference.law import Law, quadrature
 from reference.linear_solvers import (
+    mean_stiffness,
     modes_not_positive,
     near_null_space,
     set_multigrid,
     solve_directly,
 )
-from reference.membrane_stretch import MembraneStretch
-from reference.mixed_space import MixedDeformation, mixed_space
-from reference.mixed_stretch import MixedStretch
-from reference.moduli import lame_constants
-from reference.polar_stretch import PolarStretch
 from reference.rigid_motion import RigidMotions
-from reference.space import ConformingSpace, SharedUnknowns
-from reference.strain_energies import ENERGIES, virtual_work
-from verify.errors import InputError
-from verify.scene import Material
+from reference.space import ConformingSpace
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
@@ -35,8 +29,6 @@ _GOOD_ENOUGH = 1e-8  # of the force scale, where round-off does not let the resi
 _STAGNANT = 0.5  # of the residual of the iteration before, at round-off
 _DIVERGED = 1e4  # of the first residual or of the force scale
 _MOST_ITERATIONS = 25
-# share of the body that may be inside out at singular places
-_INVERTED = {"corotated": 1e-3, "corotated_mixed": 1e-3}  # none with the others
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
 # A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
@@ -50,14 +42,14 @@ class StrainEquations:
 
     Parameters
     ----------
-    material : Material
+    law : Law
     space : ConformingSpace
-    unknowns : (k,) int array
-        Constrained scalar unknowns, by nodes.
-    load : callable or None
-        Gives the linear form of the dead loads for a test function.
-    energy : str
-        A name in `ENERGIES`.
+    held : (k,) int array
+        Constrained nodal displacements.
+    load : (n · d,) array or None
+        Nodal forces of the dead loads, N.
+    most_inverted : float
+        Share of the body that may be inside out at singular places.
 
     Attributes
     ----------
@@ -72,54 +64,34 @@ class StrainEquations:
 
     def __init__(
         self,
-        material: Material,
+        law: Law,
         space: ConformingSpace,
-        unknowns: NDArray[np.int32],
-        load: Any,
-        energy: str,
+        held: NDArray[np.int32],
+        load: Array | None,
+        most_inverted: float,
     ) -> None:
-        import ufl
         from dolfinx import fem
         from dolfinx.fem import petsc
 
-        mixed = mixed_space(space) if energy.endswith("mixed") else None
-        V = space.function_space if mixed is None else mixed.function_space
-        self._mixed = mixed
-        self._space, self.iterations, self._most_inverted = space, 0, _INVERTED.get(energy, 0.0)
-        self._unknowns: SharedUnknowns = mixed or space
-        self._own, self._at = self._unknowns.own_unknowns(unknowns)
-        self._rows = self._unknowns.rows(unknowns)
-        self.solution = fem.Function(V)
-        self._factor = fem.Constant(V.mesh, 0.0)
-        membrane = space.mesh.cell_dimension < space.dimension
-        if membrane and energy != "corotated":
-            raise InputError(f"energy '{energy}' of a membrane; expected 'corotated'")
-        kinds: dict[str, Any] = {
-            "corotated_mixed": MixedStretch,
-            "neo_hookean_mixed": MixedDeformation,
-        }
-        kind = MembraneStretch if membrane else kinds.get(energy, PolarStretch)
-        self._polar = polar = kind(self.solution, 4 * space.degree - 2)
-        thickness = fem.Constant(V.mesh, material.thickness or 1.0)
-        v = ufl.TestFunction(V)
-        lam, mu = lame_constants(material, v)
-        residual = virtual_work(energy, polar, thickness * lam, thickness * mu, v)
-        if load is not None:
-            residual -= self._factor * load(v if mixed is None else ufl.split(v)[0])
-        self._energy = fem.form(thickness * ENERGIES[energy](polar, lam, mu) * polar.measure)
-        self._residual = fem.form(residual)
-        tangent = polar.derivative(residual, ufl.TrialFunction(V))
+        self._law, self._space, self.iterations = law, space, 0
+        self._most_inverted = most_inverted
+        self._unknowns, self.solution = law.unknowns, law.solution
+        self._own, self._at = self._unknowns.own_unknowns(held)
+        self._rows = self._unknowns.rows(held)
+        self._factor, self._is_membrane = 0.0, isinstance(law.state, MembraneStretch)
+        self._motions = RigidMotions(space, held)
+        self.orientation = OrientationCheck(space, held, law.state.J, quadrature_points(space))
         self._tension: Any = None
-        self._is_membrane, self._motions = membrane, RigidMotions(space, unknowns)
-        if membrane:
-            self._tension = fem.Constant(V.mesh, 1.0)
-            tension = thickness * self._tension * mu
-            tangent += tension * polar.across(ufl.TrialFunction(V), v) * polar.measure
-        self._tangent = fem.form(tangent)
-        self.orientation = OrientationCheck(space, unknowns, polar.J, quadrature_points(space))
+        if not self._is_membrane:
+            self._tangent = law.stiffness_form
+        else:
+            self._tension = fem.Constant(space.function_space.mesh, 1.0)
+            across = law.state.across(law.trial, law.test) * law.state.measure
+            self._tangent = fem.form(law.stiffness + self._tension * law.mu * across)
         self._matrix: Any = petsc.create_matrix(self._tangent)
         self._vector = self.solution.x.petsc_vec.duplicate()
-        self._increment = self._vector.duplicate()
+        self._increment, self._load = self._vector.duplicate(), self._vector.duplicate()
+        self._load.array[:] = 0.0 if load is None else self._unknowns.own_part(load)
         self._force = self._diagonal = 0.0
         self._first_residual = self._residual_before = np.inf
         self._solver = self._newton()
@@ -151,7 +123,7 @@ class StrainEquations:
         moved, before = x.array.copy(), self._internal_force()
         rests = bool(np.abs(values[self._at] - moved[self._own]).max(initial=0.0) == 0.0)
         rests = bool(x.comm.tompi4py().allreduce(int(rests)) == x.comm.size)
-        self._factor.value = np.asarray(target)
+        self._factor = target
         self._predict(values[self._at])
         solver = self._solver
         solver.solve(None, x)
@@ -210,7 +182,7 @@ class StrainEquations:
         """Say that the energy is not what was stored and the work since a state; or nothing."""
         x = self.solution.x.petsc_vec
         forces = before + self._internal_force()
-        forces[self._pressures()] = 0.0
+        forces[self._unknowns.pressures] = 0.0
         work = 0.5 * float(x.comm.tompi4py().allreduce(float(forces @ (x.array - moved))))
         energy = self.energy()
         excess = energy - stored - work
@@ -222,16 +194,8 @@ class StrainEquations:
 
     def _internal_force(self) -> Array:
         """Assemble the forces of the strain energy on the unknowns of this rank, N."""
-        from dolfinx.fem import petsc
-
-        factor = float(self._factor.value)
-        self._factor.value = np.asarray(0.0)
-        vector = petsc.assemble_vector(self._residual)
-        vector.ghostUpdate(addv=True, mode="reverse")
-        self._factor.value = np.asarray(factor)
-        forces = np.array(vector.array, dtype=float)
-        vector.destroy()
-        return forces
+        self._assemble_forces(self._vector)
+        return np.array(self._vector.array, dtype=float)
 
     def negative_modes(self) -> int | None:
         """Count modes in which the energy does not grow; None if that is not known.
@@ -245,7 +209,7 @@ class StrainEquations:
         self._assemble(self._matrix)
         self._matrix.zeroRowsColumns(self._rows, self._diagonal)
         comm = self._space.function_space.mesh.comm
-        return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._pressures())))
+        return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
 
     def displacement(self) -> Array:
         """Nodal displacements (n, d) on every rank, m."""
@@ -253,33 +217,23 @@ class StrainEquations:
 
     def energy(self) -> float:
         """Return the stored energy, J (in the plane per metre)."""
-        from dolfinx import fem
-
-        comm = self._space.function_space.mesh.comm
-        return float(comm.allreduce(float(np.real(fem.assemble_scalar(self._energy)))))
+        return self._law.stored()
 
     def destroy(self) -> None:
         """Free what PETSc holds."""
-        for entry in (self._solver, self._matrix, self._vector, self._increment):
+        for entry in (self._solver, self._matrix, self._vector, self._increment, self._load):
             entry.destroy()
 
     def _assemble_residual(self, _snes: Any, x: Any, out: Any) -> None:
-        from dolfinx.fem import petsc
-
         self._take(x)
-        with out.localForm() as local:
-            local.set(0.0)
-        petsc.assemble_vector(out, self._residual)
-        out.ghostUpdate(addv=True, mode="reverse")
+        self._assemble_forces(out)
+        out.axpy(-self._factor, self._load)
         out.array[self._own] = 0.0
 
     def _assemble_tangent(self, snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
         self._take(x)
         self._assemble(matrix, snes.getIterationNumber())
         matrix.zeroRowsColumns(self._rows, self._diagonal)
-
-    def _pressures(self) -> NDArray[np.int64]:
-        return np.empty(0, dtype=np.int64) if self._mixed is None else self._mixed.pressure_dofs
 
     def _follow(self, values: Array) -> None:
         """Let pieces turn with their supports; what is left is the linear response's."""
@@ -299,18 +253,14 @@ class StrainEquations:
 
     def _predict(self, values: Array) -> None:
         """Add the linear response to the increments of the prescribed values and of the load."""
-        from dolfinx.fem import petsc
-
         x, increment, vector = self.solution.x.petsc_vec, self._increment, self._vector
         self._take(x)
         self._assemble(self._matrix)
         if not self._diagonal:
             self._diagonal = mean_stiffness(self._matrix)
-        with vector.localForm() as local:
-            local.set(0.0)
-        petsc.assemble_vector(vector, self._residual)
-        vector.ghostUpdate(addv=True, mode="reverse")
+        self._assemble_forces(vector)
         vector.scale(-1.0)
+        vector.axpy(self._factor, self._load)
         increment.set(0.0)
         increment.array[self._own] = values - x.array[self._own]
         self._matrix.zeroRowsColumns(self._rows, self._diagonal, increment, vector)
@@ -332,8 +282,16 @@ class StrainEquations:
         mine = self.solution.x.petsc_vec
         if x.handle != mine.handle:
             x.copy(mine)
-        self.solution.x.scatter_forward()
-        self._polar.update()
+        self._law.update()
+
+    def _assemble_forces(self, out: Any) -> None:
+        """Assemble the forces of the strain energy on all unknowns."""
+        from dolfinx.fem import petsc
+
+        with out.localForm() as local:
+            local.set(0.0)
+        petsc.assemble_vector(out, self._law.work_form)
+        out.ghostUpdate(addv=True, mode="reverse")
 
     def _assemble(self, matrix: Any, iteration: int = 0) -> None:
         from dolfinx.fem import petsc
@@ -362,7 +320,7 @@ class StrainEquations:
         # symmetric, but a tangent at finite rotation need not be definite
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         few = space.mesh.cell_dimension == 2 or space.node_points.size <= _MOST_DIRECT
-        if few or self._mixed is not None:  # multigrid is for displacements alone
+        if few or self._law.state.p is not None:  # multigrid is for displacements alone
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
             linear.getPC().setFactorSolverType("mumps")
@@ -383,4 +341,4 @@ def quadrature_points(space: ConformingSpace) -> Array:
 
     plane = space.mesh.cell_dimension == 2
     cell = basix.CellType.triangle if plane else basix.CellType.tetrahedron
-    return np.asarray(basix.make_quadrature(cell, 4 * space.degree - 2)[0], dtype=float)
+    return np.asarray(basix.make_quadrature(cell, quadrature(space))[0], dtype=float)

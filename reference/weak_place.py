@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.linear_solvers import IllConditionedError
-from reference.space import ConformingSpace, SharedUnknowns
+from reference.space import ConformingSpace
+from reference.unknowns import Unknowns
 from verify.errors import InputError
 from verify.scene import Scene
 
 
 @contextmanager
 def naming_weak_places(
-    scene: Scene, space: ConformingSpace, unknowns: SharedUnknowns | None = None
+    scene: Scene, space: ConformingSpace, unknowns: Unknowns | None = None
 ) -> Iterator[None]:
     """Say of a system that is lost in round-off where the body is held too weakly.
 
@@ -23,7 +24,7 @@ def naming_weak_places(
     scene : Scene
     space : ConformingSpace
         Of the displacements.
-    unknowns : SharedUnknowns, optional
+    unknowns : Unknowns, optional
         Of the system, if it has others beside.
 
     Raises

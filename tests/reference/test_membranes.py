@@ -7,7 +7,7 @@ from case_texts import cut_text, sheet_text, support_text, weight_text
 from reference_scenes import needs_fenicsx, square
 from scipy.optimize import brentq
 
-from reference.dynamics_law import CorotatedLaw
+from reference.law import law_of as law_of_material
 from reference.meshing import imprint_surface, open_cut
 from reference.space import conforming_space
 from verify.assess.quantities import Measured
@@ -159,7 +159,7 @@ def moved(scene, name="conforming", level=0, **parameters):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_mean_force_on_a_membrane_is_a_discrete_gradient_and_turns_nothing(degree):
     space = conforming_space(open_cut(*bowl(2), NONE), degree)
-    mechanics, x = CorotatedLaw(SKIN, space), space.node_points
+    mechanics, x = law_of_material(SKIN, space, "corotational"), space.node_points
     random = np.random.default_rng(1)
     for size in (1e-3, 0.05, 0.2):
         u, later = size * random.standard_normal((2, *x.shape))

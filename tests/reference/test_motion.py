@@ -7,7 +7,7 @@ from reference_scenes import needs_fenicsx, polyline, square
 from scipy.sparse.linalg import eigsh
 
 from reference.dynamics import inherit
-from reference.linear_system import linear_system
+from reference.elasticity import linear_system
 from reference.meshing import Grading, conforming_mesh, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut

@@ -137,10 +137,7 @@ def test_a_load_is_that_of_its_piece_for_every_way_to_cut(d, cells, number):
 @pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (2,))])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degree):
-    import ufl
-
-    from reference.elasticity import load_form
-    from reference.nodal_algebra import nodal_forces
+    from reference.loads import load_forces
     from reference.space import conforming_space
     from verify.solvers.conforming_meshes import peer_mesh, reference_mesh
 
@@ -149,8 +146,7 @@ def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degr
     meshes = [peer_mesh(scene, level, "imprinted") for level in range(len(cells))]
     for mesh in (*meshes, reference_mesh(scene, 0)[0]):
         space = conforming_space(mesh, degree)
-        form = load_form(scene, space, ufl.TestFunction(space.function_space), None)
-        forces = nodal_forces(form, space).reshape(-1, d)
+        forces = load_forces(scene, space, None).reshape(-1, d)
         drawn.check(forces, space.node_points, space.beside_nodes())
 
 

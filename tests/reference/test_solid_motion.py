@@ -6,7 +6,7 @@ from reference_scenes import needs_fenicsx
 from solid_scenes import cube, polygon
 
 from reference import dynamics_body, nodal_algebra
-from reference.dynamics_law import CorotatedLaw
+from reference.law import law_of
 from reference.meshing import open_cut, structured_tetrahedra
 from reference.space import conforming_space
 from verify.scene import Material
@@ -41,7 +41,7 @@ def solved(scene, **parameters):
 def law(degree, counts=(1, 1, 1)):
     mesh = open_cut(*structured_tetrahedra((0, 0, 0), (1, 1, 1), counts), NONE)
     space = conforming_space(mesh, degree)
-    return CorotatedLaw(TISSUE, space), space.node_points
+    return law_of(TISSUE, space, "corotational"), space.node_points
 
 
 @pytest.mark.parametrize("degree", [1, 2])

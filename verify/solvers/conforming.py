@@ -5,14 +5,13 @@ from typing import Any
 
 from reference.boundary_values import constrained_values, support_ends
 from reference.dolfinx_versions import import_dolfinx
-from reference.elasticity import load_form, solve_linear
+from reference.elasticity import linear_system, solve_linear, wants_pressure
 from reference.exact import exact_of
 from reference.fracture.pressure import MIXED
 from reference.inside_out import place_text
 from reference.large_strain import LargeStrainSolve, solve_large_strain
-from reference.linear_system import linear_system
+from reference.loads import load_forces
 from reference.meshing import ConformingMesh
-from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
@@ -217,7 +216,7 @@ def _equilibrium(
 ) -> dict[str, Any]:
     """Solve a scene by its kinematics; with a pressure if that is wanted."""
     if scene.analysis.kinematics == "linear":
-        linear = (solve_mixed if pressure else solve_linear)(scene, space, exact)
+        linear = solve_linear(scene, space, exact, pressure=pressure)
         record.notes = {
             "unknowns": MIXED if pressure else "displacement",
             "linear solver": linear.answer.method,
@@ -237,8 +236,8 @@ def _equilibrium(
             space,
             unknowns,
             lambda factor: constrained_values(scene, space, exact, factor)[1],
-            lambda v: load_form(scene, space, v, exact),
-            "corotated_mixed" if pressure else "corotated",
+            load_forces(scene, space, exact),
+            pressure=pressure,
         )
     state = finite.orientation
     record.notes = {

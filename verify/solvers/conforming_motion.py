@@ -12,11 +12,10 @@ from reference.dynamics_body import MovingBody
 from reference.dynamics_cuts import opening_times, partly_opened
 from reference.dynamics_ledger import Ledger
 from reference.dynamics_step import State, Stepper
-from reference.dynamics_ties import facing_nodes
 from reference.fracture.pressure import MIXED
 from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
-from reference.tied_solver import lasting_ties
+from reference.ties import facing_nodes, lasting_ties
 from reference.weak_place import naming_weak_places
 from verify.declared_mass import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut

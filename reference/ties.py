@@ -1,4 +1,4 @@
-"""A factorised system of which ties are dropped one after the other, without a new factorisation.
+"""Ties of a cut that is still closed, and systems of which they are dropped one after the other.
 
 The matrix A is that of the body with its whole cut open, factorised once. Ties B u = 0 are forces
 λ between the nodes that they hold together: S λ = B A⁻¹ f with S = B A⁻¹ Bᵀ, u = A⁻¹ (f − Bᵀ λ).
@@ -14,11 +14,30 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from reference.dynamics_ties import TiedUnknowns
+from reference.meshing.opening import cell_facets, interior_facets
 from reference.nodal_algebra import NodalSolver
+from reference.space import ConformingSpace
+from reference.unknowns import TiedUnknowns
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
+
+
+def facing_nodes(space: ConformingSpace) -> Numbers:
+    """Pairs (f, q, 2) of nodes at one place on both sides of each facet of `mesh.cut_facets`."""
+    mesh, k = space.mesh, space.mesh.cell_dimension
+    before = mesh.parent[mesh.cells]
+    first, second, is_cut, _ = interior_facets(before, mesh.cut_facets)
+    first, second = first[is_cut], second[is_cut]
+    facets = cell_facets(before)
+    order = np.lexsort(facets[first].T[::-1])
+    assert np.array_equal(facets[first][order], mesh.cut_facets)
+    both = np.stack([space.facet_nodes(*np.divmod(s[order], k + 1)) for s in (first, second)])
+    # nodes that face each other lie at the same place, to the last digit
+    _, place = np.unique(space.node_points[both.ravel()], axis=0, return_inverse=True)
+    rank = np.argsort(place.reshape(both.shape), axis=2)
+    facing: Numbers = np.moveaxis(np.take_along_axis(both, rank, axis=2), 0, 2)
+    return facing
 
 
 def lasting_ties(facing: Numbers, opening: Array) -> Numbers:
@@ -61,7 +80,7 @@ class TiedSolver:
         self, solver: NodalSolver, ties: TiedUnknowns, lasting: Numbers, held: NDArray[np.int32]
     ) -> None:
         self._solver, self._ties, self._lasting = solver, ties, lasting
-        count, d = len(ties.leader), ties.dimension
+        count, d = ties.shape
         free = np.ones(count * d)
         free[held] = 0.0
         ends = (lasting[:, None] * d + np.arange(d)[:, None]).reshape(-1, 2)

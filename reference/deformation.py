@@ -1,4 +1,4 @@
-"""Rotation and stretch of a deformation gradient F = R U for forms, without eigenvalues.
+"""Deformation of a displacement, for forms: its gradient, and F = R U without eigenvalues.
 
 In the plane s = tr U is √((F₁₁+F₂₂)² + (F₁₂−F₂₁)²). In space it is the largest root of
 
@@ -13,7 +13,15 @@ whose denominator is twice the product of all sums of two principal stretches. S
 the quadrature points, found by Newton's method, and this rational formula do for a form and, by the
 chain rule, for its derivative.
 
-All of it is written in H = F − I, with what is 1 or I at rest taken out by hand: strains and forces
+On a membrane, with the projection P on the tangent plane of a triangle in space and F = P + ∇u,
+whose gradient is tangential, the two stretches in the plane have J² = ½ (I₁² − tr C²), and
+
+    s = √(I₁ + 2 J),    U = (C + J P) / s,    R = F U⁻¹,    U⁻¹ = (s P − U) / J.
+
+R takes the tangent plane to the deformed one without stretch. There is no det F with a sign: a
+membrane has no bending stiffness, and one folded over is as good as turned.
+
+All of it is written in H = ∇u, with what is 1 or I at rest taken out by hand: strains and forces
 are right to round-off of H, and not of F, so that a load of 1e-12 of Young's modulus is solved as
 well as any other.
 """
@@ -27,41 +35,80 @@ Array = NDArray[np.float64]
 _MOST_ITERATIONS = 80  # a double root (an inverted cell without a nearest rotation) halves errors
 
 
-class PolarStretch:
-    """Deformation gradient of a displacement, with the factors of its polar decomposition.
+class Deformation:
+    """Gradient of a displacement, with the pressure that may be an unknown beside it.
 
     Parameters
     ----------
     solution : dolfinx.fem.Function
-        Of a vector space on triangles or tetrahedra: the displacement.
-    degree : int
-        Of the quadrature of the forms; they must be measured by `measure`.
+        Of a vector space on simplices: the displacement; or of a mixed space that has a pressure
+        as its last component.
+    degree : int, optional
+        Of the quadrature of the forms, which must be measured by `measure`; default: UFL's.
 
     Attributes
     ----------
-    F, H, R : ufl expressions (d, d)
-        H = F − I.
-    away : ufl expression (d, d)
-        F − R = R (U − I).
+    F, H : ufl expressions (d, d)
+        H = ∇u, F = I + H.
     J : ufl expression
         det F.
-    trace : ufl expression
-        tr(U − I); where det F < 0 the least stretch is negative.
+    p : ufl expression or None
+        The pressure, Pa; positive in tension.
     measure : ufl.Measure
         dx with the quadrature of `degree`.
+    """
+
+    def __init__(self, solution: Any, degree: int | None = None) -> None:
+        import ufl
+
+        mesh = solution.function_space.mesh
+        d = self._dimension = mesh.geometry.dim
+        self._solution = solution
+        self.p = solution[d] if len(solution) > d else None
+        metadata = {} if degree is None else {"quadrature_degree": degree}
+        self.measure = ufl.Measure("dx", domain=mesh, metadata=metadata)
+        self.H = self.gradient(solution)
+        self.F = ufl.Identity(d) + self.H
+        self.J = ufl.det(self.F)
+
+    def update(self) -> None:
+        """Follow the solution; before a form is assembled."""
+
+    def derivative(self, form: Any, direction: Any) -> Any:
+        """Differentiate a form by the solution."""
+        import ufl
+
+        return ufl.derivative(form, self._solution, direction)
+
+    def gradient(self, of: Any) -> Any:
+        """Gradient of the displacement in a function or argument of the solution's space."""
+        import ufl
+
+        gradient, d = ufl.grad(of), self._dimension
+        if len(of) == d:
+            return gradient
+        # not that of a part split off: UFL does not differentiate it along its own direction
+        return ufl.as_tensor([[gradient[i, j] for j in range(d)] for i in range(d)])
+
+
+class PolarStretch(Deformation):
+    """Deformation with the factors of its polar decomposition, in the plane or in space.
+
+    Attributes
+    ----------
+    R : ufl expression (d, d)
+    away : ufl expression (d, d)
+        F − R = R (U − I).
+    trace : ufl expression
+        tr(U − I); where det F < 0 the least stretch is negative.
     """
 
     def __init__(self, solution: Any, degree: int) -> None:
         import ufl
 
-        mesh = solution.function_space.mesh
-        d = mesh.geometry.dim
-        self._solution = solution
+        super().__init__(solution, degree)
         self._trace: Any = None
-        self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
-        self.H = self.gradient(solution)
-        self.F = ufl.Identity(d) + self.H
-        self.J = ufl.det(self.F)
+        mesh, d = solution.function_space.mesh, self._dimension
         turn = self._in_plane() if d == 2 else self._in_space(mesh, degree)
         self.R, self.away = ufl.Identity(d) + turn, self.H - turn
         self.update()
@@ -104,7 +151,7 @@ class PolarStretch:
         return (above - below * identity) / (16 + below)
 
     def update(self) -> None:
-        """Follow the displacement; before a form is assembled."""
+        """Find the traces at the quadrature points in space."""
         if self._trace is not None:
             mesh = self._trace.function_space.mesh
             gradients = np.asarray(self._deformation.eval(mesh, self._cells), dtype=float)
@@ -114,17 +161,49 @@ class PolarStretch:
         """Differentiate a form by the solution: R is the derivative of the trace."""
         import ufl
 
-        total = ufl.derivative(form, self._solution, direction)
+        total = super().derivative(form, direction)
         if self._trace is None:
             return total
         along = ufl.inner(self.R, self.gradient(direction))
         return total + ufl.derivative(form, self._trace, along)
 
-    def gradient(self, of: Any) -> Any:
-        """Gradient of the displacement in a function or argument of the solution's space."""
+
+class MembraneStretch(Deformation):
+    """Deformation of triangles in space, with its rotation and stretch in the tangent planes.
+
+    F, R and `away` are of rank 2, as those of `PolarStretch` else; F = P + H.
+
+    Attributes
+    ----------
+    J, trace : ufl expressions
+        Change of area; sum of the two stretches, less 2.
+    """
+
+    def __init__(self, solution: Any, degree: int) -> None:
         import ufl
 
-        return ufl.grad(of)
+        super().__init__(solution, degree)
+        mesh, H = solution.function_space.mesh, self.H
+        plane = ufl.Jacobian(mesh) * ufl.JacobianInverse(mesh)
+        self._normal = ufl.Identity(3) - plane
+        F = self.F = plane + H
+        G = plane * H + H.T * plane + H.T * H  # C − P
+        g = ufl.tr(G)
+        second = (g**2 - ufl.tr(G * G)) / 2
+        self.J = ufl.sqrt(1 + g + second)
+        swelling = (g + second) / (1 + self.J)  # J − 1
+        s = ufl.sqrt(4 + g + 2 * swelling)
+        self.trace = (g + 2 * swelling) / (s + 2)
+        rest = self.trace - swelling
+        less = ((G - rest * plane) / s - rest * plane) / self.J  # P − U⁻¹
+        self.away = F * less
+        self.R = F - self.away
+
+    def across(self, trial: Any, test: Any) -> Any:
+        """Stiffness of a unit tension in all directions across the undeformed tangent planes."""
+        import ufl
+
+        return ufl.inner(self._normal * ufl.grad(trial), ufl.grad(test))
 
 
 def stretch_trace(H: Array) -> Array:

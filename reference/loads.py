@@ -1,0 +1,312 @@
+"""Loads of a scene on a conforming mesh: nodal forces, side-aware at the cuts.
+
+Tractions act on parts of the boundary, which may end inside a facet, and on the faces of cuts.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.moduli import density
+from reference.nodal_algebra import nodal_forces
+from reference.space import ConformingSpace
+from verify.errors import InputError
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, faces_of, is_uniform
+from verify.scene.part_pieces import Pieces, pieces_on_part
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# marks of the faces of cuts in a measure, beyond those of the loads on the boundary
+_FACE = 1_000_000
+_PART = 2_000_000  # and of facets in which loads end
+_WHOLE = 1e-12  # of a facet: what may be left of one that is loaded as a whole
+_DEGREE = 8  # of the rule for what is integrated over pieces of facets
+
+
+class CutFacets(NamedTuple):
+    """Facets of both faces of a cut.
+
+    Attributes
+    ----------
+    cell, opposite : (f,) int arrays
+        Cell of each, and the corner opposite to it.
+    positive : (f,) bool array
+        Whether its material is on the positive side of the cut.
+    """
+
+    cell: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+    positive: NDArray[np.bool_]
+
+
+class LoadedFacets(NamedTuple):
+    """Facets that a traction acts on.
+
+    Attributes
+    ----------
+    whole : (w,) int array
+        Those on all of which it acts, as rows of the mesh's `boundary`.
+    ended : (e,) int array
+        Those in which it ends.
+    pieces : Pieces
+        What is loaded of the latter; `facet` counts rows of `boundary`.
+    """
+
+    whole: Ints
+    ended: Ints
+    pieces: Pieces
+
+    def opposite_to(self, space: ConformingSpace, corner: int) -> "LoadedFacets":
+        """Return those in which it ends that are opposite to a corner of their cell."""
+        rows = self.ended[space.mesh.boundary[self.ended, 1] == corner]
+        pieces = self.pieces[np.isin(self.pieces.facet, rows)]
+        return LoadedFacets(np.zeros(0, dtype=np.int64), rows, pieces)
+
+
+def load_forces(scene: Scene, space: ConformingSpace, exact: Any, time: float = 0.0) -> Array:
+    """Nodal forces (k,) of all loads of a scene at a time, N, without factors of histories."""
+    import ufl
+
+    v = ufl.TestFunction(space.function_space)
+    return nodal_forces(load_form(scene, space, v, exact, time), space)
+
+
+def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: float = 0.0) -> Any:
+    """Sum up the linear form of all loads of a scene at a time for the test function `v`."""
+    import ufl
+    from dolfinx import fem
+
+    exact = None if exact is None else exact.at(time)
+    domain = space.function_space.mesh
+    form = ufl.inner(fem.Constant(domain, np.zeros(space.dimension)), v) * ufl.dx
+    thickness = scene.material.thickness or 1.0  # loads of a membrane are per volume and area too
+    tractions: dict[int, NDArray[np.int32]] = {}
+    parted: dict[int, list[tuple[int, Any]]] = {}
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Traction):
+            loaded = loaded_facets(scene, space, load, f"loads[{i}].where")
+            tractions[i] = _pairs(space, *space.mesh.boundary[loaded.whole].T)
+            parted[i] = []
+            for corner, pairs, given in _parted(space, loaded, load, exact, time):
+                mark = _PART + 4 * i + corner
+                tractions[mark] = pairs
+                parted[i].append((mark, given))
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, CutFaces):
+            cell, opposite, positive = cut_facets_of(scene, space, load, f"loads[{i}]")
+            tractions[_FACE + 2 * i] = _pairs(space, cell[positive], opposite[positive])
+            tractions[_FACE + 2 * i + 1] = _pairs(space, cell[~positive], opposite[~positive])
+    # all parts in one measure: DOLFINx takes one set of subdomains per form
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=list(tractions.items()))
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Gravity):
+            acceleration = fem.Constant(domain, np.asarray(load.acceleration, dtype=float))
+            form += density(scene.material, v) * ufl.inner(acceleration, v) * ufl.dx
+        elif isinstance(load, BodyForce):
+            force = (
+                _sided_function(space, exact.body_force, (space.dimension,))
+                if load.force == "exact"
+                else thickness * _density(space, load, load.force, time)
+            )
+            form += ufl.inner(force, v) * ufl.dx
+        elif isinstance(load, CutFaces):
+            given = _face_density(space, load, time)
+            one, other = ds(_FACE + 2 * i), ds(_FACE + 2 * i + 1)
+            if load.traction is None:
+                form -= given[0] * ufl.inner(ufl.FacetNormal(domain), v) * (one + other)
+            else:
+                form += ufl.inner(given, v) * one - ufl.inner(given, v) * other
+        elif load.traction == "exact":
+            stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
+            form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
+        else:
+            traction = thickness * _density(space, load, load.traction, time)
+            form += ufl.inner(traction, v) * ds(i)
+        for mark, given in parted.get(i, []):
+            form += thickness * ufl.inner(given, v) * ds(mark)
+    return form
+
+
+def _parted(
+    space: ConformingSpace, loaded: LoadedFacets, load: Traction, exact: Any, time: float
+) -> Iterator[tuple[int, NDArray[np.int32], Any]]:
+    """Facets in which a load ends, with their densities: corner opposite, pairs and a function.
+
+    Those of one function are opposite to the same corner: no cell has two of them.
+    """
+    from dolfinx import fem
+
+    if not len(loaded.ended):
+        return
+    domain = space.function_space.mesh
+    broken = fem.functionspace(domain, ("DG", space.degree, (space.dimension,)))
+    for corner in np.unique(space.mesh.boundary[loaded.ended, 1]):
+        mine = loaded.opposite_to(space, int(corner))
+        values = density_on_whole(space, mine, load, exact, time)
+        cell, opposite = space.mesh.boundary[mine.ended].T
+        here = space.dolfinx_cell[cell] >= 0
+        function = fem.Function(broken)
+        at = space.broken_facet_dofs(broken, cell[here], opposite[here])
+        function.x.array.reshape(-1, space.dimension)[at] = values[here]
+        yield int(corner), _pairs(space, cell[here], opposite[here]), function
+
+
+def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any, time: float) -> Any:
+    """Give a force per volume or area as a constant, or interpolated if it is a formula."""
+    from dolfinx import fem
+
+    if is_uniform(given):
+        return fem.Constant(space.function_space.mesh, np.asarray(given, dtype=float))
+    values = lambda points, _near: load.values(points, time)  # noqa: E731
+    return _sided_function(space, values, (space.dimension,))
+
+
+def _face_density(space: ConformingSpace, load: CutFaces, time: float) -> Any:
+    """Give what acts on the faces of a cut as a vector: a pressure (1,) or a traction (d,)."""
+    from dolfinx import fem
+
+    if is_uniform(load.components):
+        given = np.asarray(load.components, dtype=float)
+        return fem.Constant(space.function_space.mesh, given)
+    shape = (len(load.components),)
+    return _sided_function(space, lambda points, _near: load.given(points, time), shape)
+
+
+def _pairs(
+    space: ConformingSpace, cell: NDArray[np.int64], opposite: NDArray[np.int64]
+) -> NDArray[np.int32]:
+    """DOLFINx's pairs of cell and local facet of the facets opposite to corners of cells."""
+    # facet i lies opposite corner i; other ranks integrate over their cells themselves
+    pairs = np.column_stack([space.dolfinx_cell[cell], opposite])
+    own = space.function_space.mesh.topology.index_map(space.mesh.cell_dimension).size_local
+    pairs = pairs[(pairs[:, 0] >= 0) & (pairs[:, 0] < own)]
+    return pairs[np.argsort(pairs[:, 0], kind="stable")].astype(np.int32).ravel()
+
+
+def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...]) -> Any:
+    """Interpolate an exact field by discontinuous polynomials, each cell on its own side."""
+    from dolfinx import fem
+
+    d = space.dimension
+    degree = 4 if d == 2 else space.degree + 1  # in space quartics would take gigabytes
+    broken = fem.functionspace(space.function_space.mesh, ("DG", degree, shape))
+    here = np.flatnonzero(space.dolfinx_cell >= 0)
+    nodes = np.asarray(broken.dofmap.list, dtype=np.int64)[space.dolfinx_cell[here]]
+    points = broken.tabulate_dof_coordinates()[:, :d]
+    near = np.empty_like(points)
+    near[nodes] = space.centroids[here, None, :]
+    function = fem.Function(broken)
+    function.x.array[:] = values(points, near).ravel()
+    return function
+
+
+def cut_facets_of(scene: Scene, space: ConformingSpace, load: CutFaces, key: str) -> CutFacets:
+    """Find the facets that a load on the faces of a cut acts on; none if it is still closed.
+
+    Raises
+    ------
+    InputError
+        If there are none in a static scene.
+    """
+    mesh = space.mesh
+    cell, opposite = mesh.faces.T
+    k = mesh.cell_dimension
+    rest = np.array([[c for c in range(k + 1) if c != j] for j in range(k + 1)])
+    corners = mesh.points[mesh.cells[cell[:, None], rest[opposite]]]
+    middle = corners.mean(axis=1)
+    found = faces_of(scene, middle)
+    mine = found.cut == next(i for i, cut in enumerate(scene.cuts) if cut.name == load.cut)
+    if not mine.any() and scene.analysis.kind == "static":
+        raise InputError(f"{key}: cut '{load.cut}' has no face in the body", str(scene.file or ""))
+    inside = np.sum((mesh.points[mesh.cells[cell, opposite]] - middle) * found.normal, axis=1)
+    return CutFacets(cell[mine], opposite[mine], inside[mine] > 0.0)
+
+
+def loaded_facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> LoadedFacets:
+    """Find the facets that a traction acts on.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    corners = space.boundary_facets[1]
+    pieces = pieces_on_part(scene.geometry, load.where, corners)
+    if not len(pieces.facet):
+        raise InputError(f"{key}: no boundary facet lies in '{load.where}'", str(scene.file or ""))
+    covered = pieces.covered(len(corners))
+    whole, ended = covered > 1.0 - _WHOLE, (covered > 0.0) & (covered <= 1.0 - _WHOLE)
+    mine = pieces[ended[pieces.facet]]
+    return LoadedFacets(np.flatnonzero(whole), np.flatnonzero(ended), mine)
+
+
+def density_on_whole(
+    space: ConformingSpace, loaded: LoadedFacets, load: Traction, exact: Any, time: float
+) -> Array:
+    """Force per area on whole facets that does the work of a traction on pieces of them.
+
+    It is the polynomial of the space's degree with the same integrals against all shape functions:
+    what is loaded is the piece itself, though forms are integrated over facets. All facets must be
+    opposite to the same corner.
+
+    Returns
+    -------
+    (e, q, d) array
+        At the nodes of the facets in which the load ends, as `ConformingSpace.facet_nodes` has
+        them, Pa.
+    """
+    import basix
+
+    k = space.mesh.cell_dimension
+    cell_type = {2: basix.CellType.interval, 3: basix.CellType.triangle}[k]
+    at, weights = map(np.asarray, basix.make_quadrature(cell_type, _DEGREE))
+    rule = np.column_stack([1.0 - at.sum(axis=1), at])
+    weights = weights / weights.sum()
+    edges = space.edges_of_facet(int(space.mesh.boundary[loaded.ended[0], 1]))
+    shapes = _facet_shapes(rule, edges)
+    mass = np.einsum("q,qa,qb->ab", weights, shapes, shapes)
+    facet = np.searchsorted(loaded.ended, loaded.pieces.facet)
+    within = rule @ loaded.pieces.barycentric
+    points = within @ space.boundary_facets[1][loaded.pieces.facet]
+    values = _values(space, loaded, load, exact, time, points)
+    shapes, share = _facet_shapes(within, edges), loaded.pieces.share
+    given = np.einsum("r,q,rqa,rqc->rac", share, weights, shapes, values)
+    moments = np.zeros((len(loaded.ended), *given.shape[1:]))
+    np.add.at(moments, facet, given)
+    return np.asarray(np.linalg.solve(mass, moments))
+
+
+def _values(
+    space: ConformingSpace,
+    loaded: LoadedFacets,
+    load: Traction,
+    exact: Any,
+    time: float,
+    points: Array,
+) -> Array:
+    """Force per area (r, q, d) at points (r, q, d) of the pieces, Pa."""
+    if load.traction != "exact" and is_uniform(load.traction):
+        return np.broadcast_to(np.asarray(load.traction, dtype=float), points.shape)
+    flat = points.reshape(-1, points.shape[2])
+    if load.traction != "exact":
+        return np.asarray(load.values(flat, time)).reshape(points.shape)
+    rows = loaded.pieces.facet
+    near = np.repeat(space.centroids[space.mesh.boundary[rows, 0]], points.shape[1], axis=0)
+    stress = exact.stress(flat, near).reshape(*points.shape, -1)
+    normals = space.outward_normals(rows)
+    return np.asarray(np.einsum("rqij,rj->rqi", stress, normals))
+
+
+def _facet_shapes(barycentric: Array, edges: list[tuple[int, int]]) -> Array:
+    """Shape functions (…, q) of a facet at barycentric coordinates (…, k).
+
+    Those of the corners, and of the middles of edges in a quadratic one.
+    """
+    if not edges:
+        return barycentric
+    middles = [4.0 * barycentric[..., i] * barycentric[..., j] for i, j in edges]
+    corners = barycentric * (2.0 * barycentric - 1.0)
+    return np.concatenate([corners, np.stack(middles, axis=-1)], axis=-1)
