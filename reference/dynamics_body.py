@@ -1,7 +1,7 @@
 """Body in motion, as a scene states it: mass, elasticity, damping, loads and supports over time."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reference.boundary_values import nodes_on_part
 from reference.large_strain import solve_large_strain
 from reference.law import law_of, mass_matrix
+from reference.linear_solvers import Kind
 from reference.loads import load_forces
 from reference.nodal_algebra import NodalMatrix, NodalSolver
 from reference.space import ConformingSpace
@@ -194,9 +195,7 @@ class MovingBody:
         """Take ties (p, 2) of `lasting_ties` for all that will ever be tied; see `step_solver`."""
         self._lasting = lasting
 
-    def step_solver(
-        self, matrix: Any, kind: Literal["symmetric", "general"]
-    ) -> NodalSolver | TiedSolver:
+    def step_solver(self, matrix: Any, kind: Kind) -> NodalSolver | TiedSolver:
         """Make the solver with a matrix of all unknowns, which is destroyed with it.
 
         What a solve misses the next iteration of a step corrects, if it is little. It is good

@@ -15,13 +15,12 @@ from reference.boundary_values import constrained_values
 from reference.law import Law, mass_matrix
 from reference.linear_solvers import (
     Answer,
-    direct_solver,
+    factorised,
     mean_stiffness,
     near_null_space,
     solve_by_multigrid,
     solve_directly,
     solve_saddle,
-    symmetric_solver,
 )
 from reference.loads import load_form
 from reference.moduli import lame
@@ -127,7 +126,7 @@ def solve_linear(
     matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix), x, vector)
     timings = {"assembly": perf_counter() - start}
     if method == "direct":
-        solver = (symmetric_solver if pressure else direct_solver)(matrix)
+        solver = factorised(matrix, "symmetric" if pressure else "definite")
         timings["factorisation"] = perf_counter() - start - timings["assembly"]
         with naming_weak_places(scene, space, unknowns):
             answer = solve_directly(solver, matrix, x, vector)

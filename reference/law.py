@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.deformation import Deformation, MembraneStretch, PolarStretch
-from reference.linear_solvers import direct_solver
+from reference.linear_solvers import factorised
 from reference.moduli import density, lame_constants
 from reference.nodal_algebra import assembled_matrix, nodal_forces
 from reference.space import ConformingSpace, mixed_unknowns
@@ -330,7 +330,7 @@ class LinearLaw(Law):
             self._of_p = of_p = self.unknowns.indices(self.unknowns.pressures)
             self._compliance = self._matrix.createSubMatrix(of_p, of_p)  # −C
             self._compliance.scale(-1.0)
-            self._pressure = direct_solver(self._compliance)
+            self._pressure = factorised(self._compliance)
 
     def energy(self, u: Array) -> float:
         """½ u·K u."""

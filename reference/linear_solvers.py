@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reference.space import ConformingSpace
 from reference.unknowns import Unknowns
 
+Kind = Literal["definite", "symmetric", "general"]  # the first two are symmetric
 LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
 _RUNS = 6
@@ -78,25 +79,21 @@ class IllConditionedError(RuntimeError):
         self.correction, self.size = correction, size
 
 
-def direct_solver(matrix: Any) -> Any:
-    """Factorise a symmetric positive definite matrix by MUMPS; gives a PETSc KSP."""
+def factorised(matrix: Any, kind: Kind = "definite") -> Any:
+    """Factorise a matrix by MUMPS; gives a PETSc KSP."""
     from petsc4py import PETSc
 
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    return symmetric_solver(matrix)
-
-
-def symmetric_solver(matrix: Any) -> Any:
-    """Factorise a symmetric matrix, definite or not, by MUMPS; gives a PETSc KSP."""
-    from petsc4py import PETSc
-
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return _factorised(matrix, "cholesky")
-
-
-def general_solver(matrix: Any) -> Any:
-    """Factorise a matrix that need not be symmetric by MUMPS; gives a PETSc KSP."""
-    return _factorised(matrix, "lu")
+    if kind != "general":
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    if kind == "definite":
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("preonly")
+    solver.getPC().setType("lu" if kind == "general" else "cholesky")
+    solver.getPC().setFactorSolverType("mumps")
+    solver.setUp()
+    return solver
 
 
 def preconditioned_gradients(matrix: Any, tolerance: float) -> Any:
@@ -418,18 +415,6 @@ def _orthonormal(matrix: Any, motions: NDArray[np.float64]) -> list[Any]:
         vector.normalize()
         modes.append(vector)
     return modes
-
-
-def _factorised(matrix: Any, kind: str) -> Any:
-    from petsc4py import PETSc
-
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    solver.getPC().setType(kind)
-    solver.getPC().setFactorSolverType("mumps")
-    solver.setUp()
-    return solver
 
 
 def mean_stiffness(matrix: Any) -> float:

@@ -4,19 +4,18 @@ Assembly, products and factorisations are distributed; what a motion does with v
 is not, so that every rank takes the same steps.
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.linear_solvers import (
     LARGEST_CORRECTION,
-    direct_solver,
-    general_solver,
+    Kind,
+    factorised,
     mean_stiffness,
     preconditioned_gradients,
     solve_directly,
-    symmetric_solver,
 )
 from reference.unknowns import Unknowns
 
@@ -26,7 +25,6 @@ _LEFT = 1e-12  # of a right side, by conjugate gradients: one solution for a lin
 # in ns, for a solid of n unknowns whose matrix has e entries (docs/theory/reference.md): an
 # iteration per entry, a factorisation per n² and a solution by it per n^(4/3)
 _ITERATION, _FACTORISATION, _SOLUTION = 2.0, 2.0, 40.0
-_SOLVERS = {"definite": direct_solver, "symmetric": symmetric_solver, "general": general_solver}
 
 
 class NodalMatrix:
@@ -76,7 +74,7 @@ class NodalSolver:
         matrix: Any,
         unknowns: Unknowns,
         held: NDArray[np.int32],
-        kind: Literal["definite", "symmetric", "general"] = "definite",
+        kind: Kind = "definite",
         largest: float = LARGEST_CORRECTION,
         iterates: bool = False,
     ) -> None:
@@ -91,7 +89,7 @@ class NodalSolver:
         self._x, self._b = matrix.createVecs()
 
     def _factorise(self) -> None:
-        self._solver = _SOLVERS[self._kind](self._matrix)
+        self._solver = factorised(self._matrix, self._kind)
 
     @property
     def iterates(self) -> bool:

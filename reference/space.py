@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
 from reference.meshing.edge_splitting import mesh_edges
+from reference.meshing.opening import measures
 from reference.unknowns import Unknowns
 
 # basix numbers the mid-nodes by the opposite edge, VTK along the outline
@@ -57,11 +58,7 @@ class ConformingSpace(Unknowns):
     @cached_property
     def measures(self) -> NDArray[np.float64]:
         """(m,) areas or volumes of the cells, m² or m³."""
-        corners = self.mesh.points[self.mesh.cells]
-        edges = corners[:, 1:] - corners[:, :1]
-        gram = np.linalg.det(edges @ edges.swapaxes(1, 2))
-        measures: NDArray[np.float64] = np.sqrt(gram) / (2 if edges.shape[1] == 2 else 6)
-        return measures
+        return measures(self.mesh.points[self.mesh.cells])
 
     @cached_property
     def centroids(self) -> NDArray[np.float64]:

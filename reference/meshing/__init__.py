@@ -6,7 +6,6 @@ from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.imprint_facets import Realised, imprint_facets
 from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
-from reference.meshing.imprint_surface import imprint_surface
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.refinement import refine_uniformly
 
@@ -20,7 +19,6 @@ __all__ = [
     "imprint",
     "imprint_facets",
     "imprint_polygons",
-    "imprint_surface",
     "open_cut",
     "refine_uniformly",
     "singular_points",

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.session import gmsh_session, simplices
+from reference.meshing.session import add_polygon, gmsh_session, set_sizes, simplices
 
 
 def background_mesh(
@@ -25,15 +25,9 @@ def background_mesh(
     """
     origin, scale = outline.min(axis=0), float(np.ptp(outline, axis=0).max())
     with gmsh_session() as gmsh:
-        occ = gmsh.model.occ
-        corners = [occ.addPoint(x, y, 0.0) for x, y in (outline - origin) / scale]
-        edges = [
-            occ.addLine(corners[i], corners[(i + 1) % len(corners)]) for i in range(len(corners))
-        ]
-        occ.addPlaneSurface([occ.addCurveLoop(edges)])
-        occ.synchronize()
-        gmsh.option.setNumber("Mesh.MeshSizeMin", size / scale)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", size / scale)
+        add_polygon(gmsh.model.occ, (outline - origin) / scale)
+        gmsh.model.occ.synchronize()
+        set_sizes(gmsh, [], size / scale, size / scale)
         gmsh.model.mesh.generate(2)
         points, cells, _ = simplices(gmsh, 2)
     return points * scale + origin, cells

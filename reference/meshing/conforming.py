@@ -13,7 +13,14 @@ from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.outline import divided_outline
 from reference.meshing.separation import APART, check_separation, check_strips
-from reference.meshing.session import gmsh_session, simplices
+from reference.meshing.session import (
+    add_polygon,
+    add_size,
+    entity_facets,
+    gmsh_session,
+    set_sizes,
+    simplices,
+)
 from reference.meshing.solid import solid_mesh
 from reference.meshing.tip_rings import shrink_to_points
 from verify.errors import InputError, UnsupportedSceneError
@@ -61,7 +68,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         check_strips(features, scale, grading.strip, where)
     try:
         with gmsh_session() as gmsh:
-            surface = _add_outline(gmsh, (outline - origin) / scale)
+            surface = add_polygon(gmsh.model.occ, (outline - origin) / scale)
             curves = [tag for cut in scene.final_cuts for tag in _add_cut(gmsh, cut, origin, scale)]
             met = [_add_interface(gmsh, f, origin, scale) for f in plane_interfaces(scene)]
             cut_curves = _fragment(gmsh, surface, curves, met)
@@ -70,7 +77,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
             gmsh.model.mesh.generate(2)
             points, cells, number = simplices(gmsh, 2)
-            facets = _curve_facets(gmsh, cut_curves, number)
+            facets = entity_facets(gmsh, cut_curves, 1, number)
     except InputError:
         raise
     except Exception as error:  # gmsh raises bare Exception
@@ -83,13 +90,6 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             points, cells, facets, grading.points, grading.smallest
         )
     return open_cut(points, cells, facets)
-
-
-def _add_outline(gmsh: ModuleType, outline: Array) -> int:
-    occ = gmsh.model.occ
-    corners = [occ.addPoint(x, y, 0.0) for x, y in outline]
-    edges = [occ.addLine(corners[i], corners[(i + 1) % len(corners)]) for i in range(len(corners))]
-    return int(occ.addPlaneSurface([occ.addCurveLoop(edges)]))
 
 
 def _add_cut(gmsh: ModuleType, cut: object, origin: Array, scale: float) -> list[int]:
@@ -172,43 +172,28 @@ def _set_sizes(
     size, radius, smallest = (
         value / scale for value in (grading.size, grading.radius, grading.meshed(scale))
     )
-    field = gmsh.model.mesh.field
     terms = []
     for x, y in (grading.points - origin) / scale:
-        tag = field.add("MathEval")
         squared = f"((x-({x:.17g}))^2+(y-({y:.17g}))^2)"
         graded = f"{size:.17g}*({squared}/{radius**2:.17g})^{grading.exponent / 2:.17g}"
-        field.setString(tag, "F", f"{graded} + {smallest:.17g}")
-        terms.append(tag)
+        terms.append(f"{graded} + {smallest:.17g}")
     for point, start in grading.close_points():
-        tag = field.add("MathEval")
         at_point = grading.smallest_at(start, scale)
-        field.setString(tag, "F", _close(grading, (point - origin) / scale, start, at_point, scale))
-        terms.append(tag)
+        terms.append(_close(grading, (point - origin) / scale, start, at_point, scale))
         smallest = min(smallest, at_point / scale)
     if grading.strip is not None:
         close = close_pairs(features[0], APART * scale, grading.size / grading.strip)
         for i, j in close:
-            tag = field.add("MathEval")
             apart = " + ".join(_distance(features[0][k], origin, scale) for k in (i, j))
-            field.setString(tag, "F", f"{grading.strip:.17g}*({apart})")
-            terms.append(tag)
+            terms.append(f"{grading.strip:.17g}*({apart})")
             gap = grading.strip * features[0][i].gap(features[0][j]) / scale
             smallest = min(smallest, gap)
     near = (grading.way or grading.size) / scale
     for one in features[1]:
-        tag = field.add("MathEval")
-        away = f"0.5*({_distance(one, origin, scale)})"
-        field.setString(tag, "F", f"{near:.17g} + {away}")
-        terms.append(tag)
+        terms.append(f"{near:.17g} + 0.5*({_distance(one, origin, scale)})")
         smallest = min(smallest, near)
-    far = field.add("MathEval")
-    field.setString(far, "F", f"{size:.17g}")
-    least = field.add("Min")
-    field.setNumbers(least, "FieldsList", [*terms, far])
-    field.setAsBackgroundMesh(least)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    fields = [add_size(gmsh, formula) for formula in (*terms, f"{size:.17g}")]
+    set_sizes(gmsh, fields, smallest * 0.5, size)
 
 
 def _close(grading: Grading, point: Array, start: float, least: float, scale: float) -> str:
@@ -229,14 +214,3 @@ def _distance(feature: Feature, origin: Array, scale: float) -> str:
     along = f"(((x-({x:.17g}))*({u:.17g})+(y-({y:.17g}))*({v:.17g}))/{u * u + v * v:.17g})"
     share = f"(0.5*(1+abs({along})-abs({along}-1)))"  # clipped to 0…1
     return f"sqrt((x-({x:.17g})-{share}*({u:.17g}))^2+(y-({y:.17g})-{share}*({v:.17g}))^2)"
-
-
-def _curve_facets(
-    gmsh: ModuleType, curves: list[int], number: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    found = [np.zeros((0, 2), dtype=np.int64)]
-    for curve in curves:
-        _, _, nodes = gmsh.model.mesh.getElements(1, curve)
-        if nodes:
-            found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, 2))
-    return np.concatenate(found)

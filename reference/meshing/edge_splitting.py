@@ -8,6 +8,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.opening import doubled_nodes
+
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 
@@ -18,6 +20,16 @@ def mesh_edges(simplices: Cells) -> Cells:
     pairs.sort(axis=1)
     count = int(pairs.max(initial=0)) + 1
     return np.column_stack(np.divmod(np.unique(pairs[:, 0] * count + pairs[:, 1]), count))
+
+
+def barycentric(corners: Array, x: Array) -> Array:
+    """Barycentric coordinates (m, 3) of a point in plane triangles (m, 3, 2)."""
+    a, b, c = corners.swapaxes(0, 1)
+    u, v, w = b - a, c - a, x - a
+    det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
+    t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
+    return np.column_stack([1 - s - t, s, t])
 
 
 def split_edges(
@@ -66,6 +78,23 @@ def split_edges(
             facets = np.concatenate([facets[~cut], halves])
         keys, number = keys[~ready], number[~ready]
     return np.vstack([points, places]), np.concatenate([*resting, cells]), facets
+
+
+def loosen_front(points: Array, cells: Cells, facets: Cells) -> tuple[Array, Cells, Cells]:
+    """Split each edge inside a cut whose two ends both lie on a front or are tips.
+
+    Its ends stay single, so the cut could not open along it, nor could a facet in a corner of a
+    front open at all.
+    """
+    if not len(facets):
+        return points, cells, facets
+    opened = np.zeros(len(points), dtype=bool)
+    opened[doubled_nodes(cells, facets)] = True
+    corners = facets.shape[1]
+    pairs = np.concatenate([facets[:, [i, j]] for i, j in _pairs(corners)])
+    edges, times = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
+    tied = edges[~opened[edges].any(axis=1) & (times >= corners - 1)]
+    return split_edges(points, cells, facets, tied, points[tied].mean(axis=1))
 
 
 def _pairs(corners: int) -> list[tuple[int, int]]:

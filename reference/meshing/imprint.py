@@ -10,6 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.edge_splitting import barycentric, mesh_edges, split_edges
+from reference.meshing.opening import inner_facets
 from verify.errors import InputError
 
 Array = NDArray[np.float64]
@@ -66,8 +68,7 @@ def imprint(points: Array, cells: Cells, polylines: list[Array]) -> tuple[Array,
         points, cells = _split_crossed(points, cells, a, b)
     for a, b in segments:
         ends.append(_facets_on(points, cells, a, b))
-    facets = np.unique(np.concatenate(ends), axis=0) if ends else np.zeros((0, 2), dtype=np.int64)
-    facets = facets[_is_interior(cells, facets, len(points))]
+    facets = inner_facets(cells, np.concatenate([np.zeros((0, 2), dtype=np.int64), *ends]))
     if polylines and not len(facets):
         raise InputError("cuts: none of them lies inside the mesh")
     return points, cells, facets
@@ -75,26 +76,21 @@ def imprint(points: Array, cells: Cells, polylines: list[Array]) -> tuple[Array,
 
 def _insert(points: Array, cells: Cells, end: Array) -> tuple[Array, Cells]:
     """Make `end` a node, if a cell contains it: split an edge in two or a cell in three."""
-    share = _barycentric(points, cells, end)
+    share = barycentric(points[cells], end)
     inside = np.flatnonzero((share >= -_ON).all(axis=1))
     if not len(inside):
         return points, cells
     if (share[inside] > 1 - 2 * _ON).any():
         return points, cells  # it is a node already
-    new = len(points)
-    points = np.vstack([points, end])
     on_edge = (share[inside] <= _ON).any(axis=1)
     if on_edge.any():
         cell = inside[np.argmax(on_edge)]
-        k = int(np.argmin(share[cell]))
-        edge = {int(cells[cell, (k + 1) % 3]), int(cells[cell, (k + 2) % 3])}
-        around = [c for c in inside if edge <= set(cells[c].tolist())]
-        return points, _replace(
-            cells, [int(c) for c in around], [_halves(cells[c], edge, new) for c in around]
-        )
-    cell = int(inside[0])
-    a, b, c = cells[cell]
-    return points, _replace(cells, [cell], [[[a, b, new], [b, c, new], [c, a, new]]])
+        edge = np.sort(np.delete(cells[cell], np.argmin(share[cell])))[None]
+        return split_edges(points, cells, edge[:0], edge, end[None])[:2]
+    a, b, c = cells[inside[0]]
+    new = len(points)
+    parts = [[[a, b, new], [b, c, new], [c, a, new]]]
+    return np.vstack([points, end]), _replace(cells, inside[:1], parts)
 
 
 def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Array, Cells]:
@@ -124,7 +120,7 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
     on_edge = number[owner]  # (m, 3): new node on the edge opposite each corner, or −1
     touched = np.flatnonzero((on_edge >= 0).any(axis=1))
     pieces = [_parts(points, cells[c], on_edge[c]) for c in touched]
-    return points, _replace(cells, touched.tolist(), pieces)
+    return points, _replace(cells, touched, pieces)
 
 
 def _parts(points: Array, cell: Cells, new: Cells) -> list[list[int]]:
@@ -144,13 +140,7 @@ def _parts(points: Array, cell: Cells, new: Cells) -> list[list[int]]:
     return [[a, on_ab, on_ca], [on_ab, b, on_ca], [b, c, on_ca]]
 
 
-def _halves(cell: Cells, edge: set[int], new: int) -> list[list[int]]:
-    k = next(i for i in range(3) if int(cell[i]) not in edge)
-    a, b, c = (int(cell[(k + i) % 3]) for i in range(3))
-    return [[a, b, new], [a, new, c]]
-
-
-def _replace(cells: Cells, old: list[int], parts: list[list[list[int]]]) -> Cells:
+def _replace(cells: Cells, old: Cells, parts: list[list[list[int]]]) -> Cells:
     keep = np.ones(len(cells), dtype=bool)
     keep[old] = False
     added = [triangle for part in parts for triangle in part]
@@ -166,7 +156,7 @@ def _edges(cells: Cells, count: int) -> tuple[Cells, Cells]:
 
 def _facets_on(points: Array, cells: Cells, a: Array, b: Array) -> Cells:
     """Edges whose both ends lie on the segment ab."""
-    edges, _ = _edges(cells, len(points))
+    edges = mesh_edges(cells)
     along = b - a
     length = float(np.hypot(*along))
     height = np.abs((points - a) @ np.array([-along[1], along[0]])) / length
@@ -176,20 +166,3 @@ def _facets_on(points: Array, cells: Cells, a: Array, b: Array) -> Cells:
     on = (height[edges] <= tolerance[:, None]) & (place[edges] >= -tolerance[:, None])
     on &= place[edges] <= length + tolerance[:, None]
     return edges[on.all(axis=1)]
-
-
-def _is_interior(cells: Cells, facets: Cells, count: int) -> NDArray[np.bool_]:
-    pairs = np.sort(cells[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
-    keys, times = np.unique(pairs[:, 0] * count + pairs[:, 1], return_counts=True)
-    wanted = facets[:, 0] * count + facets[:, 1]
-    inner: NDArray[np.bool_] = times[np.searchsorted(keys, wanted)] == 2
-    return inner
-
-
-def _barycentric(points: Array, cells: Cells, x: Array) -> Array:
-    a, b, c = (points[cells[:, k]] for k in range(3))
-    u, v, w = b - a, c - a, x - a
-    det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
-    t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
-    return np.column_stack([1 - s - t, s, t])

@@ -14,10 +14,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from reference.meshing.edge_splitting import split_edges
-from reference.meshing.front_edges import loosen_front
+from reference.meshing.edge_splitting import loosen_front, split_edges
 from reference.meshing.imprint_solid import ON, imprint_polygons
-from reference.meshing.opening import cell_facets
+from reference.meshing.opening import cell_facets, inner_facets, measures
 from verify.errors import InputError
 
 Array = NDArray[np.float64]
@@ -75,22 +74,14 @@ def imprint_facets(points: Array, cells: Cells, facets: Array) -> Realised:
         whole = (np.diff(wanted, axis=1) > 0).all(axis=1)  # a corner may have become a node
         found, missing = _as_facets(mesh, np.unique(wanted[whole], axis=0))
         if not len(missing):
-            return Realised(*loosen_front(mesh[0], mesh[1], _interior(mesh[1], found)), fitted)
+            return Realised(*loosen_front(mesh[0], mesh[1], inner_facets(mesh[1], found)), fitted)
     imprinted = imprint_polygons(points, cells, list(facets))
-    lost = 1 - _areas(imprinted[0][imprinted[2]]).sum() / _areas(facets).sum()
+    lost = 1 - measures(imprinted[0][imprinted[2]]).sum() / measures(facets).sum()
     if not abs(lost) <= _LOST:
         raise InputError(
             f"the realised cut could not be imprinted: {lost:.1e} of its area is missing"
         )
     return Realised(*imprinted, fitted)
-
-
-def _interior(cells: Cells, facets: Cells) -> Cells:
-    """Those facets that two cells share."""
-    every, times = np.unique(cell_facets(cells), axis=0, return_counts=True)
-    both = np.concatenate([every[times == 2], np.unique(np.sort(facets, axis=1), axis=0)])
-    rows, times = np.unique(both, axis=0, return_counts=True)
-    return rows[times == 2]
 
 
 def _within_cells(points: Array, cells: Cells, facets: Array) -> bool:
@@ -180,8 +171,8 @@ def _as_facets(mesh: Mesh, wanted: Cells) -> tuple[Cells, Cells]:
     owner = _holders(points[missing], points[others])
     group = _flat_groups(points, missing)
     held = owner >= 0
-    asked = np.bincount(group, _areas(points[missing]))
-    filled = np.bincount(group[owner[held]], _areas(points[others[held]]), minlength=len(asked))
+    asked = np.bincount(group, measures(points[missing]))
+    filled = np.bincount(group[owner[held]], measures(points[others[held]]), minlength=len(asked))
     full = np.abs(filled - asked) <= _FLAT * asked
     use = held & full[group[owner]]
     return np.concatenate([found, others[use]]), missing[~full[group]]
@@ -228,8 +219,3 @@ def _flat_groups(points: Array, triangles: Cells) -> NDArray[np.int64]:
     flat = np.abs(away).max(axis=1) <= _FLAT * np.sqrt(size[one])
     link = coo_array((np.ones(flat.sum()), (one[flat], two[flat])), shape=(len(triangles),) * 2)
     return connected_components(link.tocsr(), directed=False)[1].astype(np.int64)
-
-
-def _areas(triangles: Array) -> Array:
-    spread = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(spread, axis=1))

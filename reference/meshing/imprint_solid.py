@@ -1,7 +1,7 @@
-"""Imprinting plane polygons on a given tetrahedral mesh, so that they run along its facets.
+"""Imprinting plane polygons on given tetrahedra or triangles in space: they run along facets.
 
-Only the tetrahedra that a polygon touches are split, by halving edges; the rest of the mesh stays
-as it is.
+Only the cells that a polygon touches are split, by halving edges; the rest of the mesh stays as it
+is.
 """
 
 from itertools import permutations
@@ -9,9 +9,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.edge_splitting import mesh_edges, split_edges
-from reference.meshing.front_edges import loosen_front
-from reference.meshing.opening import cell_facets
+from reference.meshing.edge_splitting import barycentric, loosen_front, mesh_edges, split_edges
+from reference.meshing.opening import cell_facets, inner_facets
 from reference.meshing.session import oriented
 from verify.errors import InputError
 from verify.scene.planar import distance_to_outline, inside_polygon
@@ -48,16 +47,16 @@ def imprint_polygons(points: Array, cells: Cells, polygons: list[Array]) -> Mesh
     Parameters
     ----------
     points : (n, 3) array
-    cells : (m, 4) array
-        Positively oriented tetrahedra.
-    polygons : list of (k, 3) array
+    cells : (m, k + 1) array
+        Positively oriented tetrahedra, or triangles of a membrane.
+    polygons : list of (c, 3) array
         Plane and simple; they may end inside, cross, branch and reach beyond the mesh.
 
     Returns
     -------
     points : (…, 3) array
-    cells : (…, 4) array
-    facets : (f, 3) array
+    cells : (…, k + 1) array
+    facets : (f, k) array
         Nodes of the *interior* facets along the polygons.
 
     Raises
@@ -65,23 +64,16 @@ def imprint_polygons(points: Array, cells: Cells, polygons: list[Array]) -> Mesh
     InputError
         If no part of the polygons lies inside the mesh.
     """
-    mesh: Mesh = (points, cells, np.zeros((0, 3), dtype=np.int64))
+    solid = cells.shape[1] == 4
+    mesh: Mesh = (points, cells, np.zeros((0, cells.shape[1] - 1), dtype=np.int64))
     for corners in polygons:
-        mesh = trace_polygon(mesh, corners, insert=True)
+        mesh = trace_polygon(mesh, corners, insert=solid)
     points, cells, facets = mesh
-    kept = interior_facets(cells, facets)
+    kept = inner_facets(cells, facets)
     if polygons and not len(kept):
-        raise InputError("cuts: none of them lies inside the mesh")
+        lies = "lies inside the mesh" if solid else "crosses the membrane"
+        raise InputError(f"cuts: none of them {lies}")
     return loosen_front(points, cells, kept)
-
-
-def interior_facets(cells: Cells, facets: Cells) -> Cells:
-    """Keep those of some facets that two cells share, each once."""
-    every, times = np.unique(cell_facets(cells), axis=0, return_counts=True)
-    inner = {tuple(facet) for facet in every[times == 2].tolist()}
-    found = np.unique(np.sort(facets, axis=1), axis=0).tolist()
-    kept = [facet for facet in found if tuple(facet) in inner]
-    return np.array(kept, dtype=np.int64).reshape(-1, facets.shape[1])
 
 
 def trace_polygon(mesh: Mesh, corners: Array, insert: bool) -> Mesh:
@@ -176,12 +168,7 @@ def _insert(
     points, cells, facets = mesh
     mine = plane_facets(cells, on_plane)
     place = (points - origin) @ axes[:2].T
-    u, v = (place[mine[:, k]] - place[mine[:, 0]] for k in (1, 2))
-    w = end - place[mine[:, 0]]
-    det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
-    t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
-    shares = np.column_stack([1 - s - t, s, t])
+    shares = barycentric(place[mine], end)
     inside = np.flatnonzero((shares >= -ON).all(axis=1))
     if not len(inside) or (shares[inside] > 1 - 2 * ON).any():
         return mesh, on_plane  # outside the body, or a node already

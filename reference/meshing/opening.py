@@ -131,6 +131,14 @@ def interior_facets(
     return first, second, is_chosen, np.flatnonzero(alone)
 
 
+def inner_facets(cells: NDArray[np.int64], facets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Keep those of some facets (f, d) that two cells share, ascending, each once."""
+    facets = np.unique(np.sort(facets, axis=1), axis=0)
+    keys, wanted = _facet_keys(cell_facets(cells), facets)
+    values, times = np.unique(keys, return_counts=True)
+    return facets[np.isin(wanted, values[times == 2])]
+
+
 def open_cut(
     points: NDArray[np.float64], cells: NDArray[np.int64], cut_facets: NDArray[np.int64]
 ) -> ConformingMesh:
@@ -185,7 +193,7 @@ def _without_specks(
     count, part = connected_components(link.tocsr(), directed=False)
     if count == 1:
         return is_cut, np.zeros(0)
-    size = np.bincount(part, _measures(points[cells]), count)
+    size = np.bincount(part, measures(points[cells]), count)
     size /= size.sum()
     inner = np.ones(count, dtype=bool)
     inner[part[outer // (k + 1)]] = False
@@ -194,13 +202,13 @@ def _without_specks(
     for speck in specks:
         ours = np.flatnonzero(is_cut & ((part[one] == speck) != (part[other] == speck)))
         beside = np.where(part[one[ours]] == speck, part[other[ours]], part[one[ours]])
-        faces = _measures(points[cell_facets(cells)[first[ours]]])
+        faces = measures(points[cell_facets(cells)[first[ours]]])
         neighbour = np.bincount(beside, faces).argmax()
         is_cut[ours[beside == neighbour]] = False
     return is_cut, size[specks]
 
 
-def _measures(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def measures(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Measures (m,) of simplices (m, k + 1, d), in m^k."""
     edges = corners[:, 1:] - corners[:, :1]
     if edges.shape[1] == edges.shape[2]:
@@ -281,7 +289,7 @@ def _check_volumes(points: NDArray[np.float64], cells: NDArray[np.int64]) -> Non
     d = cells.shape[1] - 1
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     if points.shape[1] > d:  # a membrane
-        volume = _measures(points[cells])
+        volume = measures(points[cells])
     else:
         volume = np.linalg.det(edges) / (2 if d == 2 else 6)
     longest = np.linalg.norm(edges, axis=2).max(axis=1)

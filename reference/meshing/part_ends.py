@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import split_edges
+from reference.meshing.opening import cell_facets
 from verify.scene import Scene, Traction
 from verify.scene.part_pieces import pieces_on_part, size_of
 from verify.scene.regions import is_affine
@@ -46,11 +47,8 @@ def split_at_part_ends(
 
 def _boundary(cells: Cells) -> Cells:
     """Nodes (b, k) of the facets of one cell only."""
-    k = cells.shape[1] - 1
-    rest = [[j for j in range(k + 1) if j != i] for i in range(k + 1)]
-    facets = np.sort(cells[:, rest].reshape(-1, k), axis=1)
-    distinct, count = np.unique(facets, axis=0, return_counts=True)
-    return np.asarray(distinct[count == 1])
+    facets, count = np.unique(cell_facets(cells), axis=0, return_counts=True)
+    return np.asarray(facets[count == 1])
 
 
 def _ends(scene: Scene, formulas: list[str], points: Array, boundary: Cells) -> tuple[Cells, Array]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
@@ -49,6 +50,42 @@ def simplices(
     cells = compact[cells]
     number = np.where(row >= 0, compact[row], -1)
     return points, oriented(points, cells), number
+
+
+def entity_facets(
+    gmsh: ModuleType, entities: list[int], dimension: int, number: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Nodes (f, k) of the segments or triangles on curves or faces; `number` as of `simplices`."""
+    found = [np.zeros((0, dimension + 1), dtype=np.int64)]
+    for entity in entities:
+        _, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
+        if nodes:
+            found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, dimension + 1))
+    return np.concatenate(found)
+
+
+def add_polygon(occ: ModuleType, corners: NDArray[np.float64]) -> int:
+    """Add the plane face between corners (k, 2 or 3)."""
+    tags = [occ.addPoint(*p, *[0.0] * (3 - len(p))) for p in corners]
+    lines = [occ.addLine(a, b) for a, b in pairwise([*tags, tags[0]])]
+    return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
+
+
+def add_size(gmsh: ModuleType, formula: str) -> int:
+    """Add a field of element sizes by a formula."""
+    tag: int = gmsh.model.mesh.field.add("MathEval")
+    gmsh.model.mesh.field.setString(tag, "F", formula)
+    return tag
+
+
+def set_sizes(gmsh: ModuleType, fields: list[int], smallest: float, largest: float) -> None:
+    """Mesh by the least of some fields of sizes; without any, by bounds alone."""
+    if fields:
+        least = gmsh.model.mesh.field.add("Min")
+        gmsh.model.mesh.field.setNumbers(least, "FieldsList", fields)
+        gmsh.model.mesh.field.setAsBackgroundMesh(least)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
 
 
 def oriented(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,12 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.box_lines import clamped_edges, part_lines
-from reference.meshing.front_edges import loosen_front
+from reference.meshing.edge_splitting import loosen_front
 from reference.meshing.grading import Grading
 from reference.meshing.interfaces import solid_interfaces
-from reference.meshing.opening import ConformingMesh, open_cut
-from reference.meshing.session import gmsh_session, simplices
-from reference.meshing.solid_cuts import CutFaces, add_polygon, add_surface, imprint_surfaces
+from reference.meshing.opening import ConformingMesh, measures, open_cut
+from reference.meshing.session import (
+    add_polygon,
+    add_size,
+    entity_facets,
+    gmsh_session,
+    set_sizes,
+    simplices,
+)
+from reference.meshing.solid_cuts import CutFaces, add_surface, imprint_surfaces
 from verify.errors import InputError
 from verify.scene import Box, Scene
 
@@ -66,7 +73,7 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
             gmsh.model.mesh.generate(3)
             points, cells, number = simplices(gmsh, 3)
-            facets = _face_facets(gmsh, cut, number)
+            facets = entity_facets(gmsh, cut.faces, 2, number)
     except InputError:
         raise
     except Exception as error:  # gmsh raises bare Exception
@@ -96,32 +103,23 @@ def _set_sizes(
         distance = field.add("Distance")
         field.setNumbers(distance, "CurvesList", curves)
         field.setNumber(distance, "Sampling", min(_MOST_SAMPLES, 20 + 2 * longest / smallest))
-        graded = field.add("MathEval")
         law = f"{size:.17g}*(F{distance}/{radius:.17g})^{grading.exponent:.17g} + {smallest:.17g}"
-        field.setString(graded, "F", law)
-        terms.append(graded)
+        terms.append(add_size(gmsh, law))
     # factors of several modes or places have one round front
     fronts = {(_distance(front, origin, scale), start / scale) for front, start in grading.fronts}
     for distance_text, start in sorted(fronts):
-        around, least = field.add("MathEval"), grading.share * start
-        away = f"({distance_text})*{grading.share:.17g}"
-        field.setString(around, "F", f"0.5*({least:.17g} + {away} + abs({least:.17g} - {away}))")
-        terms.append(around)
+        least, away = grading.share * start, f"({distance_text})*{grading.share:.17g}"
+        law = f"0.5*({least:.17g} + {away} + abs({least:.17g} - {away}))"
+        terms.append(add_size(gmsh, law))
         smallest = min(smallest, least)
     if way and grading.way is not None:
         near = grading.way / scale
         smallest = min(smallest, near) if curves or grading.fronts else near
-        distance, graded = field.add("Distance"), field.add("MathEval")
+        distance = field.add("Distance")
         field.setNumbers(distance, "SurfacesList", way)
         field.setNumber(distance, "Sampling", min(_MOST_SAMPLES, 20 + 2 / near))
-        field.setString(graded, "F", f"{near:.17g} + 0.5*F{distance}")
-        terms.append(graded)
-    if terms:
-        least = field.add("Min")
-        field.setNumbers(least, "FieldsList", terms)
-        field.setAsBackgroundMesh(least)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5 if terms else size)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        terms.append(add_size(gmsh, f"{near:.17g} + 0.5*F{distance}"))
+    set_sizes(gmsh, terms, smallest * 0.5 if terms else size, size)
 
 
 def _distance(front: Any, origin: Array, scale: float) -> str:
@@ -164,19 +162,9 @@ def _clamped(
     return [curve for curve, clamped in zip(curves, on, strict=True) if clamped]
 
 
-def _face_facets(gmsh: ModuleType, cut: CutFaces, number: NDArray[np.int64]) -> NDArray[np.int64]:
-    found = [np.zeros((0, 3), dtype=np.int64)]
-    for face in cut.faces:
-        _, _, nodes = gmsh.model.mesh.getElements(2, face)
-        if nodes:
-            found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, 3))
-    return np.concatenate(found)
-
-
 def _check_volume(mesh: ConformingMesh, expected: float, where: str) -> None:
     """Nothing was lost or meshed twice."""
-    edges = mesh.points[mesh.cells[:, 1:]] - mesh.points[mesh.cells[:, :1]]
-    volume = float(np.linalg.det(edges).sum()) / 6
+    volume = float(measures(mesh.points[mesh.cells]).sum())
     if abs(volume - expected) > 1e-9 * expected:
         raise InputError(
             f"gmsh's mesh of the cut body has a volume of {volume:.9g} m³; expected "

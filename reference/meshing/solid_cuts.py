@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.session import add_polygon
 from verify.errors import InputError
 
 Array = NDArray[np.float64]
@@ -121,13 +122,6 @@ def _on_surface(gmsh: ModuleType, face: int) -> bool:
     box = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     centre = np.array(gmsh.model.occ.getCenterOfMass(2, face))
     return bool(np.abs(box - centre).min() < _MERGED * np.ptp(box, axis=0).max())
-
-
-def add_polygon(occ: ModuleType, corners: Array) -> int:
-    """Add the plane face between corners (k, 3)."""
-    tags = [occ.addPoint(*p) for p in corners]
-    lines = [occ.addLine(a, b) for a, b in pairwise([*tags, tags[0]])]
-    return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
 
 
 def _arcs(occ: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:

@@ -8,7 +8,7 @@ from reference_scenes import needs_fenicsx, square
 from scipy.optimize import brentq
 
 from reference.law import law_of as law_of_material
-from reference.meshing import imprint_surface, open_cut
+from reference.meshing import imprint_polygons, open_cut
 from reference.space import conforming_space
 from verify.assess.quantities import Measured
 from verify.compare.body import body_of
@@ -108,7 +108,7 @@ def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
     points = np.column_stack([*grid.points.T, 0.2 * np.sin(3 * grid.points[:, 0])])
     one = np.array([[0.13, 0.42, -1], [0.87, 0.53, -1], [0.87, 0.53, 1], [0.13, 0.42, 1]])
     two = np.array([[0.48, 0.1, -1], [0.55, 0.9, -1], [0.55, 0.9, 1], [0.48, 0.1, 1]])
-    mesh = open_cut(*imprint_surface(points, grid.cells, [one, two]))
+    mesh = open_cut(*imprint_polygons(points, grid.cells, [one, two]))
     assert np.bincount(mesh.parent).max() == 4
     assert mesh.pieces.max() == 0
     a, b = mesh.realised_cut.swapaxes(0, 1)

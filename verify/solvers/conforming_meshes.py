@@ -17,7 +17,6 @@ from reference.meshing import (
     imprint,
     imprint_facets,
     imprint_polygons,
-    imprint_surface,
     open_cut,
     refine_uniformly,
     singular_points,
@@ -206,8 +205,7 @@ def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
             points, cells, [c.vertices() for c in scene.final_cuts if c.kind == "polyline"]
         )
     polygons = [p for cut in scene.final_cuts for p in _polygons(cut)]
-    membrane = scene.cell_dimension < scene.dimension
-    return (imprint_surface if membrane else imprint_polygons)(points, cells, polygons)
+    return imprint_polygons(points, cells, polygons)
 
 
 def _polygons(cut: Cut) -> list[Array]:
