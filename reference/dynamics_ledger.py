@@ -16,9 +16,7 @@ from reference.dynamics_body import MovingBody
 from reference.dynamics_step import State, StepForces
 
 Array = NDArray[np.float64]
-_DONE = ("work_of_loads", "work_of_supports", "damping", "algorithmic", "unbalanced")
-_STATE = ("kinetic", "strain", "gravity")
-_AXES = ("x", "y", "z")
+DONE = ("work_of_loads", "work_of_supports", "damping", "algorithmic", "unbalanced")
 
 
 class Ledger:
@@ -26,13 +24,12 @@ class Ledger:
 
     Attributes
     ----------
-    rows : list of dict
-        Energies in J and momenta in kg m/s and kg m²/s (in the plane per metre) by name.
+    done : dict of str to float
+        What was done since then by the names in `DONE`, J (in the plane per metre).
     """
 
     def __init__(self) -> None:
-        self.rows: list[dict[str, float]] = []
-        self._done = dict.fromkeys(_DONE, 0.0)
+        self.done = dict.fromkeys(DONE, 0.0)
         self._kinetic = self._strain = 0.0
 
     def open(self, body: MovingBody, state: State) -> None:
@@ -43,7 +40,7 @@ class Ledger:
         """Enter what supports did that took up another velocity at once."""
         kinetic = self._kinetic
         self._kinetic, self._strain = _energies(body, state)
-        self._done["work_of_supports"] += self._kinetic - kinetic
+        self.done["work_of_supports"] += self._kinetic - kinetic
 
     def record(self, body: MovingBody, before: State, state: State, forces: StepForces) -> None:
         """Enter one step."""
@@ -52,7 +49,7 @@ class Ledger:
         reaction[body.held] = -forces.residual[body.held]
         kinetic, strain = _energies(body, state)
         slip = change @ forces.inertia - (kinetic - self._kinetic)
-        done = self._done
+        done = self.done
         done["work_of_loads"] += float(change @ (forces.external - body.weight))
         done["work_of_supports"] += float(change @ reaction)
         done["damping"] += float(change @ forces.viscous)
@@ -60,28 +57,18 @@ class Ledger:
         done["unbalanced"] -= float(change @ (forces.residual + reaction))
         self._kinetic, self._strain = kinetic, strain
 
-    def enter(self, body: MovingBody, state: State) -> None:
-        """Enter a row for a state that is put out."""
-        row = {
-            "kinetic": self._kinetic,
-            "strain": self._strain,
-            "gravity": -float(body.weight @ state.displacement),
-            **self._done,
-        }
-        done = self._done
-        row["total"] = sum(row[name] for name in _STATE) - done["work_of_loads"]
-        row["total"] += done["damping"] + done["algorithmic"] - done["work_of_supports"]
-        d = body.space.dimension
-        momenta = (body.mass @ state.velocity).reshape(-1, d)
-        places = body.space.node_points + state.displacement.reshape(-1, d)
-        row |= _components("linear_momentum", momenta.sum(axis=0))
-        row |= _components("angular_momentum", _turning(places, momenta))
-        self.rows.append(row)
+    def state(self, body: MovingBody, state: State) -> dict[str, float]:
+        """Energies of the state that was entered last, J."""
+        gravity = -float(body.weight @ state.displacement)
+        return {"kinetic": self._kinetic, "strain": self._strain, "gravity": gravity}
 
-    def columns(self) -> dict[str, Array]:
-        """All entries (t,) by name."""
-        names = self.rows[0] if self.rows else {}
-        return {name: np.array([row[name] for row in self.rows]) for name in names}
+
+def momenta_of(body: MovingBody, state: State) -> tuple[Array, Array]:
+    """Linear (d,) and angular momentum (1 or 3,) of a state, kg m/s and kg m²/s."""
+    d = body.space.dimension
+    momenta = (body.mass @ state.velocity).reshape(-1, d)
+    places = body.space.node_points + state.displacement.reshape(-1, d)
+    return momenta.sum(axis=0), _turning(places, momenta)
 
 
 def _energies(body: MovingBody, state: State) -> tuple[float, float]:
@@ -94,8 +81,3 @@ def _turning(places: Array, momenta: Array) -> Array:
         return np.array([np.sum(places[:, 0] * momenta[:, 1] - places[:, 1] * momenta[:, 0])])
     turning: Array = np.cross(places, momenta).sum(axis=0)
     return turning
-
-
-def _components(name: str, vector: Array) -> dict[str, float]:
-    axes = ("z",) if len(vector) == 1 else _AXES[: len(vector)]
-    return {f"{name}_{axis}": float(x) for axis, x in zip(axes, vector, strict=True)}

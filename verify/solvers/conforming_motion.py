@@ -10,7 +10,7 @@ from reference.boundary_values import constrained_values
 from reference.dynamics import Scheme, generalised_alpha, implicit_euler, inherit
 from reference.dynamics_body import MovingBody
 from reference.dynamics_cuts import opening_times, partly_opened
-from reference.dynamics_ledger import Ledger
+from reference.dynamics_ledger import Ledger, momenta_of
 from reference.dynamics_step import State, Stepper
 from reference.fracture.pressure import MIXED
 from reference.moduli import wave_speed
@@ -20,6 +20,7 @@ from reference.weak_place import naming_weak_places
 from verify.declared_mass import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
+from verify.solvers.account import Account
 from verify.solvers.runs import Record
 from verify.solvers.timeline import march, step_sizes, timeline_of
 
@@ -135,7 +136,7 @@ class TiedMotion:
             self.opening = opening_times(scene, space.mesh, marching.delay)
             self.closed = np.ones(len(self.opening), dtype=bool)
             self.planned = self._plan()
-        self.ledger = Ledger()
+        self.ledger, self.account = Ledger(), Account()
         self.steppers: dict[float, Stepper] = {}
         self.outputs: list[State] = []
         self.openings = 0
@@ -173,7 +174,7 @@ class TiedMotion:
             "velocity": self._over_time("velocity"),
             "acceleration": self._over_time("acceleration") if linear else None,
             "mass": CONSISTENT,
-            "ledger": self.ledger.columns(),
+            "ledger": self.account.columns(),
             "unknowns": self.space.node_points.size,
         }
 
@@ -212,7 +213,8 @@ class TiedMotion:
         if linear and not self.begun and self.scheme.alpha_m != self.scheme.alpha_f:
             found.acceleration = self.body.accelerations(self._unbalanced(found.time))
         self.outputs.append(found)
-        self.ledger.enter(self.body, self.state)
+        energies = self.ledger.state(self.body, self.state)
+        self.account.enter(energies, self.ledger.done, *momenta_of(self.body, self.state))
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""

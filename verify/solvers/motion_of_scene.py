@@ -12,11 +12,11 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.initial import starts_open
 from verify.solution import Regularisation
+from verify.solvers.account import StagedAccount
 from verify.solvers.body_in_motion import body_in_motion, initial_state
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.runs import Record
 from verify.solvers.timeline import Timeline, march, step_sizes
-from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.body import DynamicBody, Integrator, MotionState
@@ -126,7 +126,7 @@ class CutMotion:
             self._events = opening.events()
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
         self._opened = -np.inf if closed_before else timeline.close
-        self._account = Account(opening.removal)
+        self._account = StagedAccount(opening.removal)
         self._outputs: list[_Output] = []
         self._solves = 0
         body = self._made(self._opened)
@@ -231,7 +231,7 @@ class CutMotion:
 
     def _leave(self) -> None:
         """Enter what has happened to the body."""
-        self._account.enter(self._recorder.close(), self._instants)
+        self._account.leave(self._recorder.close(), self._instants)
         newton = [o for o in self._integrators.values() if isinstance(o, NewtonIntegrator)]
         self._solves += sum(one.solves for one in newton)
 
