@@ -98,7 +98,7 @@ Extensions, which none of the modules above needs (a contract of the imports hol
 
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
-`rigid_motion`, `equilibrium`
+`rigid_motion`, `slack_membranes`, `stability`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability
 `energy_momentum`, `inherit`
     a scheme that keeps energy and momentum; the state of a body that is cut on the way

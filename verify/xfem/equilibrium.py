@@ -9,7 +9,9 @@ from verify.xfem.arrays import Bools, Floats, finite_array
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.rigid_motion import RigidMotions
-from verify.xfem.static_newton import Descent, Newton, NotInEquilibriumError
+from verify.xfem.slack_membranes import Descent
+from verify.xfem.stability import is_stable, way_out
+from verify.xfem.static_newton import ROUND_OFF, Newton, NotInEquilibriumError
 from verify.xfem.supports import check_fixed
 
 _HALVINGS = 6  # of a load step
@@ -17,9 +19,7 @@ _FURTHER = 2  # of them, to compare with a step that has converged
 _SAMPLES = 16  # places of the supports on the whole path that are looked at beforehand
 _MOST_STRAIN = 0.5  # root mean square of held edges: parts of a body turn by 58° against each other
 _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
-_ROUND_OFF = 1e-14  # of stiffness times size squared
-_STRAIGHT = 1e-9  # of the largest displacement, half way
-_SAME = 1e-6  # of the energy, between two paths
+_SAME = 1e-6  # of the energy, between two paths; of the displacement half way, on a straight one
 _INVERTED = 1e-3  # of the volume: cells at singular points do turn inside out
 _MOST_WAYS_OUT = 4
 
@@ -100,7 +100,7 @@ class LoadPath:
         turned = self._motions.turned_path(whole)
         if turned is None:
             return prescribed
-        straight = np.abs(prescribed(0.5) - 0.5 * whole).max() <= _STRAIGHT * np.abs(whole).max()
+        straight = np.abs(prescribed(0.5) - 0.5 * whole).max() <= _SAME * np.abs(whole).max()
         return turned if straight else prescribed
 
     def check(self) -> PathCheck:
@@ -131,13 +131,13 @@ class LoadPath:
         """
         newton, load = self._newton, self._load
         for _ in range(_MOST_WAYS_OUT):
-            if newton.is_stable(displacement):
+            if is_stable(newton, displacement):
                 self._stable = True
                 return displacement
             if self._force.is_membrane:  # slack ones have no stiffness across their plane
                 return displacement
             place = newton.place(displacement, load)
-            out = newton.way_out(place, load)
+            out = way_out(newton, place, load)
             if out is None:
                 return displacement
             energy = self._force.evaluate(displacement)[1]
@@ -230,7 +230,7 @@ class LoadPath:
         """Round-off of an energy, J."""
         phantom = self._force.phantom
         size = float(np.ptp(phantom.mesh.points, axis=0).max())
-        return _ROUND_OFF * self._newton.largest_stiffness * size**2
+        return ROUND_OFF * self._newton.largest_stiffness * size**2
 
     def _turns_inside_out(self, before: Floats, after: Floats) -> bool:
         if self._force.is_membrane:

@@ -115,9 +115,7 @@ def solve_static(
     stiffness = InternalForce(phantom, material, "linear", kernels, ghost)
     clock = [perf_counter()]
     pattern = body_pattern(phantom, stiffness.couplings)
-    iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(phantom))
-    limit = _MOST if solver == "auto" else 5 * _MOST
-    inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, limit if iterates else 0)
+    inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, solver)
     clock.append(perf_counter())
     blocks = stiffness.stiffness(pattern)
     right = np.where(supports.fixed, 0.0, force - stiffness.evaluate(supports.values)[0])
@@ -126,7 +124,7 @@ def solve_static(
     clock.append(perf_counter())
     inverse.factorize(blocks)
     clock.append(perf_counter())
-    displacement = inverse.solve(right, insists=solver == "iterative") + supports.values
+    displacement = inverse.solve(right) + supports.values
     clock.append(perf_counter())
     internal, energy = stiffness.evaluate(displacement)
     penalty = stiffness.penalty_energy(displacement)
@@ -145,11 +143,6 @@ def solve_static(
     )
 
 
-def is_large(phantom: PhantomMesh) -> bool:
-    """Whether iterations are quicker than a factorisation: of solids with many nodes."""
-    return phantom.cells.shape[1] == 4 and phantom.node_count >= ITERATE_FROM
-
-
 class StaticSolver:
     """Iterations for a large body, a factorisation where they do not converge.
 
@@ -161,8 +154,8 @@ class StaticSolver:
     fixed : (N, d) bool array
     tolerance : float
         Of the residual that iterations leave.
-    limit : int
-        Most iterations; zero: factorise at once.
+    method : {"auto", "direct", "iterative"}
+        As for `solve_static`.
 
     Attributes
     ----------
@@ -176,11 +169,15 @@ class StaticSolver:
         pattern: BlockPattern,
         fixed: Bools,
         tolerance: float,
-        limit: int,
+        method: Method = "auto",
     ) -> None:
-        kernels, block = force.kernels, fixed.shape[1]
+        kernels, block, phantom = force.kernels, fixed.shape[1], force.phantom
         self._make_direct = partial(kernels.direct, pattern, block, fixed.all(axis=1))
-        self._iterative = kernels.iterative(pattern, block, tolerance, limit) if limit else None
+        is_large = phantom.mesh.dim == 3 and phantom.node_count >= ITERATE_FROM
+        iterates = is_large and force.ghost is None if method == "auto" else method == "iterative"
+        self._insists = method == "iterative"
+        limit = 5 * _MOST if self._insists else _MOST
+        self._iterative = kernels.iterative(pattern, block, tolerance, limit) if iterates else None
         self._first = self._iterative or self._direct
         self.used: set[str] = set()
 
@@ -193,15 +190,15 @@ class StaticSolver:
         self._blocks = blocks
         self._first.factorize(blocks)
 
-    def solve(self, load: Floats, insists: bool = False) -> Floats:
-        """Solve, by a factorisation if the iterations do not converge and none insists on them."""
+    def solve(self, load: Floats) -> Floats:
+        """Solve, by a factorisation if iterations that are not insisted on do not converge."""
         if self._iterative is not None:
             try:
                 found = self._iterative.solve(load)
                 self.used.add("iterative")
                 return found
             except NotConvergedError:
-                if insists:
+                if self._insists:
                     raise
             self._direct.factorize(self._blocks)
         self.used.add("direct")
