@@ -12,8 +12,10 @@ from verify.scene import (
     Polygon,
     Rectangle,
     Scene,
+    crossed_by_interfaces,
     read_mesh,
 )
+from verify.solution import Regularisation
 from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -40,16 +42,11 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     if isinstance(geometry, MeshFile):
         mesh = SimplexMesh(*read_mesh(scene))
         return mesh, float(np.linalg.norm(mesh.edge_vectors, axis=2).mean())
-    if scene.mesh.pattern == "structured":
+    counts, size = grid_of(scene, level)
+    if counts is not None:
         assert isinstance(geometry, Rectangle | Box)
-        sides = np.subtract(geometry.upper, geometry.lower)
-        if scene.mesh.cells is not None:
-            counts = np.array(scene.mesh.cells[level])
-        else:
-            # a size that divides the side up to round-off is that size
-            counts = np.ceil(sides / _size(scene, level) * (1 - 1e-9)).astype(int)
         make = rectangle_mesh if isinstance(geometry, Rectangle) else box_mesh
-        return make(counts.tolist(), geometry.lower, geometry.upper), float((sides / counts).max())
+        return make(counts, geometry.lower, geometry.upper), size
     try:
         from reference.meshing import background_mesh as unstructured
     except ImportError as error:
@@ -57,15 +54,28 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
             f"mesh.pattern: 'unstructured' needs '{error.name}', which is not installed",
             str(scene.file or ""),
         ) from None
-    size = _size(scene, level)
     assert isinstance(geometry, Rectangle | Polygon)
     points, cells = unstructured(geometry.outline(), size)
     return SimplexMesh(points, cells), size
 
 
-def _size(scene: Scene, level: int) -> float:
-    assert scene.mesh.sizes is not None
-    return scene.mesh.sizes[level]
+def grid_of(scene: Scene, level: int) -> tuple[list[int] | None, float]:
+    """Cells along each axis, None if unstructured, and element size h in m, of a level.
+
+    Of a mesh that the scene does not give itself, but its pattern and sizes or numbers of cells.
+    """
+    geometry, asked = scene.geometry, scene.mesh
+    if asked.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
+        assert asked.sizes is not None
+        return None, asked.sizes[level]
+    sides = np.subtract(geometry.upper, geometry.lower)
+    if asked.cells is not None:
+        counts = np.array(asked.cells[level])
+    else:
+        assert asked.sizes is not None
+        # a size that divides the side up to round-off is that size
+        counts = np.ceil(sides / asked.sizes[level] * (1 - 1e-9)).astype(int)
+    return counts.tolist(), float((sides / counts).max())
 
 
 def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
@@ -103,3 +113,19 @@ def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
     if material.is_uniform:
         return material.young, material.poisson, material.density
     return material.at(points)
+
+
+def across_interfaces(
+    scene: Scene, points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> list[Regularisation]:
+    """State the cells (m, k + 1) that an interface crosses: of the material at their centroid."""
+    if scene.material.is_uniform:
+        return []
+    crossed = crossed_by_interfaces(scene.material, points, cells)
+    if not crossed.any():
+        return []
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    measures = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0.0))
+    share = float(measures[crossed].sum() / measures.sum())
+    kind = "cell across an interface, of the material at its centroid"
+    return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]

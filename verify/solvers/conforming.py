@@ -17,9 +17,9 @@ from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
-from verify.solvers.across_interfaces import across_interfaces
+from verify.solvers.body_of_scene import across_interfaces
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
-from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
+from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
 from verify.solvers.interface import check_choices
 from verify.solvers.runs import Record, at_rest, repeated
 from verify.system import System
@@ -101,7 +101,7 @@ class ConformingSolver:
             largest = scene.analysis.time_step or natural_step(scene, size)
             return Marching(scheme, largest, spectral_radius, delay)
 
-        size = structure(scene, level).size
+        size = structure(scene, level)[1]
         return _solve(
             scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions,
             marching,
@@ -183,7 +183,8 @@ def _solve(
             fields = _equilibrium(scene, space, exact, pressure, record)
         else:
             how = marching(level, size)
-            fields = move(scene, space, exact, how, record, comm, pressure, trial)
+            motion = TiedMotion(scene, space, exact, how, record, comm, pressure)
+            fields = motion.run(trial)
         return _solution(scene, space, record, fields, size)
 
     def made(level: int) -> tuple[ConformingMesh, float, int]:

@@ -1,7 +1,6 @@
 """Meshes on which the FEniCSx side solves a scene: at equal h, and the reference's own levels."""
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,46 +39,23 @@ from verify.scene import (
 )
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.cuts import Cut
+from verify.solvers.body_of_scene import grid_of
 
 Array = NDArray[np.float64]
 _WAY = {2: 1 / 16, 3: 1 / 2}  # size of elements along the way of a blade, over that far away
 # of the smallest domain at a front: cells that begin within a quarter of it must end inside
 _FRONT_SHARE = 0.45
 Cells = NDArray[np.int64]
+Counts = list[int] | None  # cells along each axis; None if unstructured
 
 
-class Structure(NamedTuple):
-    """A level of the scene's own meshes.
-
-    Attributes
-    ----------
-    counts : tuple of int, optional
-        Cells along each axis; None if unstructured.
-    size : float
-        Element size h, m.
-    """
-
-    counts: tuple[int, ...] | None
-    size: float
-
-
-def structure(scene: Scene, level: int) -> Structure:
-    """Give the cell counts and the element size of a level of the scene."""
-    geometry = scene.geometry
-    if isinstance(geometry, MeshFile):
+def structure(scene: Scene, level: int) -> tuple[Counts, float]:
+    """Give the cells along each axis, None if unstructured, and the element size of a level, m."""
+    if isinstance(scene.geometry, MeshFile):
         points, cells = read_mesh(scene)
-        edges = mesh_edges(cells)
-        return Structure(None, float(np.linalg.norm(np.diff(points[edges], axis=1), axis=2).mean()))
-    if scene.mesh.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
-        assert scene.mesh.sizes is not None
-        return Structure(None, scene.mesh.sizes[level])
-    sides = np.subtract(geometry.upper, geometry.lower)
-    if scene.mesh.cells is not None:
-        counts = np.array(scene.mesh.cells[level])
-    else:
-        assert scene.mesh.sizes is not None
-        counts = np.ceil(sides / scene.mesh.sizes[level] * (1 - 1e-9)).astype(int)
-    return Structure(tuple(counts.tolist()), float((sides / counts).max()))
+        edges = points[mesh_edges(cells)]
+        return None, float(np.linalg.norm(np.diff(edges, axis=1), axis=2).mean())
+    return grid_of(scene, level)
 
 
 def not_imprinted(scene: Scene) -> str | None:
@@ -95,7 +71,7 @@ def not_imprinted(scene: Scene) -> str | None:
 def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
     """Make the mesh of a level, imprinted or remeshed, that is the peer of an unfitted one."""
     if isinstance(scene.geometry, MeshFile) or (mesh == "imprinted" and not not_imprinted(scene)):
-        return open_cut(*_imprinted(scene, structure(scene, level)))
+        return open_cut(*_imprinted(scene, *structure(scene, level)))
     counts, size = structure(scene, level)
     if counts is not None:
         # equal mean size: two equilateral triangles of this edge are a square of 1, and with it
@@ -113,12 +89,12 @@ def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
     and tractions end; so is the scene's own where the cut is what another solver realised on it.
     Others are made anew, graded.
     """
-    coarse = structure(scene, 0)
-    realised = _realised(scene, coarse)
+    counts, size = structure(scene, 0)
+    realised = _realised(scene, counts, size)
     if realised is not None or isinstance(scene.geometry, MeshFile):
-        given = _imprinted(scene, coarse) if realised is None else realised[:3]
+        given = _imprinted(scene, counts, size) if realised is None else realised[:3]
         given = split_at_part_ends(scene, *given)
-        return open_cut(*refine_uniformly(*given, times=level)), coarse.size / 2**level
+        return open_cut(*refine_uniformly(*given, times=level)), size / 2**level
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)
     return conforming_mesh(scene, grading), grading.size
@@ -163,43 +139,43 @@ def _way(scene: Scene, size: float) -> float | None:
     return size * _WAY[scene.dimension] if on_its_way else None
 
 
-def _background(scene: Scene, level: Structure) -> tuple[Array, Cells]:
+def _background(scene: Scene, counts: Counts, size: float) -> tuple[Array, Cells]:
     """Make the scene's own mesh without its cuts."""
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
         return read_mesh(scene)
-    if level.counts is None:
+    if counts is None:
         assert isinstance(geometry, Rectangle | Polygon)
-        return background_mesh(geometry.outline(), level.size)
+        return background_mesh(geometry.outline(), size)
     if isinstance(geometry, Box):
-        return structured_tetrahedra(geometry.lower, geometry.upper, level.counts)
+        return structured_tetrahedra(geometry.lower, geometry.upper, tuple(counts))
     assert isinstance(geometry, Rectangle)
-    n, m = level.counts
+    n, m = counts
     return structured_triangles(geometry.lower, geometry.upper, (n, m))
 
 
-def _realised(scene: Scene, level: Structure) -> Realised | None:
+def _realised(scene: Scene, counts: Counts, size: float) -> Realised | None:
     """Imprint cuts that are triangles which fit the scene's own mesh, or give None."""
     triangles = [
         c.points for c in scene.final_cuts if isinstance(c, PolygonCut) and len(c.points) == 3
     ]
-    given = isinstance(scene.geometry, MeshFile) or level.counts is not None
+    given = isinstance(scene.geometry, MeshFile) or counts is not None
     membrane = scene.cell_dimension < scene.dimension
     if membrane or not given or not triangles or len(triangles) < len(scene.final_cuts):
         return None
     try:
-        found = imprint_facets(*_background(scene, level), np.array(triangles, dtype=float))
+        found = imprint_facets(*_background(scene, counts, size), np.array(triangles, dtype=float))
     except InputError:  # they reach beyond the body
         return None
     return found if found.fitted else None
 
 
-def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
+def _imprinted(scene: Scene, counts: Counts, size: float) -> tuple[Array, Cells, Cells]:
     """Imprint the cuts of the scene on its background mesh."""
-    realised = _realised(scene, level)
+    realised = _realised(scene, counts, size)
     if realised is not None:
         return realised[:3]
-    points, cells = _background(scene, level)
+    points, cells = _background(scene, counts, size)
     if scene.dimension == 2:
         return imprint(
             points, cells, [c.vertices() for c in scene.final_cuts if c.kind == "polyline"]

@@ -68,17 +68,8 @@ def natural_step(scene: Scene, size: float) -> float:
     return size / wave_speed(scene.material)
 
 
-def move(
-    scene: Scene,
-    space: ConformingSpace,
-    exact: Any,
-    marching: Marching,
-    record: Record,
-    comm: Any = None,
-    pressure: bool = False,
-    trial: bool = False,
-) -> dict[str, Any]:
-    """Integrate the motion of a dynamic scene; return its fields of `Solution`.
+class TiedMotion:
+    """A body on a mesh with all its cuts, tied where they are closed: a `timeline.Mover`.
 
     Parameters
     ----------
@@ -89,28 +80,15 @@ def move(
     marching : Marching
     record : Record
         Gets timings, iterations and notes.
-    comm : MPI communicator, optional
-        Of the ranks that share the work, each with the whole answer; default: each by itself.
+    comm : MPI communicator or None
+        Of the ranks that share the work, each with the whole answer; None: each by itself.
     pressure : bool
         Whether linear kinematics have the pressure as an unknown.
-    trial : bool
-        Whether to stop after the first step: what compiles, compiles in it.
 
     Raises
     ------
     InputError
-        If a support or load acts nowhere, a piece that is to be in equilibrium is not held, or
-        part of one so weakly that round-off is all there is.
-    RuntimeError
-        If a step or the initial equilibrium is not found.
-    """
-    return TiedMotion(scene, space, exact, marching, record, comm, pressure).run(trial)
-
-
-class TiedMotion:
-    """A body on a mesh with all its cuts, tied where they are closed: a `timeline.Mover`.
-
-    Parameters are those of `move`.
+        If a support or load acts nowhere.
     """
 
     def __init__(
@@ -148,7 +126,16 @@ class TiedMotion:
         )
 
     def run(self, trial: bool) -> dict[str, Any]:
-        """March to the end, or for one step; return the fields."""
+        """March to the end, or for one step; return the fields of `Solution`.
+
+        Raises
+        ------
+        InputError
+            If a piece that is to be in equilibrium is not held, or part of one so weakly that
+            round-off is all there is.
+        RuntimeError
+            If a step or the initial equilibrium is not found.
+        """
         record, marching = self.record, self.marching
         with naming_weak_places(self.scene, self.space, self.body.ties):
             with record.timed("initial state"):
