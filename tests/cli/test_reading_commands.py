@@ -148,8 +148,8 @@ def test_values_are_numbers_where_they_are_json_and_text_elsewhere():
 
 
 def test_each_solver_gets_its_own():
-    given = ["xfem.basis=shifted", "xfem.tip=inside", "my.module:Solver.order=2"]
-    wanted = {"xfem": {"basis": "shifted", "tip": "inside"}, "my.module:Solver": {"order": 2}}
+    given = ["xfem.mass=evs", "xfem.tip=inside", "my.module:Solver.order=2"]
+    wanted = {"xfem": {"mass": "evs", "tip": "inside"}, "my.module:Solver": {"order": 2}}
     assert of_solvers(given) == wanted
 
 

@@ -9,19 +9,14 @@ from verify.cli import main
 from verify.conformance import State, conform, exit_code_of
 
 
-@pytest.mark.parametrize(
-    "basis", ["sidewise", "shifted", pytest.param("heaviside", marks=pytest.mark.heavy)]
-)
-def test_the_compact_solver_conforms_in_every_basis(basis):
-    results = conform("xfem", {"basis": basis})
+def test_the_compact_solver_conforms():
+    results = conform("xfem")
     assert exit_code_of(results) == 0, [r for r in results if r.state is not State.PASS]
     kept = {result.name for result in results if result.state is State.PASS}
-    # the three bases share the mesh; none may hide behind refusals
     wanted = {"cut-patch", "rigid-rotation-3d", "parted-3d", "renumbering", "mirrored-cut"}
     wanted |= {"two-materials", "two-cuts", "ending-cut", "crossed-interface"}
-    if basis == "sidewise":
-        wanted |= {"crossing-cuts", "branched-cut", "traction-3d"}
-        wanted |= {"finite-rotation-2d", "finite-rotation-3d", "free-fall"}
+    wanted |= {"crossing-cuts", "branched-cut", "traction-3d"}
+    wanted |= {"finite-rotation-2d", "finite-rotation-3d", "free-fall"}
     assert wanted <= kept
 
 
@@ -53,7 +48,7 @@ def test_the_command_prints_the_checks_as_a_table_and_as_json(capsys):
     assert main(command) == 0
     table = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in table] == [["uncut-2d", "pass"]]
-    assert main([*command, "--set", "basis=shifted", "--json"]) == 0
+    assert main([*command, "--set", "tip=through", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["parameters"] == {"basis": "shifted"}
+    assert said["parameters"] == {"tip": "through"}
     assert [check["state"] for check in said["checks"]] == ["pass"]

@@ -9,7 +9,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut
 from verify.compare.integration import cut_rules
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
@@ -51,20 +51,6 @@ def strain_energy(solution, young=1e4, poisson=0.3):
     mu = young / (2 * (1 + poisson))
     trace = np.trace(strain, axis1=1, axis2=2)
     return float(area @ (0.5 * lam * trace**2 + mu * (strain**2).sum(axis=(1, 2))))
-
-
-def test_the_three_bases_give_the_same_displacements(tmp_path):
-    strip = scene(tmp_path)
-    solutions = [
-        XfemSolver().solve(strip, 1, basis=b) for b in ("sidewise", "shifted", "heaviside")
-    ]
-    scale = np.abs(solutions[0].displacement).max()
-    for other in solutions[1:]:
-        # round-off times the condition number of a mesh of 41 elements in length, about 1e5
-        np.testing.assert_allclose(
-            other.displacement, solutions[0].displacement, rtol=0, atol=1e-9 * scale
-        )
-        assert other.unknowns == solutions[0].unknowns
 
 
 def test_the_patch_has_its_exact_energy_on_every_level():
@@ -142,9 +128,6 @@ def test_a_part_may_end_at_a_cut_inside_an_element(tmp_path):
     moved = found.displacement[0][found.cells]
     wanted = np.where(above[:, None, None], [1e-4, 0.0], [0.0, 0.0])
     np.testing.assert_allclose(moved, np.broadcast_to(wanted, moved.shape), atol=1e-15)
-    # of the two unknowns of a node one side is held alone: which the shifted ones cannot say
-    with pytest.raises(UnsupportedSceneError, match="element"):
-        XfemSolver().solve(strip, 0, 0, basis="heaviside")
 
 
 FENICSX = [pytest.param(name, marks=pytest.mark.fenicsx) for name in ("reference", "conforming")]

@@ -5,7 +5,6 @@ import pytest
 from cut_bodies import cut_body, cut_membrane, material
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.bases import sidewise_from
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath, TriangulatedSurface
@@ -64,7 +63,6 @@ def stiffness():
         (lambda: solve_static(CUT, SOFT, Supports(ALL, np.where(ALL, NAN, 0.0))), "not finite"),
         (lambda: traction(CUT, [[0.7, 1.2]], [1.0, 0.0]), "loaded facets"),
         (lambda: body_force(CUT, lambda x, s: x, -1), "degree -1"),
-        (lambda: sidewise_from(CUT, "shifted", np.zeros((3, 2))), "unknowns"),
         # an infinite or missing step
         (lambda: element_critical_steps(PLATE, SOFT, -1.0), "density -1"),
         (lambda: critical_step(stiffness() * NAN, side_wise_mass(CUT, 1.0)), "not finite"),

@@ -6,9 +6,9 @@ import xfem_exact_fields as exact
 from cut_bodies import DENSITY, material
 from scipy.sparse import csr_array, identity, kron
 from swings import aggregated, cube, let_go, plate, stretched
+from thesis_blocks import transformed_matrix
 from xfem_bodies import boundary_nodes, relative_l2_error, scaled_dense_stiffness, sparse_stiffness
 
-from verify.xfem.bases import transformed_matrix
 from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
@@ -91,13 +91,13 @@ def alternating(count):
 
 def condition_numbers(phantom, basis):
     """Raw and with Jacobi scaling."""
-    matrix, held = sparse_stiffness(phantom, 1e4), clamped(phantom).fixed
+    matrix, held = sparse_stiffness(phantom, 1e4).toarray(), clamped(phantom).fixed
     if basis != "sidewise":
-        matrix = transformed_matrix(phantom, basis, csr_array(matrix))
+        matrix = transformed_matrix(phantom, basis, matrix)
         nodes = held[: len(phantom.mesh.points)]
         held = np.concatenate([nodes, nodes[phantom.enriched_nodes]])
     free = ~held.ravel()
-    dense = matrix.toarray()[np.ix_(free, free)]
+    dense = matrix[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.diag(dense))
     scaled = scale[:, None] * dense * scale
     inverse = scale[:, None] * np.linalg.inv(scaled) * scale

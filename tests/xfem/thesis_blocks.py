@@ -13,6 +13,32 @@ from verify.xfem.mesh import SimplexMesh
 _Floats = NDArray[np.float64]
 
 
+def transformation(phantom, basis="shifted") -> _Floats:
+    """T (N, n + enriched) of p = T q, for one cut: side-wise p from q, u over a of an enrichment.
+
+    With H = ±1 above and below the cut, the shifted basis (2.48) is
+    u = Σ N_i u_i + Σ N_j ½(H − H_j) a_j and the plain one is u = Σ N_i u_i + Σ N_j H a_j.
+    """
+    count, own = len(phantom.mesh.points), phantom.enriched_nodes
+    place = np.zeros(count, dtype=np.int64)
+    place[phantom.node_parent[count:]] = np.arange(count, phantom.node_count)
+    other, extra, sign = place[own], count + np.arange(len(own)), phantom.node_side[own, 0]
+    T = np.eye(phantom.node_count, count + len(own))
+    T[other, extra] = 0.0
+    T[other, own] = 1.0
+    # p_own = u_j (plain: ± a more); the other side differs, counted from below to above
+    T[other, extra] = -sign
+    if basis == "heaviside":
+        T[own, extra] = sign
+    return T
+
+
+def transformed_matrix(phantom, basis, matrix) -> _Floats:
+    """Tᵀ K T, dense, for a matrix with d components per node."""
+    full = np.kron(transformation(phantom, basis), np.eye(matrix.shape[0] // phantom.node_count))
+    return np.asarray(full.T @ (matrix @ full))
+
+
 def shifted_stiffness(
     mesh: SimplexMesh,
     material: Material,

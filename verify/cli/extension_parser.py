@@ -143,7 +143,7 @@ def _add_conform(add: Add) -> None:
     command = add(
         "conform",
         "check a solver on what holds for every right solver, before it is ranked",
-        "examples:\n  verify conform xfem\n  verify conform xfem --set basis=shifted\n"
+        "examples:\n  verify conform xfem\n  verify conform xfem --set tip=partial\n"
         "  verify conform my_module:MySolver --json\n\n"
         "exit codes:\n"
         "  0  every check that the solver did not refuse passes, or is off as it states\n"

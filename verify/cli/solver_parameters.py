@@ -8,18 +8,18 @@ from verify.solvers.named import plain_value
 
 
 def of_one_solver(given: Iterable[str]) -> dict[str, Any]:
-    """Read ``basis=shifted`` … as the parameters of one solver.
+    """Read ``tip=partial`` … as the parameters of one solver.
 
     Raises
     ------
     InputError
         If one is not of this form.
     """
-    return dict(_split(text, text, "--set basis=shifted") for text in given)
+    return dict(_split(text, text, "--set tip=partial") for text in given)
 
 
 def of_solvers(given: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Read ``xfem.basis=shifted`` … as the parameters of several solvers.
+    """Read ``xfem.tip=partial`` … as the parameters of several solvers.
 
     The solver ends at the last dot before the equals sign, so that ``module:Class`` works too.
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.xfem.errors import BasisError, XfemError
+from verify.xfem.errors import XfemError
 
 
 @dataclass
@@ -73,11 +73,9 @@ def check_steps(load_steps: int, step_factor: float) -> None:
 
 @contextmanager
 def errors_of_scene(scene: Scene) -> Iterator[None]:
-    """Turn errors of the library into those of a scene: `UnsupportedSceneError`, `InputError`."""
+    """Turn errors of the library into those of a scene: `InputError`."""
     try:
         yield
-    except BasisError as error:  # another basis can do the scene
-        raise UnsupportedSceneError(str(error)) from None
     except XfemError as error:
         raise InputError(str(error), str(scene.file or scene.name)) from None
 

@@ -30,7 +30,6 @@ from verify.xfem.slivers import join_specks, treat_slivers
 
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _CHOICES: Mapping[str, Collection[str]] = {
-    "basis": ("sidewise", "shifted", "heaviside"),
     "tip": ("inside", "through", "nearest", "partial"),
     "slivers": ("keep", "merge", "drop", "penalise"),
     "scheme": SCHEMES,
@@ -49,7 +48,6 @@ class _Parameters:
         If one has a value that it cannot have.
     """
 
-    basis: str = "sidewise"
     tip: str = "inside"
     slivers: str = "keep"
     load_steps: int = 0
@@ -77,7 +75,6 @@ class _Parameters:
         """Say them, for the report."""
         return {
             "method": "P1 XFEM, element-wise cut",
-            "basis": self.basis,
             "tip": self.tip,
             "slivers": self.slivers,
         }
@@ -90,9 +87,6 @@ class XfemSolver:
 
     Parameters of `solve`
     ---------------------
-    basis : {"sidewise", "shifted", "heaviside"}
-        Unknowns of the enrichment; all give the same displacements up to round-off. The last two
-        are for linear statics.
     tip : {"inside", "through", "nearest", "partial"}
         What happens to an element in which a cut ends: see `verify.xfem.pieces.split_cells`; the
         last, for triangles, divides it so that the end is a node (`verify.methods.tip_nodes`).
@@ -151,12 +145,8 @@ class XfemSolver:
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
         given, exact = _Parameters(**parameters), exact_of(scene)
-        linear_static = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
-        if given.basis != "sidewise" and not linear_static:
-            said = f"the {given.basis} basis is offered for linear statics only"
-            raise UnsupportedSceneError(said)
         if given.slivers == "penalise":
-            _check_penalty(scene, given.basis, given.mass)
+            _check_penalty(scene, given.mass)
         return repeated(
             scene, repetitions, lambda: background_mesh(scene, level),
             lambda mesh, trial: _run(scene, *mesh, exact, given, trial),
@@ -178,7 +168,7 @@ class XfemSolver:
             phantom = _cut(scene, mesh, size, exact, given)[0]
             return system_of(
                 scene, phantom, phantom, material_of(scene, phantom.mesh), exact, given.mass,
-                given.basis, given.slivers == "penalise",
+                given.slivers == "penalise",
             )  # fmt: skip
 
 
@@ -197,13 +187,11 @@ def _cut(
     return phantom, report, [*asked.done, *joined(specks)]
 
 
-def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
+def _check_penalty(scene: Scene, mass: str) -> None:
     """Refuse a ghost penalty where the library has none."""
     static = scene.analysis.kind == "static"
-    if static and (scene.analysis.kinematics != "linear" or basis != "sidewise"):
-        raise UnsupportedSceneError(
-            "slivers = 'penalise' in statics is for linear kinematics and the sidewise basis"
-        )
+    if static and scene.analysis.kinematics != "linear":
+        raise UnsupportedSceneError("slivers = 'penalise' in statics is for linear kinematics")
     if not static and mass != "sidewise":
         raise UnsupportedSceneError("slivers = 'penalise' in motion is for the sidewise mass")
 
@@ -228,7 +216,7 @@ def _run(
         phantom, slivers, changes = _cut(scene, mesh, size, exact, given)
     record.regularisations += [*treated(slivers), *changes]
     fields = solve_equilibrium(
-        scene, phantom, exact, record, basis=given.basis, load_steps=given.load_steps,
+        scene, phantom, exact, record, load_steps=given.load_steps,
         penalise=given.slivers == "penalise", kernels=_KERNELS[given.kernels],
     )  # fmt: skip
     return solution_on(scene, record, phantom, fields, size)

@@ -14,7 +14,6 @@ from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.runs import Record, at_rest
 from verify.solvers.supports_of_scene import path_of_supports
 from verify.solvers.xfem_answer import penalised, springs_left_out
-from verify.solvers.xfem_bases import solve_in_basis
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
@@ -34,7 +33,6 @@ def solve_equilibrium(
     *,
     resisting: PhantomMesh | None = None,
     law: Law = InternalForce,
-    basis: str = "sidewise",
     load_steps: int = 0,
     penalise: bool = False,
     kernels: Kernels = FAST,
@@ -54,7 +52,7 @@ def solve_equilibrium(
         What resists, with the same unknowns; default: the same.
     law : callable
         Makes the internal force; other than that of elements it is solved by Newton's method.
-    basis, load_steps
+    load_steps : int
         As of the solver ``xfem``.
     penalise : bool
         Whether with a ghost penalty (linear only).
@@ -76,13 +74,6 @@ def solve_equilibrium(
         load = loads_of(scene, phantom, exact)
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
-    if basis != "sidewise":
-        other: Any = basis
-        displacement, phases = solve_in_basis(body, material, supports, load, other)
-        record.timings |= phases
-        record.notes["linear solver"] = "SciPy SuperLU"
-        energy = InternalForce(body, material, "linear").evaluate(displacement)[1]
-        return at_rest(displacement, energy)
     if kinematics == "linear" and law is InternalForce:
         ghost = GhostPenalty(body, material) if penalise else None
         static = solve_static(body, material, supports, load, ghost=ghost, kernels=kernels)

@@ -8,10 +8,8 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.solvers.body_of_scene import density_of
 from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.xfem_bases import held_in_basis
 from verify.solvers.xfem_steps import MASSES
 from verify.system import System
-from verify.xfem.bases import transformed_matrix
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.elasticity import Material
 from verify.xfem.ghost_penalty import GhostPenalty
@@ -26,7 +24,6 @@ def system_of(
     material: Material,
     exact: Any,
     mass: str = "sidewise",
-    basis: str = "sidewise",
     penalise: bool = False,
 ) -> System:
     """Assemble the system of a cut body.
@@ -39,7 +36,7 @@ def system_of(
     material : Material
         Of the cells of `resisting`.
     exact : exact solution, optional
-    mass, basis : str
+    mass : str
         As of the solver ``xfem``.
     penalise : bool
         With a ghost penalty.
@@ -47,9 +44,9 @@ def system_of(
     Raises
     ------
     InputError
-        If the mass or the basis is unknown.
+        If the mass is unknown.
     XfemError
-        If one of them is not defined on this body.
+        If it is not defined on this body.
     """
     if mass not in MASSES:
         raise InputError(f"mass '{mass}'; expected one of {', '.join(MASSES)}")
@@ -67,11 +64,4 @@ def system_of(
         stiffness = csr_array(stiffness + kron(ghost.matrix, identity(components)))
         inertia = None if inertia is None else ghost.mass(inertia, density_of(scene, phantom.mesh))
     matrix = None if inertia is None else csr_array(kron(inertia.matrix, identity(components)))
-    if basis == "sidewise":
-        return System(stiffness, matrix, supports.fixed.ravel())
-    other: Any = basis
-    return System(
-        transformed_matrix(phantom, other, stiffness),
-        None if matrix is None else transformed_matrix(phantom, other, matrix),
-        held_in_basis(phantom, supports, other),
-    )
+    return System(stiffness, matrix, supports.fixed.ravel())

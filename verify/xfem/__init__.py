@@ -50,7 +50,7 @@ piece, cut-cell part
 dof node, unknown
     one displacement vector. A node of the mesh has one for each piece of material around it that
     the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes. These are
-    the *side-wise* unknowns, against those of an enrichment, u and a (`bases`)
+    the *side-wise* unknowns, against those of an enrichment, u and a
 free body
     pieces that hang together by shared dof nodes; a cut through the whole makes two of one
 sliver
@@ -102,9 +102,8 @@ Extensions, which none of the modules above needs (a contract of the imports hol
     load steps at finite rotation: rigid motion first, second paths, stability
 `energy_momentum`, `inherit`
     a scheme that keeps energy and momentum; the state of a body that is cut on the way
-`bases`, `critical_step`, `subdivision`
-    other bases of the same space; largest step of explicit schemes; the cut body as a conforming
-    mesh
+`critical_step`, `subdivision`
+    largest step of explicit schemes; the cut body as a conforming mesh
 """
 
 from verify.xfem.body import DynamicBody

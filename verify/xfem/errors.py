@@ -5,10 +5,6 @@ class XfemError(ValueError):
     """Bad input to the compact solver: what it was, where, and what was expected."""
 
 
-class BasisError(XfemError):
-    """An enrichment (`verify.xfem.bases`) cannot express the cuts; side-wise unknowns can."""
-
-
 class SingularStiffnessError(XfemError):
     """The matrix is not positive definite: something moves freely, or a sign is wrong.
 

@@ -177,17 +177,6 @@ def test_consistent_masses_give_the_same_critical_step_without_a_cut(scene):
     assert lumped > 1.3 * ours  # lumping slows the highest mode down, in one dimension by √3
 
 
-@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
-def test_another_basis_is_another_condition_and_the_same_step(basis, scene):
-    """ω of K x = ω² M x is that of the space, whatever spans it."""
-    solver = find_solver("xfem")
-    given = {"mass": "consistent", "slivers": "keep"}
-    own = solver.system(scene, 0, **given)
-    other = checked_system(solver.system(scene, 0, basis=basis, **given))
-    assert critical_step(other) == pytest.approx(critical_step(own), rel=1e-9)
-    assert condition_numbers(other)[0] != pytest.approx(condition_numbers(own)[0], rel=0.05)
-
-
 class Explicit:
     """Central differences with the scene's step, of which nothing but solutions is known."""
 
