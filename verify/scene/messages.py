@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from verify.printable import shown
+from verify.removed import instead
 from verify.scene.nearest import nearest
 
 
@@ -33,6 +34,8 @@ def first_fault(error: ValidationError, content: dict[str, Any], schema: dict[st
 def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> str:
     match found["type"]:
         case "extra_forbidden":
+            if said := instead(key):
+                return said
             valid = _valid_keys(found["loc"][:-1], schema)
             return f"{key}: unknown key{nearest(str(found['loc'][-1]), valid)}"
         case "missing":

@@ -1,4 +1,4 @@
-"""Skin: a patch of body surface, as a membrane or with a thickness; procedural, real, or own."""
+"""Skin: a patch of body surface, as a membrane or with a thickness; made by formulas, or own."""
 
 from pathlib import Path
 from typing import Literal
@@ -17,10 +17,6 @@ class Skin(Strict):
 
     kind: Literal["skin"]
     shape: Literal["face", "hand"] | None = Field(default=None, description="which patch; or file")
-    source: Literal["procedural", "anatomy"] = Field(
-        default="procedural",
-        description="procedural: made by formulas; anatomy: real, see `verify data anatomy`",
-    )
     elements: Count | None = Field(
         default=None, description="of a shape: about how many elements are wanted"
     )
@@ -38,8 +34,6 @@ class Skin(Strict):
             raise ValueError("a skin has either a shape or a file")
         if (self.shape is None) != (self.elements is None):
             raise ValueError("elements belong to a shape, and a shape needs them")
-        if self.file is not None and self.source == "anatomy":
-            raise ValueError("source: 'anatomy' belongs to a shape, not to a file")
         if self.thickness is None and self.layers > 1:
             raise ValueError("layers belong to a skin with a thickness")
         return self

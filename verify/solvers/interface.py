@@ -13,7 +13,7 @@ import numpy as np
 
 from verify.errors import InputError
 from verify.printable import one_line, shown, words_of
-from verify.removed import check_removed
+from verify.removed import instead
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
@@ -201,7 +201,8 @@ def check_parameters(name: str, solver: Solver, given: Mapping[str, Any]) -> Non
     named = {name for name, one in taken.items() if one.kind is not Parameter.VAR_KEYWORD}
     known = {*named, *(listed or ())} - {"scene", "level", "repetitions"}
     for word in given:
-        check_removed(f"{name}.{word}")
+        if said := instead(f"{name}.{word}"):
+            raise InputError(said)
     for word in given if listed is not None or len(named) == len(taken) else ():
         if word not in known:
             raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")

@@ -8,7 +8,6 @@ import numpy as np
 from verify.scene import Skin
 from verify.simulator.anatomy.patch import Patch
 from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
-from verify.simulator.anatomy.store import stored_patch
 from verify.simulator.anatomy.surface_file import outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken
 from verify.xfem.arrays import Bools, Floats, Ints
@@ -23,16 +22,7 @@ class SkinMesh(NamedTuple):
 
 
 def patch_of(skin: Skin) -> Patch:
-    """Return the patch of a shape.
-
-    Raises
-    ------
-    InputError
-        If real anatomy is asked for and has not been fetched.
-    """
-    assert skin.shape is not None
-    if skin.source == "anatomy":
-        return stored_patch(skin.shape)
+    """Return the patch of a shape."""
     return procedural_face() if skin.shape == "face" else procedural_hand()
 
 
