@@ -1,7 +1,7 @@
 """Loads of a scene: force densities at points, and consistent nodal forces of a cut body."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,31 +76,12 @@ class ForceDensity:
         return np.asarray(self.exact.body_force(points, near))
 
 
-class NodalForces(NamedTuple):
-    """A load of the scene and its nodal forces (N, d), N (per metre of thickness in 2D)."""
-
-    load: Load
-    forces: _Floats
-
-
 def loads_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> _Floats:
     """Return the consistent nodal forces (N, d) of all loads, N (per metre in 2D)."""
     total = np.zeros_like(phantom.node_points)
-    for one in nodal_forces(scene, phantom, exact):
-        total += one.forces
+    for i in range(len(scene.loads)):
+        total += forces_of(scene, i, phantom, exact)
     return total
-
-
-def nodal_forces(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[NodalForces]:
-    """Return the nodal forces of every load at the time 0, in the order of the scene.
-
-    Those of a membrane are times its thickness: forces per volume and per area stay what they
-    are.
-    """
-    return [
-        NodalForces(entry, forces_of(scene, i, phantom, exact))
-        for i, entry in enumerate(scene.loads)
-    ]
 
 
 def is_moving(load: Load, exact: Any) -> bool:
@@ -111,7 +92,11 @@ def is_moving(load: Load, exact: Any) -> bool:
 
 
 def forces_of(scene: Scene, i: int, phantom: PhantomMesh, exact: Any, time: float = 0.0) -> _Floats:
-    """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N."""
+    """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N.
+
+    Those of a membrane are times its thickness: forces per volume and per area stay what they
+    are.
+    """
     entry = scene.loads[i]
     if isinstance(entry, CutFaces):
         forces = _face_forces(scene, phantom, i, time)

@@ -1,6 +1,8 @@
 """Motion of a body on virtual nodes, which is made anew whenever its cuts open further."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -9,24 +11,28 @@ from scipy.sparse import csr_array
 
 from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Equilibrium, Scene, ToolPathCut
+from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
+from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open
 from verify.solution import Regularisation
 from verify.solvers.account import StagedAccount
-from verify.solvers.body_in_motion import body_in_motion, initial_state
 from verify.solvers.body_of_scene import density_of, material_of
+from verify.solvers.loads_of_scene import forces_of, is_moving
 from verify.solvers.runs import Record
+from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports
 from verify.solvers.timeline import Timeline, march, step_sizes
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
-from verify.xfem.body import DynamicBody, Integrator, MotionState
+from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
 from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
+from verify.xfem.supports import check_bodies
 
 _Floats = NDArray[np.float64]
 
@@ -131,7 +137,7 @@ class CutMotion:
         self._solves = 0
         body = self._made(self._opened)
         with record.timed("initial state"):
-            state = initial_state(scene, body, exact)
+            state = _initial_state(scene, body, exact)
         self._take(body, state)
 
     def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
@@ -212,7 +218,7 @@ class CutMotion:
         with self.record.timed(self.opening.phase):
             phantom = self.opening.at(time)
         with self.record.timed("loading"):
-            return body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
+            return _body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
 
     def _take(self, body: DynamicBody, state: MotionState) -> None:
         """Go on with a body and its state."""
@@ -288,3 +294,70 @@ class CutMotion:
         }
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["a tool path opens"] = self.opening.rule
+
+
+def _body_in_motion(scene: Scene, force: InternalForce, mass: Mass, exact: Any) -> DynamicBody:
+    """Give a body with elasticity and mass the loads, supports and damping of a scene."""
+    phantom = force.phantom
+    weight = np.zeros_like(phantom.node_points)
+    driven: list[tuple[Any, Callable[[float], _Floats]]] = []  # history, and forces at a time
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
+            weight += mass.weight(load.acceleration)
+        else:
+            at = partial(forces_of, scene, i, phantom, exact)
+            driven.append((load.history, at if is_moving(load, exact) else _always(at(0.0))))
+
+    def load_at(time: float) -> _Floats:
+        total = np.zeros_like(weight)
+        for history, forces in driven:
+            total += factor_at(history, time) * forces(time)
+        return total
+
+    return DynamicBody(
+        force,
+        mass,
+        weight,
+        load_at if driven else None,
+        motion_of_supports(scene, phantom, exact),
+        RayleighDamping(*scene.analysis.damping),
+    )
+
+
+def _always(forces: _Floats) -> Callable[[float], _Floats]:
+    return lambda _time: forces
+
+
+def _initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
+    """Return the state of a body at the time 0, before what opens then.
+
+    Raises
+    ------
+    UnsupportedBodyError, NotInEquilibriumError
+        If it is to be an equilibrium, and a piece is not held or none is found.
+    """
+    state, initial, phantom = body.rest(), scene.initial, body.force.phantom
+    free = ~body.fixed
+    if isinstance(initial, Moving):
+        state.velocity[free] = initial.velocities(phantom.node_points)[free]
+    elif isinstance(initial, InitialField):
+        u, v = initial.state(phantom.node_points, phantom.node_piece_points, exact)
+        state.displacement[free], state.velocity[free] = u[free], v[free]
+    elif isinstance(initial, Equilibrium):
+        state.displacement[:] = _equilibrium(scene, body, exact)
+    return state
+
+
+def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
+    """Displacement at rest under the loads and supports as their histories begin."""
+    phantom = body.force.phantom
+    assert body.weight is not None
+    load = body.weight.copy()
+    for i, entry in enumerate(scene.loads):
+        if not isinstance(entry, Gravity):
+            load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
+    path = path_of_supports(scene, phantom, exact)
+    check_bodies(phantom, path(1.0))
+    return static_equilibrium(
+        body.force, body.fixed, lambda share: path(share).values, load
+    ).displacement
