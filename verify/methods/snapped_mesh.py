@@ -70,7 +70,7 @@ def snap_nodes(
     XfemError
         If the mesh is a membrane, or a parameter is outside its bounds.
     """
-    if mesh.dim != mesh.space:
+    if mesh.is_membrane:
         raise XfemError("snapping of a membrane in space; expected triangles in the plane or tets")
     if not 0.0 < threshold <= 0.5:
         raise XfemError(f"snapping threshold {threshold:g}; expected a share of an edge in (0, ½]")

@@ -57,7 +57,7 @@ def spring_stiffness(
     XfemError
         If the fit is unknown or the mesh a membrane.
     """
-    if mesh.dim != mesh.space:
+    if mesh.is_membrane:
         raise XfemError("springs of a membrane in space; expected triangles in the plane or tets")
     count = len(mesh.cells)
     lam, mu = (np.broadcast_to(x, count).astype(float) for x in (material.lam, material.mu))

@@ -56,7 +56,7 @@ def quality_of(session: Session) -> Quality:
         body.mesh, body.piece_parent.rows, body.piece_cells.rows, displacement
     )
     stretch = float(np.linalg.svd(gradients, compute_uv=False)[:, 0].max())
-    solid = phantom.mesh.dim == phantom.mesh.space
+    solid = not phantom.mesh.is_membrane
     inverted = int((np.linalg.det(gradients) < 0.0).sum()) if solid else 0
     enclosed, loose = float("nan"), 0
     if solid:

@@ -130,4 +130,4 @@ class Stage:
     @property
     def is_membrane(self) -> bool:
         """Whether the body is a membrane."""
-        return self.mesh.dim < self.mesh.space
+        return self.mesh.is_membrane

@@ -131,6 +131,6 @@ def _dismissed(found: StaticEquilibrium) -> list[Regularisation]:
 
 def _inverted(force: InternalForce, displacement: NDArray[np.float64]) -> str:
     mesh = force.phantom.mesh
-    if mesh.dim < mesh.space:
+    if mesh.is_membrane:
         return "not defined for a membrane"
     return str(len(inverted_cells(force, displacement)))

@@ -86,13 +86,14 @@ on what the two after it define, and is easier read first):
     material, nearest rotations, load vectors, prescribed displacements
 `block_pattern`, `mass`
     sparsity and supports in a matrix; masses, side-wise and consistent
-`element`, `linear_solvers`, `internal_force`
-    force and tangents of an element, linear elasticity being R = I; SciPy behind one protocol, and
-    the operations that `verify.accelerated` replaces; force, energy and stiffness of a body
+`element`, `membrane`, `linear_solvers`, `internal_force`
+    force and tangents of an element, linear elasticity being R = I; tension of membranes; SciPy
+    behind one protocol, and the operations that `verify.accelerated` replaces; force, energy and
+    stiffness of a body
 `statics`, `static_newton`
     linear statics; Newton's method with a line search on the potential energy
-`body`, `energy_balance`, `explicit`, `implicit`, `real_time`
-    a body in motion, its energies and its schemes
+`body`, `explicit`, `implicit`
+    a body in motion, and its schemes
 
 Extensions, which none of the modules above needs (a contract of the imports holds that):
 
@@ -100,8 +101,9 @@ Extensions, which none of the modules above needs (a contract of the imports hol
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
 `rigid_motion`, `slack_membranes`, `stability`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability
-`energy_momentum`, `inherit`
-    a scheme that keeps energy and momentum; the state of a body that is cut on the way
+`energy_balance`, `energy_momentum`, `real_time`, `inherit`
+    energies of a motion; a scheme that keeps energy and momentum, one of a linear solve per step;
+    the state of a body that is cut on the way
 `critical_step`, `subdivision`
     largest step of explicit schemes; the cut body as a conforming mesh
 """

@@ -270,7 +270,7 @@ def _continued(
     rest = weights.sum(axis=1, keepdims=True) - np.take_along_axis(weights, largest, 1)
     np.put_along_axis(weights, largest, 1.0 - rest, 1)
     mesh = phantom.mesh
-    if mesh.dim < mesh.space:
+    if mesh.is_membrane:
         corners = mesh.points[mesh.cells[phantom.parent[root]]]
         off = np.linalg.norm(np.einsum("qi,qis->qs", weights, corners) - points[:, 0], axis=1)
         flat = off <= _ROUND_OFF * mesh.extent

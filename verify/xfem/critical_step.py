@@ -162,6 +162,7 @@ def element_critical_steps(
     mu = second[:, None, None, None, None]
     # unknowns scaled by a unit mass: K_ij (d + 1)/(ρ V)
     eye = np.eye(space)
+    # K_ij = λ b_i b_jᵀ + μ (b_j b_iᵀ + b_i·b_j I)
     dots = np.einsum("eik,ejk->eij", b, b)
     diagonal = np.einsum("eij,kl->eikjl", dots, eye)
     turned = np.einsum("ejk,eil->eikjl", b, b)
@@ -179,4 +180,4 @@ def _against_rotation(mesh: SimplexMesh, lam: NDArray, mu: NDArray, strain: floa
     plane with T/u |n·δF|², which the linear stiffness with its μ and twice the factor cover.
     """
     factor: NDArray = (2.0 * mu + mesh.dim * lam) * strain / (1.0 + strain)
-    return factor if mesh.dim == mesh.space else 2.0 * factor
+    return 2.0 * factor if mesh.is_membrane else factor

@@ -8,11 +8,8 @@ is linear elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative 
     rotation-fixed   A = μ (δ_kl δ_nm + R_km R_ln) + λ R_kn R_lm,
     consistent       A = 2μ δ_kl δ_nm + λ R_kn R_lm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm.
 
-A membrane (in the kernels c == d: as many corners as dimensions) is the same with F and I
-restricted to its tangent plane. It has no stiffness against the displacement φ along its turned
-normal n but w (∇φ · S ∇φ) of its tension S, the second Piola–Kirchhoff stress with principal values
-(2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches λ_k. The geometric stiffness takes its
-positive part alone, so that it has no negative mode.
+A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane; what
+holds it across that is in `verify.xfem.membrane`.
 """
 
 from typing import NamedTuple
@@ -26,7 +23,6 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import SPINS, adjugate
 
 _SINGULAR = 1e-8  # determinant over the power of the trace: a rotation without a derivative
-_COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
 
 
 class Elements(NamedTuple):
@@ -48,6 +44,8 @@ class Elements(NamedTuple):
         Lamé parameters in pascal.
     axes, corners : tuple of int
         0…d − 1 and 0…c − 1: lengths that the compiler knows.
+    is_membrane : bool
+        Whether cells are triangles in space.
     """
 
     cells: Ints
@@ -59,11 +57,7 @@ class Elements(NamedTuple):
     mu: Floats
     axes: tuple[int, ...]
     corners: tuple[int, ...]
-
-    @property
-    def is_membrane(self) -> bool:
-        """Whether cells are triangles in space."""
-        return len(self.axes) == len(self.corners)
+    is_membrane: bool
 
     def part(self, some: slice | Ints) -> "Elements":
         """Return some of the cells."""
@@ -82,28 +76,29 @@ def elements_of(phantom: PhantomMesh, material: Material) -> Elements:
     """
     mesh = phantom.mesh
     normals = np.zeros((1, mesh.space))
-    if mesh.dim < mesh.space:
+    if mesh.is_membrane:
         normals = np.cross(mesh.edge_vectors[:, 0], mesh.edge_vectors[:, 1])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     lam, mu = material.of_cells(len(mesh.cells))
     gradients = np.ascontiguousarray(mesh.gradients)
     axes, corners = tuple(range(mesh.space)), tuple(range(mesh.dim + 1))
     return Elements(
-        phantom.cells, phantom.parent, gradients, phantom.volumes, normals, lam, mu, axes, corners
-    )
+        phantom.cells, phantom.parent, gradients, phantom.volumes, normals, lam, mu, axes, corners,
+        mesh.is_membrane,
+    )  # fmt: skip
 
 
 @njit(cache=True)
 def deform(elements, displacement, share, F):
     """Write `share` I + ∇u to F (p, d, d), restricted to the tangent plane of membranes."""
-    cells, parent, gradients, _, normals, _, _, axes, corners = elements
+    cells, parent, gradients, _, normals, _, _, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
     for p in range(len(cells)):
         cell = parent[p]
         for k in range(d):
             for l in range(d):
                 total = share if k == l else 0.0
-                if c == d:
+                if is_membrane:
                     total -= share * normals[cell, k] * normals[cell, l]
                 for i in range(c):
                     total += displacement[cells[p, i], k] * gradients[cell, i, l]
@@ -124,7 +119,7 @@ def add_force(elements, R, F, share, scale, force):
     share, scale : float
     force : (N, d) float array
     """
-    cells, parent, gradients, volumes, normals, lam, mu, axes, corners = elements
+    cells, parent, gradients, volumes, normals, lam, mu, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
     E, P = np.empty((d, d)), np.empty((d, d))
     energy = 0.0
@@ -135,7 +130,7 @@ def add_force(elements, R, F, share, scale, force):
                 E[k, l] = 0.0
                 for m in range(d):
                     E[k, l] += R[p, m, k] * F[p, m, l]
-        if c == d:  # nothing resists across the turned plane
+        if is_membrane:  # nothing resists across the turned plane
             for l in range(d):
                 across = 0.0
                 for k in range(d):
@@ -181,7 +176,7 @@ def add_rotation_fixed(elements, R, scale, targets, blocks):
         Block of each pair of corners.
     blocks : (B, d, d) float array
     """
-    cells, parent, gradients, volumes, normals, lam, mu, axes, corners = elements
+    cells, parent, gradients, volumes, normals, lam, mu, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
     g, n = np.empty((c, d)), np.zeros(d)
     for p in range(len(cells)):
@@ -192,7 +187,7 @@ def add_rotation_fixed(elements, R, scale, targets, blocks):
                 g[i, k] = 0.0
                 for l in range(d):
                     g[i, k] += R[p, k, l] * gradients[cell, i, l]
-            if c == d:
+            if is_membrane:
                 n[k] = 0.0
                 for l in range(d):
                     n[k] += R[p, k, l] * normals[cell, l]
@@ -207,7 +202,7 @@ def add_rotation_fixed(elements, R, scale, targets, blocks):
                         value = wl * g[i, k] * g[j, l] + wm * g[j, k] * g[i, l]
                         if k == l:
                             value += dot
-                        if c == d:
+                        if is_membrane:
                             value -= dot * n[k] * n[l]
                         blocks[upper, k, l] += value
                         if i != j:
@@ -217,7 +212,7 @@ def add_rotation_fixed(elements, R, scale, targets, blocks):
 @njit(cache=True)
 def add_moduli(elements, A, scale, targets, blocks):
     """Add the tangent of the moduli A (p, d, d, d, d), times `scale`, to nodal blocks."""
-    cells, parent, gradients, volumes, _, _, _, axes, corners = elements
+    cells, parent, gradients, volumes, _, _, _, axes, corners, _ = elements
     d, c = len(axes), len(corners)
     half = np.empty((d, d, d))
     for p in range(len(cells)):
@@ -267,11 +262,13 @@ def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floa
     spins = SPINS[F.shape[1]]
     U = R.transpose(0, 2, 1) @ F
     trace = np.einsum("pkk->p", U)
+    # H_ab = S_a,ij sym(U)_ik S_b,kj sums to tr(U) I − U in space, to tr(U) in the plane
     H = np.einsum("aij,bik,pkj->pab", spins, spins, 0.5 * (U + U.transpose(0, 2, 1)), optimize=True)
     cofactors, determinant = adjugate(H) if len(spins) == 3 else (np.ones_like(H), H[:, 0, 0])
     without = ~(determinant > singular * np.abs(trace) ** len(spins))
     inverse = cofactors / np.where(without, 1.0, determinant)[:, None, None]
     inverse[without] = 0.0
+    # ∂R/∂F = Σ G_a (H⁻¹)_ab G_b, G_a = R S_a
     G = np.einsum("pka,san->pskn", R, spins)
     half = np.einsum("pst,ptlm->pslm", inverse, G)
     return np.einsum("pskn,pslm->pknlm", G, half), without
@@ -286,41 +283,16 @@ def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats,
     identity = np.eye(F.shape[1])
     lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
     trace = np.einsum("pkl,pkl->p", R, F) - (len(elements.corners) - 1)
+    # A = 2μ δ_kl δ_nm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm + λ R_kn R_lm
     A, without = polar_slope(R, F)
     A *= (lam * trace - 2.0 * mu)[:, None, None, None, None]
     A += (2.0 * mu)[:, None, None, None, None] * np.einsum("kl,nm->knlm", identity, identity)
     if without.any():
         turned = R[without] @ restricted(elements)[without if elements.is_membrane else [0]]
         plane = turned @ turned.transpose(0, 2, 1)
+        # μ (δ_kl δ_nm + R_km R_ln), of membranes δ_kl in the turned tangent plane
         fixed = np.einsum("pkl,nm->pknlm", plane, identity)
         fixed += np.einsum("pkm,pln->pknlm", R[without], R[without])
         A[without] = mu[without, None, None, None, None] * fixed
     A += np.einsum("pkn,plm->pknlm", lam[:, None, None] * R, R)
     return A, int(without.sum())
-
-
-def positive_tension(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
-    """Positive part (p, 3, 3) of the tension of membranes, α I + β U in the tangent plane.
-
-    Principal values below `least` times μ are taken as that: without it what is slack has no
-    stiffness.
-    """
-    lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
-    U = R.transpose(0, 2, 1) @ F
-    U = 0.5 * (U + U.transpose(0, 2, 1))
-    trace, square = np.einsum("pkk->p", U), np.einsum("pkl,pkl->p", U, U)
-    gap = np.sqrt(np.maximum(2.0 * square - trace**2, 0.0))
-    high, low = 0.5 * (trace + gap), 0.5 * (trace - gap)
-
-    def tension(stretch: Floats) -> Floats:
-        carries = stretch > _COLLAPSED
-        value = 2.0 * mu * (stretch - 1.0) + lam * (trace - 2.0)
-        return np.maximum(
-            least * mu, np.where(carries, value / np.where(carries, stretch, 1.0), -np.inf)
-        )
-
-    first, second = tension(high), tension(low)
-    apart = gap > 1e-12 * trace
-    beta = np.where(apart, (first - second) / np.where(apart, gap, 1.0), 0.0)
-    alpha = np.where(apart, first - beta * high, 0.5 * (first + second))
-    return alpha[:, None, None] * np.eye(3) + beta[:, None, None] * U

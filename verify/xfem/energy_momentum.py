@@ -85,6 +85,7 @@ def averaged_moduli(elements: Elements, ends: StepEnds, substituted: Bools) -> F
     if len(elements.axes) == 2:
         t0, t1 = ends.traces
         total = np.where(t0 + t1 > 0.0, t0 + t1, np.inf)[:, None, None, None, None]
+        # dT = (d(t₁ R₁) − T dt₁)/(t₀ + t₁), dt₁ = R₁ : dF
         dT = (_IN_PLANE - np.einsum("pkn,plm->pknlm", T, ends.R1)) / total
     else:
         dT, some = np.empty((len(T), 3, 3, 3, 3)), ~substituted
@@ -92,6 +93,7 @@ def averaged_moduli(elements: Elements, ends: StepEnds, substituted: Bools) -> F
         if substituted.any():
             dT[substituted] = _substitute(ends.of(substituted))[1]
     lam, mu, factor = _factors(elements, ends)
+    # dP = μ dF + ½λ (R₁ : dF) T + c dT
     slope = factor[..., None, None] * dT
     slope += np.einsum("pkn,plm->pknlm", 0.5 * lam * T, ends.R1)
     identity = np.eye(len(elements.axes))
@@ -143,6 +145,7 @@ def _plain_slope(elements: Elements, ends: StepEnds, T: Floats, some: Bools) -> 
     R1, F1 = ends.R1[some], ends.F1[some]
     dR, _ = polar_slope(R1, F1, _SINGULAR)
     identity = np.eye(3)
+    # dU₁ = R₁ᵀdF + dR₁ᵀF₁, dT = (dF − T dU₁) A⁻¹
     dU = np.einsum("plk,nm->pknlm", R1, identity) + np.einsum("paklm,pan->pknlm", dR, F1)
     change = np.einsum("kl,nm->knlm", identity, identity) - np.einsum(
         "pka,panlm->pknlm", T[some], dU
@@ -159,12 +162,14 @@ def _substitute(ends: StepEnds) -> tuple[Floats, Floats]:
     dT, _ = polar_slope(middle, G, _SINGULAR)
     C1 = F1.transpose(0, 2, 1) @ F1
     change = C1 - F0.transpose(0, 2, 1) @ F0
+    # dC₁ = dFᵀF₁ + F₁ᵀdF
     half = np.einsum("ma,plb->pablm", np.eye(3), F1)
     dC = half + half.transpose(0, 2, 1, 3, 4)
     square = _inner(change, change)
     moving = square > _STILL * _inner(C1, C1)
     square = np.where(moving, square, 1.0)[:, None, None]
     factor = np.where(moving, t1 - t0 - _inner(middle, F1 - F0), 0.0)[:, None, None] / square
+    # T = Rₘ + α D, D = 2Fₘ (C₁ − C₀), α = (t₁ − t₀ − Rₘ : (F₁ − F₀))/|C₁ − C₀|²; slope = dα
     slope = R1 - middle - np.einsum("pknlm,pkn->plm", dT, F1 - F0)
     slope = (slope - 2.0 * factor * np.einsum("pab,pablm->plm", change, dC)) / square
     slope[~moving] = 0.0

@@ -59,7 +59,7 @@ class GhostPenalty:
             raise XfemError(f"ghost penalty with factor {factor!r}; expected a positive one")
         if phantom.aggregation is not None:
             raise XfemError("ghost penalty of a body with aggregated cells; expected one or other")
-        if phantom.mesh.dim < phantom.mesh.space:
+        if phantom.mesh.is_membrane:
             raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
         lam, mu = material.of_cells(len(phantom.mesh.cells))
         self.phantom, self.factor = phantom, factor

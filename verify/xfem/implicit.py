@@ -305,7 +305,7 @@ class NewtonIntegrator(ABC):
             return "The iterates left the finite numbers: the step is far too long"
         force = self.body.force
         found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
-        if force.phantom.mesh.dim == force.phantom.mesh.space:
+        if not force.is_membrane:
             inverted = inverted_cells(force, displacement)
             if len(inverted) > 0:
                 found.append(

@@ -21,10 +21,10 @@ from verify.xfem.element import (
     consistent_moduli,
     deform,
     elements_of,
-    positive_tension,
 )
 from verify.xfem.errors import XfemError
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
+from verify.xfem.membrane import tension_forces, tension_moduli
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 
@@ -285,9 +285,14 @@ class InternalForce:
         if kind in ("rotation-fixed", "geometric"):
             add_rotation_fixed(self.elements, at.R, scale, targets, added)
         if kind == "tension" or (kind == "geometric" and self.is_membrane):
-            tension, n = self._tension(at, least)
-            moduli = np.einsum("pk,pl,pnm->pknlm", n, n, tension)  # A = n nᵀ ⊗ S
-            add_moduli(self.elements, moduli, scale, targets, added)
+            self._check_membrane()
+            add_moduli(
+                self.elements,
+                tension_moduli(self.elements, at.R, at.F, least),
+                scale,
+                targets,
+                added,
+            )
         if kind == "consistent":
             for start in range(0, len(at.F), _CHUNK):
                 some = slice(start, start + _CHUNK)
@@ -311,12 +316,9 @@ class InternalForce:
             If the body is no membrane, or an array not of it.
         """
         self._check(vector=vector, force=out)
-        tension, n = self._tension(at, 0.0)
-        b, w = self.elements.gradients[self.elements.parent], scale * self.elements.volumes
-        # f_i = w n (b_i · S ∇φ), ∇φ = Σ b_j (n · v_j)
-        across = self.phantom.extend(vector)[self.phantom.cells] @ n[:, :, None]
-        pull = b @ tension @ (b.transpose(0, 2, 1) @ across)
-        out += self.nodal_force(w[:, None, None] * pull * n[:, None, :])
+        self._check_membrane()
+        vectors = self.phantom.extend(vector)[self.phantom.cells]
+        out += scale * self.nodal_force(tension_forces(self.elements, at.R, at.F, vectors))
 
     def nodal_force(self, forces: Floats) -> Floats:
         """Sum (N, d) of forces (p, c, d) at the corners of cells."""
@@ -325,13 +327,9 @@ class InternalForce:
         columns = forces.reshape(-1, forces.shape[2]).T
         return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))
 
-    def _tension(self, at: Configuration, least: float) -> tuple[Floats, Floats]:
-        """Positive tension (p, 3, 3) of a membrane, and its turned normals (p, 3)."""
+    def _check_membrane(self) -> None:
         if not self.is_membrane:
             raise XfemError("geometric stiffness of a solid; expected a membrane in space")
-        tension = positive_tension(self.elements, at.R, at.F, least)
-        normals = self.elements.normals[self.elements.parent]
-        return tension, np.einsum("pkl,pl->pk", at.R, normals)
 
     def stiffness(
         self,

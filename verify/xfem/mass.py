@@ -174,6 +174,7 @@ def second_moments(phantom: PhantomMesh) -> Floats:
     moments = phantom.volumes[:, None, None] * whole
     moments[phantom.split] = 0.0
     sub = phantom.sub_cells
+    # ∫ N_i N_j of a simplex: V/((d + 1)(d + 2)) Σ_vw (1 + δ_vw) N_i(v) N_j(w)
     vertex_sum = sub.barycentric.sum(axis=1)
     products = np.einsum("kvi,kvj->kij", sub.barycentric, sub.barycentric)
     products += vertex_sum[:, :, None] * vertex_sum[:, None, :]

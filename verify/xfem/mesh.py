@@ -1,7 +1,7 @@
 """Simplicial meshes: triangles in the plane, triangles in space, tetrahedra.
 
 The dimension is a number, not a case: ``dim`` is that of the simplex, ``space`` that of its
-points. Only measures and gradients tell membranes (``dim < space``) from the others.
+points. Only measures and gradients tell membranes (`SimplexMesh.is_membrane`) from the others.
 """
 
 from dataclasses import dataclass
@@ -112,6 +112,11 @@ class SimplexMesh:
         rows = np.arange(len(corners))
         at, after, before = (corners[rows, (apex + k) % 3] for k in range(3))
         return np.cross(after - at, before - at)
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether these are triangles in space, which resist in their plane alone."""
+        return self.dim < self.space
 
     @cached_property
     def gradients(self) -> Floats:

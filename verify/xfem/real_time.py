@@ -68,8 +68,9 @@ class RealTimeEuler:
         before = state.copy()
         at = self._advance(state) or force.configuration(before.displacement)
         internal = self._internal.copy()
-        force.add_tangent_product(at, before.velocity, -(h + self.body.damping.stiffness), internal)
-        force.add_tangent_product(at, state.velocity, h, internal)
+        # f + (h + β) K v₀ was found, f + h K v₁ has acted
+        change = h * state.velocity - (h + self.body.damping.stiffness) * before.velocity
+        force.add_tangent_product(at, change, 1.0, internal)
         if force.is_membrane:
             force.add_tension_product(at, state.velocity - before.velocity, h, internal)
         return StepForces(internal, external, self.body.viscous(state.velocity, at))

@@ -31,7 +31,7 @@ class BodySurface:
 
     def __init__(self, body: GrowingBody) -> None:
         mesh = body.mesh
-        self._body, self._membrane = body, mesh.dim < mesh.space
+        self._body, self._membrane = body, mesh.is_membrane
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.space)
         self._edges = EdgePoints(mesh.points, body.points)
         self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
