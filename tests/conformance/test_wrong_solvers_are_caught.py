@@ -113,10 +113,13 @@ def test_a_solver_that_states_the_energy_of_its_field_keeps_its_account():
 
 
 def test_a_loss_of_three_thousandths_is_measured_as_that():
-    found = state("LosesEnergySlowly", "energy-in-motion")["energy-in-motion"]
-    assert found.state is State.FAIL
-    assert "nothing accounts for" in found.reason
-    assert found.observed == pytest.approx(0.003, rel=0.02)  # to first order in the loss
+    names = ["energy-in-motion", "work-of-supports"]
+    for name, found in state("LosesEnergySlowly", *names).items():
+        assert found.state is State.FAIL
+        assert "nothing accounts for" in found.reason
+        # to first order in the loss; on a moving support another energy is in play at its start
+        rel = 0.02 if name == "energy-in-motion" else 0.5
+        assert found.observed == pytest.approx(0.003, rel=rel)
 
 
 @pytest.mark.parametrize("given, said", [

@@ -220,6 +220,7 @@ class LosesEnergySlowly(XfemSolver):
         if scene.analysis.kind == "static":
             return super().solve(scene, level, repetitions)
         own = self.damped(scene, 0.0, level).ledger
+        moved = {"work_of_supports": own["work_of_supports"]}
         # what damping proportional to the mass takes is twice its factor times ∫T
         time = np.linspace(0.0, scene.analysis.duration, len(own["kinetic"]))
         taken = 2 * np.trapezoid(own["kinetic"], time)
@@ -227,7 +228,8 @@ class LosesEnergySlowly(XfemSolver):
         solution = self.damped(scene, 0.003 * in_play / taken, level)
         kept = {name: solution.ledger[name] for name in ("strain", "gravity")}
         total = own["kinetic"][0] + sum(row[0] for row in kept.values())
-        return replace(solution, ledger={**kept, "kinetic": total - sum(kept.values())})
+        kinetic = total - sum(kept.values()) + own["work_of_supports"]
+        return replace(solution, ledger={**kept, **moved, "kinetic": kinetic})
 
     def damped(self, scene, factor, level):
         analysis = scene.analysis.model_copy(update={"damping": (factor, 0.0)})

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, issparse
 
 from verify.compare.kinetic import Kinetic
-from verify.compare.lumping import lumping_of, lumping_range, nodal_weights
+from verify.compare.lumping import consistent_mass, lumping_of, lumping_range, nodal_weights
 from verify.compare.separated import Part
 from verify.compare.simplices import simplices
 from verify.declared_mass import CONSISTENT
@@ -39,6 +39,12 @@ class Inertia:
         Mass at the nodes, kg.
     moment : (t, d) array
         Half-width of Σ weights × displacements, kg m.
+    matrix : (n, n) sparse array
+        Mass of the nodes, kg.
+    off : float
+        By how much of itself the mass may be off; beside how it is lumped.
+    lumped : (n, n) sparse array or None
+        Another mass that it may as well be, kg.
     note : str
         Which mass it is.
     """
@@ -47,7 +53,10 @@ class Inertia:
     width: Array
     weights: Array
     moment: Array
+    matrix: csr_array
     note: str
+    off: float = 0.0
+    lumped: csr_array | None = None
 
 
 def inertia_of(
@@ -73,11 +82,11 @@ def inertia_of(
     """
     weights = nodal_weights(solution, density)
     known = np.zeros_like(whole.energy), np.zeros((len(whole.energy), solution.dimension))
+    consistent = consistent_mass(solution, density)
     if isinstance(solution.mass, str):
         assert solution.mass == CONSISTENT
-        return Inertia(
-            whole.energy, known[0], weights, known[1], "the consistent mass, as declared"
-        )
+        note = "the consistent mass, as declared"
+        return Inertia(whole.energy, known[0], weights, known[1], consistent, note)
     wrong = "no mass is declared"
     if solution.mass is not None:
         matrix = _matrix(solution.mass)
@@ -91,11 +100,14 @@ def inertia_of(
             moved = solution.displacement - solution.displacement[0]
             moment = off * np.abs(np.einsum("n,tna->ta", own, moved))
             width = off * energy + _round_off(solution, matrix)
-            return Inertia(energy, width, own, moment, "the declared mass")
+            return Inertia(energy, width, own, moment, matrix, "the declared mass", off)
         wrong = f"the declared mass is not taken: {wrong}"
     lumping = lumping_of(solution, density)
     note = f"that of the field, give or take its lumping ({wrong})"
-    return Inertia(whole.energy, lumping.kinetic, weights, lumping.moment, note)
+    lumped = csr_array(diags_array(weights))
+    return Inertia(
+        whole.energy, lumping.kinetic, weights, lumping.moment, consistent, note, lumped=lumped
+    )
 
 
 def _velocities(solution: Solution) -> Array:

@@ -2,9 +2,10 @@
 
 Strain energy is that of the displacements, kinetic energy that of the velocities with the declared
 mass (`verify.assess.inertia`), which gravity pulls at. Work of dead loads follows from the
-displacements, what damping takes from its rate at the output times. The solver's own ledger is
-asked only for what no field shows: the work of supports that move, and of loads that change in
-place. Its word then is the interval.
+displacements, that of supports that move from momenta and stresses
+(`verify.compare.support_work`), what damping takes from its rate at the output times. The solver's
+own ledger is asked only for what no field shows: the work of loads that change in place, and of
+supports that jump or follow an exact field. Its word then is the interval.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,10 @@ from verify.compare.load_work import load_work
 from verify.compare.locate import SolutionField
 from verify.compare.separated import Part
 from verify.compare.strain_energy import cell_dissipation
+from verify.compare.support_work import support_work
+from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Scene, Traction
+from verify.scene.physics import Support
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -94,15 +98,15 @@ def measured_energies(
         found["damping"], widths["damping"] = _damped(scene, solution, law, inertia)
     for name, (known, width, unknown) in {
         "work_of_loads": _loads(scene, solution),
-        "work_of_supports": (np.zeros_like(strain), np.zeros_like(strain), _moving(scene)),
+        "work_of_supports": _supports(scene, solution, law, inertia),
     }.items():
         if unknown and name not in solution.ledger:
-            why = f"{unknown} is not known between output times, and the solver does not state it"
+            why = f"{unknown}, and the solver does not state it"
             return Energies(lacking=why)
         if unknown:
             own = np.asarray(solution.ledger[name]) - solution.ledger[name][0]
             known, width = own, width + np.abs(own - known)
-            said[name] = f"{unknown} is the solver's word"
+            said[name] = f"{unknown}; it is the solver's word"
         if known.any() or width.any():
             found[name], widths[name] = known, width
     return Energies(found, {n: w for n, w in widths.items() if w.any()}, "", said)
@@ -118,7 +122,8 @@ def _loads(scene: Scene, solution: Solution) -> tuple[Array, Array, str]:
         if one is None and load.history is not None and _is_let_go(load.history):
             continue
         if one is None:
-            return total, width, f"the work of a load ({load.kind.replace('_', ' ')})"
+            kind = load.kind.replace("_", " ")
+            return total, width, f"the work of a load ({kind}) is not known between output times"
         total, width = total + one[0], width + one[1]
     return total, width, ""
 
@@ -129,16 +134,30 @@ def _is_let_go(table: Sequence[tuple[float, float]]) -> bool:
     return bool(before) and not any([before[-1], *(f for time, f in table if time > 0.0)])
 
 
-def _moving(scene: Scene) -> str:
-    """Name the work of supports, if any moves."""
-    moved = [s for s in scene.supports if s.history or s.timed or s.displacement == "exact"]
-    if scene.initial.kind != "equilibrium":
-        moved += [s for s in scene.supports if _moves(s.displacement) or s.rotation is not None]
-    return "the work of supports that move" if moved else ""
+def _supports(
+    scene: Scene, solution: Solution, law: Law, inertia: Inertia
+) -> tuple[Array, Array, str]:
+    """Work of supports, its half-width, and why it cannot be measured."""
+    still = np.zeros(len(solution.times))
+    if all(_stands_still(scene, support) for support in scene.supports):
+        return still, still, ""
+    parts = scene, solution, law
+    try:
+        work, width = support_work(*parts, inertia.matrix, inertia.weights)
+        if inertia.lumped is not None:
+            width = width + np.abs(work - support_work(*parts, inertia.lumped, inertia.weights)[0])
+    except InputError as problem:
+        return still, still, f"the work of supports that move is not known: {problem.what}"
+    moved = np.abs(np.diff(work, prepend=0.0))
+    return work, width + inertia.off * np.cumsum(moved), ""
 
 
-def _moves(displacement: object) -> bool:
-    return isinstance(displacement, list) and any(value != 0.0 for value in displacement)
+def _stands_still(scene: Scene, support: Support) -> bool:
+    """Whether a support is from the start where it stays."""
+    if support.history or support.timed or support.displacement == "exact":
+        return False
+    at_home = support.rotation is None and not any(support.displacement)
+    return at_home or scene.initial.kind == "equilibrium"
 
 
 def _damped(scene: Scene, solution: Solution, law: Law, inertia: Inertia) -> tuple[Array, Array]:

@@ -51,6 +51,14 @@ class Hooke:
         density: Array = 0.5 * self.lame * trace**2 + self.shear * square
         return density
 
+    def power_density(self, gradient: Array, rate: Array) -> Array:
+        """Power (n,) in W/m³ of the stress of displacement gradients on velocity gradients."""
+        strain = 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
+        trace = np.einsum("nii->n", strain) * np.einsum("nii->n", rate)
+        density: Array = self.lame * trace
+        density += 2.0 * self.shear * np.einsum("nij,nij->n", strain, rate)
+        return density
+
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Energy density (n,) of the difference of a gradient from an `expected` one."""
         return self.energy_density(difference)
@@ -63,6 +71,12 @@ class Corotated(Hooke):
     def energy_density(self, gradient: Array) -> Array:
         """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
         return self._density(_principal_stretches(gradient) - 1.0)
+
+    def power_density(self, gradient: Array, rate: Array) -> Array:
+        """R (2μ(U − I) + λ tr(U − I) I) : rate (n,), W/m³."""
+        turned = np.swapaxes(_rotations(gradient), 1, 2)
+        unit = np.eye(gradient.shape[1])
+        return super().power_density(turned @ (unit + gradient) - unit, turned @ rate)
 
     def _density(self, stretch: Array) -> Array:
         """Energy density (n,) of principal stretches less one (n, k)."""
@@ -93,6 +107,13 @@ class MembraneLaw(Corotated):
         along = gradient[:, :2]
         strain = along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
         return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
+
+    def power_density(self, gradient: Array, rate: Array) -> Array:
+        """R (2μ(U − I) + λ tr(U − I) I) : rate (n,), W/m², R (n, 3, 2)."""
+        unit = np.eye(3)[:, :2]
+        left, _, right = np.linalg.svd(unit + gradient, full_matrices=False)
+        turned = np.swapaxes(left @ right, 1, 2)
+        return Hooke.power_density(self, turned @ (unit + gradient) - np.eye(2), turned @ rate)
 
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Energy density (n,) of sym(Rᵀ δ), R (n, 3, 2) the turn of the tangent plane."""

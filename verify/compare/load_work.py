@@ -44,7 +44,7 @@ def load_work(
     """
     if load.exact or load.timed:
         return None
-    nodal = _forces(scene, load, solution)
+    nodal = nodal_forces(scene, load, solution)
     assert solution.velocity is not None
     place = np.einsum("na,tna->t", nodal, solution.displacement)
     rate = np.einsum("na,tna->t", nodal, solution.velocity)
@@ -74,13 +74,13 @@ def _worked(times: Array, history: object, place: Array, rate: Array) -> tuple[A
     return work, width
 
 
-def _forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Array:
+def nodal_forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Array:
     """Consistent nodal forces (n, d) of a load without its factor, N."""
     if isinstance(load, BodyForce):
         nodes, k = solution.cells, solution.cell_dimension
         pieces = Pieces.whole(np.arange(len(nodes)), k + 1)
     else:
-        nodes, k = _facet_nodes(solution), solution.cell_dimension - 1
+        nodes, k = boundary_nodes_of_facets(solution), solution.cell_dimension - 1
         pieces = pieces_on_part(scene.geometry, load.where, solution.points[nodes[:, : k + 1]])
         nodes = nodes[pieces.facet]
     place, share = simplex_rule(k, 4)
@@ -97,7 +97,7 @@ def _forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Arr
     return found
 
 
-def _facet_nodes(solution: Solution) -> Ints:
+def boundary_nodes_of_facets(solution: Solution) -> Ints:
     """Nodes (b, f) of the facets of the outer boundary, corners first, then those of edges."""
     k = solution.cell_dimension
     cell, opposite = boundary_facets(solution)

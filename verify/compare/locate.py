@@ -92,6 +92,11 @@ class SolutionField:
                 "mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:]
             )
 
+    @property
+    def nodal(self) -> Array:
+        """Nodal displacements (n, d)."""
+        return self._nodal
+
     def with_nodal(self, displacement: Array) -> Self:
         """Return the field of other nodal displacements (n, d) on the same mesh and tree."""
         other = copy(self)

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from verify.compare.kinetic import shape_functions
@@ -76,6 +77,16 @@ def nodal_weights(solution: Solution, density: float | Array) -> Array:
     shares = _consistent(k, solution.order).sum(axis=1)
     mass = (density * simplices(solution.points, solution.cells).volume)[:, None] * shares
     return np.bincount(solution.cells.ravel(), mass.ravel(), minlength=len(solution.points))
+
+
+def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
+    """Masses ∫ρ N_i N_j (n, n) in kg of a solution's nodes."""
+    nodes, count = solution.cells, len(solution.points)
+    mass = density * simplices(solution.points, nodes).volume
+    local = mass[:, None, None] * _consistent(solution.cell_dimension, solution.order)
+    rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
+    columns = np.tile(nodes, nodes.shape[1]).ravel()
+    return csr_array((local.ravel(), (rows, columns)), shape=(count, count))
 
 
 @cache

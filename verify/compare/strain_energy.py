@@ -40,6 +40,24 @@ def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
     return _integrated(field, lambda at, gradient: law.at(at).energy_density(gradient(field)), law)
 
 
+def stress_power(rate: SolutionField, displacement: SolutionField, law: Law) -> float:
+    """Power of the stresses of a displacement on a velocity, ∫ P:∇w, W (2D: per metre)."""
+
+    def density(at: Array, gradient: Callable[[SolutionField], Array]) -> Array:
+        return law.at(at).power_density(gradient(displacement), gradient(rate))
+
+    return float(_integrated(rate, density, law).sum())
+
+
+def viscous_power(
+    rate: SolutionField, velocity: SolutionField, displacement: SolutionField, law: Law
+) -> float:
+    """w·Kv of two velocities, of which `cell_dissipation` has the square."""
+    total = velocity.nodal + rate.nodal, velocity.nodal - rate.nodal
+    more, less = (cell_dissipation(rate.with_nodal(v), displacement, law).sum() for v in total)
+    return 0.25 * float(more - less)
+
+
 def cell_dissipation(
     velocity: SolutionField, displacement: SolutionField, law: Law
 ) -> NDArray[np.float64]:

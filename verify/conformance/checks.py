@@ -47,6 +47,7 @@ def checks(folder: Path) -> list[Check]:
         _hanging_halves(),
         _freed_half(),
         energy_in_motion(),
+        energy_in_motion(shaken=True),
         _mirrored_cut(),
         _renumbering(folder),
         _repeatability(),

@@ -24,9 +24,9 @@ _NO_RATE = 0.05
 _STATED = ("algorithmic", "penalty", "removed_energy")
 
 
-def energy_in_motion() -> Check:
-    """Make the check of a body that swings under its weight, with a cut from its edge."""
-    scene = scenes.swinging()
+def energy_in_motion(shaken: bool = False) -> Check:
+    """Make the check of a cut body that swings under its weight, `shaken` by its support or not."""
+    scene = scenes.swinging(shaken)
 
     def judge(solutions: Mapping[str, Solution]) -> Finding:
         (solution,) = solutions.values()
@@ -38,7 +38,10 @@ def energy_in_motion() -> Check:
         return _kept(account)
 
     claim = "in motion energy is kept, but for what the solver states that its method takes"
-    return Check("energy-in-motion", claim, [Trial(scene.name, scene)], judge)
+    name = "energy-in-motion"
+    if shaken:
+        name, claim = "work-of-supports", f"{claim}, and for the work of supports that move"
+    return Check(name, claim, [Trial(scene.name, scene)], judge)
 
 
 def _kept(account: MotionAccount) -> Finding:
@@ -57,9 +60,8 @@ def _kept(account: MotionAccount) -> Finding:
     if least > _LOST:
         return Finding(float(missing.max()), _LOST, "energy changes that nothing accounts for")
     if most > _LOST:
-        return Finding(
-            0.0, None, f"known within {width.max():.1g} only: {energies.said['kinetic_energy']}"
-        )
+        why = energies.said.get("work_of_supports", energies.said["kinetic_energy"])
+        return Finding(0.0, None, f"known within {width.max():.1g} only: {why}")
     loss = float(taken.max())
     note = f"its method takes {loss:.2g} of the energy in play, as it states"
     return Finding(float(missing.max()), _LOST, note if loss > _LOST else "")

@@ -144,12 +144,16 @@ def freed_half() -> tuple[Scene, Array]:
     return scene, gravity
 
 
-def swinging() -> Scene:
-    """Let a square that stands on its lower side swing under a sudden weight, cut from its side."""
+def swinging(shaken: bool = False) -> Scene:
+    """Let a square that stands on its lower side swing under a sudden weight, cut from its side.
+
+    Its lower side stands still, or swings too.
+    """
+    swing = "0.02 * (1 - cos(0.6 * t))"  # from rest, slower than its lowest mode
     return unit_scene(
-        "swinging",
+        "shaken" if shaken else "swinging",
         cuts=[{"kind": "polyline", "points": [[0.37, 0.41], [1.1, 0.63]]}],
-        supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
+        supports=[{"where": "bottom", "displacement": [swing if shaken else 0.0, 0.0]}],
         loads=[{"kind": "gravity", "acceleration": [0.02, -0.01]}],
         analysis={"kind": "dynamic", "duration": 9.0, "time_step": 0.05, "outputs": 31},
     )

@@ -184,7 +184,11 @@ class TiedMotion:
         """Take up what jumps: velocities of supports, and accelerations."""
         body, state = self.body, self.state
         with self.record.timed("loading"):
-            state.velocity[body.held] = body.prescribed(state.time)[1]
+            taken = np.zeros_like(state.velocity)
+            taken[body.held] = body.prescribed(state.time)[1] - state.velocity[body.held]
+            if taken.any():  # without an impulse on what is free
+                taken += body.accelerations(-(body.mass @ taken))
+                state.velocity = state.velocity + taken
             self.ledger.started(body, state)
             state.acceleration = body.accelerations(self._unbalanced(self._later))
         self.begun = True

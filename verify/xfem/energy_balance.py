@@ -8,8 +8,9 @@ chosen the forces; with T the kinetic and W the strain energy:
 
     D = (Δu·p − v̄·M Δv) + (Δu·f_int − ΔW),   v̄ = ½ (v₀ + v₁).
 
-D is what the scheme itself dissipates (negative: produces). The right-hand side is what the step
-leaves unsolved; if it is not round-off, the forces are not those of the motion.
+D is what the scheme itself dissipates (negative: produces). The first part of it at what moving
+supports hold is work of theirs: they may take up another velocity at once. The right-hand side is
+what the step leaves unsolved; if it is not round-off, the forces are not those of the motion.
 """
 
 from dataclasses import dataclass
@@ -113,15 +114,18 @@ class BalanceRecorder:
         reaction = np.where(body.fixed, residual, 0.0)
         strain, self._penalty = self._stored(state)
         # the two parts nearly cancel: what they differ by is taken first
-        slip = np.sum((change / h - 0.5 * (last.velocity + state.velocity)) * gained)
+        slips = (change / h - 0.5 * (last.velocity + state.velocity)) * gained
+        slip = np.sum(slips)
+        # supports that take up another velocity at once do that work, whatever step they do it in
+        taken = np.sum(slips[body.fixed]) if body.moving else 0.0
         if forces.inertia is not None:
             slip += np.sum(change * (inertia - gained / h))
         assert body.weight is not None
         self._work += [
             np.sum(change * (forces.external - body.weight)),
-            np.sum(change * reaction),
+            np.sum(change * reaction) - taken,
             np.sum(change * forces.viscous),
-            slip + np.sum(change * forces.internal) - (strain - self._strain),
+            slip - taken + np.sum(change * forces.internal) - (strain - self._strain),
             np.sum(change * (residual - reaction)),
         ]
         self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(

@@ -124,6 +124,7 @@ class NewtonIntegrator(ABC):
         self._factorised: tuple[float, RayleighDamping] | None = None
         self._left: list[float] = []  # of the residual by each correction of the last step
         self._end: Resistance | None = None  # of the last step
+        self._speed = np.zeros(body.shape)  # of the supports at the end of the step
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     @abstractmethod
@@ -200,9 +201,8 @@ class NewtonIntegrator(ABC):
     def _velocity(self, displacement: Floats) -> Floats:
         velocity = (self.rate / self.step_size) * (displacement - self._start.displacement)
         velocity -= (self.rate - 1.0) * self._start.velocity
-        if not self.body.moving:
-            # nodes that were caught in flight would go on changing the sign of their velocity
-            velocity[self.body.fixed] = 0.0
+        # nodes that were caught in flight would go on changing the sign of their velocity
+        velocity[self.body.fixed] = self._speed[self.body.fixed]
         return velocity
 
     def _iterate(self, displacement: Floats) -> Iterate:
@@ -233,7 +233,7 @@ class NewtonIntegrator(ABC):
     def _solve(self, displacement: Floats) -> Iterate:
         """End of the step, from a first guess (N, d)."""
         body = self.body
-        prescribed, _ = body.prescribed(self._start.time + self.step_size)
+        prescribed, self._speed = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
         now, is_slow = self._iterate(displacement), False
         left: list[float] = []

@@ -1,0 +1,286 @@
+"""Work of supports that move, from the fields of a solution: the weak form tested with a motion.
+
+A reaction r balances M a + f(u) + f_v(v) − p at the components that supports hold. Its power is
+that of the residual on any test function w that has the prescribed velocity there,
+
+    r·w = ∫ P(∇u):∇w + f_v(v)·w − p·w + d/dt (w·Mv) − ẇ·Mv,
+
+and so its work does not hang on accelerations, which no field shows between output times. Any w
+gives the same; a smooth one the most accurate, since waves of the mesh hardly work on it, neither
+between output times nor where the solver has other test functions than its mesh of output (at
+cuts). A rigid motion of the body as it is deformed has no internal power at all: its work is the
+change of momenta, to round-off (`verify.compare.extension`). One layer of elements, the other
+extreme, sees every wave at the support.
+
+Between output times displacements are the cubic of those and of the velocities at both ends
+(Hermite), at held nodes what is prescribed. Each part between output times and kinks of histories
+is integrated by a Lobatto rule of four points. The half-width is Richardson's from every second and
+every fourth output time. An extension that is not affine is no test function of every solver: there
+the half-width is that of the one in one layer of elements, and what the two differ by.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import cg
+
+from verify.compare.extension import Extension
+from verify.compare.hooke import Law
+from verify.compare.load_work import nodal_forces
+from verify.compare.locate import SolutionField
+from verify.compare.prescribed_motion import PrescribedNodes, prescribed_nodes
+from verify.compare.strain_energy import stress_power, viscous_power
+from verify.errors import InputError
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
+from verify.scene.history import factor_at
+from verify.solution import Solution
+
+Array = NDArray[np.float64]
+_Force = tuple[Array, list[tuple[float, float]] | None]
+
+_PLACES = 0.5 * (1.0 + np.array([-1.0, -(0.2**0.5), 0.2**0.5, 1.0]))  # Lobatto
+_SHARES = np.array([1.0, 5.0, 5.0, 1.0]) / 12.0
+# derivatives at these places of the cubic through values at them
+_RATES = np.linalg.solve(
+    np.vander(_PLACES, increasing=True).T,
+    np.array([[0.0, 1.0, 2 * s, 3 * s * s] for s in _PLACES]).T,
+).T
+_ORDERS, _SAFETY = (0.5, 4.0), 3.0
+_INSIDE = 1e-9  # of an interval: so far from its ends what jumps there is asked for
+_SAME_TIME = 1e-9  # of the duration
+
+
+def support_work(
+    scene: Scene, solution: Solution, law: Law, mass: csr_array, weights: Array
+) -> tuple[Array, Array]:
+    """Work (t,) of supports since the first output time, and the half-width of its interval, J.
+
+    Parameters
+    ----------
+    scene : Scene
+    solution : Solution
+        With velocities.
+    law : Law
+    mass : (n, n) sparse array
+        kg, of the nodes (2D: per metre, as all that follows).
+    weights : (n,) array
+        kg, at which gravity pulls.
+
+    Raises
+    ------
+    InputError
+        If it is not known from the fields, with the reason.
+    """
+    nodes = prescribed_nodes(scene, solution)
+    still = np.zeros(len(solution.times))
+    if not any(one.moves for _, _, one in nodes.supports):
+        return still, still
+    if len(solution.times) < 3:
+        raise InputError("there are less than three output times")
+    forces = _forces(scene, solution, weights)
+    parts = scene, solution, law, mass, nodes, forces
+    smooth = _Work(*parts, Extension(solution, nodes.held))
+    steps = smooth.steps()
+    if smooth.is_affine:
+        return _since(steps), _since(smooth.off(steps))
+    layer = _Work(*parts, Extension(solution, nodes.held, in_layer=True))
+    other = layer.steps()
+    return _since(steps), _since(layer.off(other)) + np.abs(_since(other) - _since(steps))
+
+
+def _since(steps: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _forces(scene: Scene, solution: Solution, weights: Array) -> list[_Force]:
+    """Nodal forces (n, d) of loads without their factors, N, and their histories."""
+    found: list[_Force] = []
+    for load in scene.loads:
+        if isinstance(load, Gravity):
+            found.append((np.multiply.outer(weights, np.asarray(load.acceleration)), None))
+        elif isinstance(load, CutFaces):
+            continue  # in balance, on whatever is continuous across a cut
+        elif not isinstance(load, BodyForce | Traction) or load.exact or load.timed:
+            raise InputError(f"a load ({load.kind.replace('_', ' ')}) changes in place")
+        else:
+            found.append((nodal_forces(scene, load, solution), load.history))
+    return found
+
+
+@dataclass(frozen=True)
+class _Work:
+    """Work of the supports of a solution with one extension of their velocities."""
+
+    scene: Scene
+    solution: Solution
+    law: Law
+    mass: csr_array
+    nodes: PrescribedNodes
+    forces: Sequence[_Force]
+    extension: Extension
+
+    def steps(self, stride: int = 1) -> Array:
+        """Work (s,) between output times of which so many are one, J."""
+        return np.array([self._between(a, b) for a, b in pairwise(self._picks(stride))])
+
+    def off(self, steps: Array) -> Array:
+        """Half-width (t − 1,) of the steps between all output times, J.
+
+        Three times Richardson's (Roache's factor of safety), from steps of twice and four times the
+        length, with the order at which all of them together change: at most the 4 of Hermite's
+        cubic; a motion that output times do not resolve has an order of next to nothing. A step
+        that has no other to make one of twice the length with has the largest width of all.
+        """
+        first, second, fourth = (self._picks(stride) for stride in (1, 2, 4))
+        done, twice = _since(steps), _since(self.steps(2))
+        pairs = np.flatnonzero(np.diff(second) == 2)
+        change = np.abs(np.diff(twice) - np.diff(done[second]))
+        if not len(pairs):
+            return np.abs(steps)
+        fours = np.flatnonzero(np.diff(fourth) == 4)
+        order = 1.0
+        if len(fours):
+            at = np.searchsorted(second, fourth[fours])
+            before = np.abs(self.steps(4)[fours] - (twice[at + 2] - twice[at])).sum()
+            after = (change[at] + change[at + 1]).sum()
+            order = float(np.log2(max(before, 1e-300) / max(after, 1e-300)))
+        each = 0.5 * _SAFETY * change[pairs] / (2.0 ** np.clip(order, *_ORDERS) - 1.0)
+        width = np.full(len(first) - 1, each.max())
+        for start, one in zip(second[pairs], each, strict=True):
+            width[start : start + 2] = one
+        return width
+
+    def _picks(self, stride: int) -> NDArray[np.int64]:
+        """Numbers of output times of which so many are one step, but for those with a kink."""
+        times = self.solution.times
+        ends = [i for i in range(len(times)) if self._is_knot(times[i])]
+        ends = sorted({*ends, len(times) - 1})
+        runs = [range(a, b, stride) for a, b in pairwise(ends)]
+        return np.concatenate([*runs, ends[-1:]]).astype(np.int64)
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether all velocities asked for so far were affine at what is held."""
+        return "_solvers" not in vars(self.extension)
+
+    @cached_property
+    def _knots(self) -> Array:
+        """Times of kinks, s: of supports, which may take up another velocity, and of loads."""
+        return np.array([*self.nodes.knots, *self._kinks_of_loads])
+
+    @property
+    def _kinks_of_loads(self) -> list[float]:
+        return [time for _, history in self.forces for time, _ in history or ()]
+
+    @cached_property
+    def _field(self) -> SolutionField:
+        return SolutionField(self.solution)
+
+    def _between(self, first: int, last: int) -> float:
+        """Work between two output times, J, from before what jumps there as far as they show it."""
+        times = self.solution.times
+        same = _SAME_TIME * float(np.ptp(times))
+        a, b = float(times[first]), float(times[last])
+        inner = sorted(t for t in set(self._knots) if a + same < t < b - same)
+        done = 0.0
+        for start, end in pairwise([a, *inner, b]):
+            done += self._smooth(first, last, start, end)
+        return done
+
+    def _smooth(self, first: int, last: int, start: float, end: float) -> float:
+        """Work in a part of an interval without kinks, and of what jumps at its ends, J.
+
+        A velocity that supports take up at once is a change of kinetic energy at what is held.
+        """
+        span = end - start
+        prescribed = [start + span * float(np.clip(s, _INSIDE, 1 - _INSIDE)) for s in _PLACES]
+        states = [self._state(first, last, start + span * s) for s in _PLACES]
+        done = 0.0
+        for i, sign in ((0, 1.0), (-1, -1.0)):
+            if self._is_knot(float([start, end][i])):
+                u, v = states[i]
+                taken = self._taken_up(v, self.nodes.velocities(prescribed[i]))
+                done += sign * 0.5 * float(np.sum((taken + v) * (self.mass @ (taken - v))))
+                states[i] = u, taken
+        follows = self.nodes.follows
+        tests, rigid = [], []
+        for t, (u, v) in zip(prescribed, states, strict=True):
+            velocities = np.where(follows, self.nodes.velocities(t), v)
+            test, is_rigid = self.extension.of(velocities, self._points(u))
+            tests.append(test)
+            rigid.append(is_rigid)
+        rates = np.tensordot(_RATES, tests, axes=1) / span
+        momenta = [self.mass @ v for _, v in states]
+        done += float(np.sum(tests[-1] * momenta[-1]) - np.sum(tests[0] * momenta[0]))
+        for i, share in enumerate(_SHARES):
+            u, v = states[i]
+            power = self._power(prescribed[i], v, tests[i]) - float(np.sum(rates[i] * momenta[i]))
+            if not rigid[i]:
+                power += self._internal(u, v, tests[i])
+            done += span * share * power
+        return done
+
+    def _is_knot(self, time: float) -> bool:
+        times = self.solution.times
+        near = _SAME_TIME * float(np.ptp(times))
+        kinks = [times[0], *self.nodes.knots]
+        return bool(np.abs(np.array(kinks) - time).min() <= near)
+
+    def _state(self, first: int, last: int, time: float) -> tuple[Array, Array]:
+        """Displacements and velocities (n, d) at a time: Hermite's between two output times."""
+        solution, held = self.solution, self.nodes.follows
+        assert solution.velocity is not None
+        a, b = solution.times[first], solution.times[last]
+        for one in (first, last):
+            if abs(time - solution.times[one]) <= 1e-12 * (b - a):
+                return solution.displacement[one], solution.velocity[one]
+        span, s = b - a, (time - a) / (b - a)
+        u0, u1 = solution.displacement[[first, last]]
+        v0, v1 = solution.velocity[[first, last]]
+        gain = u1 - u0
+        u = u0 + s * s * (3 - 2 * s) * gain
+        u = u + span * s * (1 - s) * ((1 - s) * v0 - s * v1)
+        v = 6 * s * (1 - s) * gain / span + (1 - s) * (1 - 3 * s) * v0 + s * (3 * s - 2) * v1
+        u[held] = self.nodes.values(time)[held]
+        v[held] = self.nodes.velocities(time)[held]
+        return u, v
+
+    def _points(self, u: Array) -> Array:
+        """Places in which a motion is rigid, m: of linear kinematics those at rest."""
+        moved = self.scene.analysis.kinematics == "corotational"
+        return self.solution.points + u if moved else self.solution.points
+
+    def _power(self, time: float, v: Array, w: Array) -> float:
+        """Power of damping by the mass, less that of loads, on velocities w, W."""
+        power = self.scene.analysis.damping[0] * float(np.sum(w * (self.mass @ v)))
+        for force, history in self.forces:
+            power -= factor_at(history, time) * float(np.sum(force * w))
+        return power
+
+    def _internal(self, u: Array, v: Array, w: Array) -> float:
+        """Power of stresses, and of damping by the stiffness, on velocities w, W."""
+        test, displacement = self._field.with_nodal(w), self._field.with_nodal(u)
+        power = stress_power(test, displacement, self.law)
+        if damping := self.scene.analysis.damping[1]:
+            moving = self._field.with_nodal(v)
+            power += damping * viscous_power(test, moving, displacement, self.law)
+        return power
+
+    def _taken_up(self, v: Array, velocities: Array) -> Array:
+        """Velocities (n, d) after held nodes take up given ones at once: no impulse elsewhere."""
+        held, change = self.nodes.follows, np.zeros_like(v)
+        change[held] = (velocities - v)[held]
+        if not change.any():
+            return v
+        for axis, own in enumerate(held.T):
+            if own.any() and not own.all():
+                coupled = self.mass[~own]
+                change[~own, axis] = cg(
+                    coupled[:, ~own], -(coupled[:, own] @ change[own, axis]), rtol=1e-12
+                )[0]
+        return v + change
