@@ -136,41 +136,6 @@ class Profile:
     most: float | None = None
 
 
-@dataclass(frozen=True)
-class Strength:
-    """In how many cases a solver is the best in one respect.
-
-    Parameters
-    ----------
-    question : str
-        What is compared: an error at equal element size, or ``"time at equal error"``.
-    solver : str
-    items : int
-        Cases in which it and another have a number.
-    best, alone : int
-        Cases in which nobody is certainly better; in which all others are certainly worse.
-    near : int
-        Cases in which its number is within 5 % of the least.
-    case : str
-        The clearest of the cases in which it is best; empty if there is none, or all tie there.
-    value : float
-        Its number there.
-    next_solver, next_value : str, float
-        The best of those who are certainly worse there.
-    """
-
-    question: str
-    solver: str
-    items: int
-    best: int
-    alone: int
-    near: int
-    case: str = ""
-    value: float = 0.0
-    next_solver: str = ""
-    next_value: float = 0.0
-
-
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
     """A table per question, and what was left out.
@@ -188,8 +153,6 @@ class Ranking:
         Why times may be off, if they may.
     profiles : list of Profile
         Performance and data profiles.
-    strengths : list of Strength
-        What each solver is best at, by question.
     """
 
     schema: Literal[1]
@@ -204,7 +167,6 @@ class Ranking:
     left_out: list[LeftOut]
     contended: list[str]
     profiles: list[Profile] = field(default_factory=list)
-    strengths: list[Strength] = field(default_factory=list)
 
 
 def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:

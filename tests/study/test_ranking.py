@@ -209,26 +209,3 @@ def test_profiles_count_what_a_solver_has_not_done_as_never_done():
     assert coarse["steps"] == {"x": [1.0, 1.0], "y": [3.0, 3.0], "z": [9.0]}
     assert fine["steps"] == {"x": [1.0], "y": [], "z": [9.0]}
     assert fine["items"] == 3  # the protocol: of all cases
-
-
-def strength_of(ranking, solver, question="energy_norm"):
-    (found,) = [
-        s for s in ranking["strengths"] if (s["solver"], s["question"]) == (solver, question)
-    ]
-    return found
-
-
-def test_a_solver_is_best_where_none_is_certainly_better_and_alone_where_all_are_worse():
-    results = [
-        case_of("a", [solve("a", "x", 0, 0.1), solve("a", "y", 0, 0.1 + 1e-9)]),  # the same method
-        case_of("b", [solve("b", "x", 0, 0.1), solve("b", "y", 0, 0.3)]),
-        case_of("c", [solve("c", "x", 0, 0.1), solve("c", "y", 0, 0.104)]),
-        case_of("d", [solve("d", "x", 0, 0.2, 0.01), solve("d", "y", 0, 0.19, 0.01)]),
-        case_of("e", [solve("e", "x", 0, 0.2)]),  # nothing to compare with
-    ]
-    ranking = rank_solvers(results)
-    x, y = (strength_of(ranking, name) for name in "xy")
-    assert [x[k] for k in ("items", "best", "alone", "near")] == [4, 4, 2, 3]
-    assert [y[k] for k in ("items", "best", "alone", "near")] == [4, 2, 0, 3]
-    assert [x[k] for k in ("case", "value", "next_solver", "next_value")] == ["b", 0.1, "y", 0.3]
-    assert y["case"] == ""

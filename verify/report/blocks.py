@@ -22,8 +22,6 @@ class Cell:
     verdict : str
         A word that stands in a frame before the text: PASS, FAIL, UNDECIDED, ERROR.
     strong : bool
-    mark : str
-        A sign behind the text, explained by `tip`.
     tip : str
     grade : str
         Of a stability map: good, fair, poor, bad or none.
@@ -37,7 +35,6 @@ class Cell:
     note: str = ""
     verdict: str = ""
     strong: bool = False
-    mark: str = ""
     tip: str = ""
     grade: str = ""
     link: str = ""

@@ -10,7 +10,6 @@ from verify.report.overview import origin_facts, overview
 from verify.report.ranking_tables import (
     compared,
     profiles_figure,
-    strengths_table,
 )
 from verify.report.run_directory import Run
 
@@ -64,4 +63,4 @@ def _ranking(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
         return None
     tables = {question: compared(ranking, question, title) for question, title in _QUESTIONS}
     figure = profiles_figure(ranking.get("profiles") or [])
-    return {**ranking, "figure": figure, "best": strengths_table(ranking), "tables": tables}
+    return {**ranking, "figure": figure, "tables": tables}

@@ -1,11 +1,11 @@
-"""The rankings of a run: tables, strengths in words, profiles, and what was left out."""
+"""The rankings of a run: tables, profiles, and what was left out."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from verify.report.blocks import Cell, Figure, Table, plain_table
 from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
-from verify.report.notation import metric_title, number, solver_title, with_interval
+from verify.report.notation import metric_title, solver_title, with_interval
 
 
 def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Table]:
@@ -16,21 +16,13 @@ def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Tabl
     if shown:
         first = [s["solver"] for s in shown[0]["standings"]]
         order = first + [solver for solver in ranking["solvers"] if solver not in first]
-        rows = [[marked(s, ranking), *(_standing(one, s) for one in shown)] for s in order]
+        rows = [[Cell(solver_title(s)), *(_standing(one, s) for one in shown)] for s in order]
         head = [Cell("solver"), *(_column(one) for one in shown)]
         tables.append(Table(f"{title}: rank, number [interval]", head, rows))
     if rest := _grouped(comparisons):
         head_ = ["case", "solver", "metric", "not in the numbers because"]
         tables.append(plain_table(f"{title}: left out", head_, rest, "prose"))
     return tables
-
-
-def marked(solver: str, ranking: Mapping[str, Any]) -> Cell:
-    """Return a solver's name, with a mark if it fails a conformance check."""
-    checks = ranking["conformance"].get(solver, {}).get("checks") or []
-    wrong = any(c["state"] in ("fail", "error") for c in checks)
-    mark, tip = ("†", "does not conform") if wrong else ("", "")
-    return Cell(solver_title(solver), mark=mark, tip=tip)
 
 
 def _merged(comparisons: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -79,68 +71,6 @@ def _grouped(comparisons: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         [case, solver_title(solver) if solver else "all", ", ".join(dict.fromkeys(metrics)), reason]
         for (case, solver, reason), metrics in rows.items()
     ]
-
-
-_TIME = "time at equal error"
-_WORDS = {
-    "displacement_l2": "L² error",
-    "energy_norm": "energy-norm error",
-    "jump_l2": "L² error of the jump",
-    _TIME: "time at equal L² error",
-}
-_HEADS = ["solver", "best at", "clearest of these cases", "within 5 % of the best, cases"]
-
-
-def strengths_table(ranking: Mapping[str, Any]) -> Table | None:
-    """Return a row per solver; None for a ranking from before there were such."""
-    found = ranking.get("strengths") or []
-    if not found:
-        return None
-    rows = []
-    for solver in ranking["solvers"]:
-        own = [one for one in found if one["solver"] == solver]
-        rows.append([solver_title(solver), _sentence(own), _row(own), _near(own)])
-    return plain_table("What each solver is best at", _HEADS, rows, "prose")
-
-
-def _order(one: Mapping[str, Any]) -> tuple[float, float]:
-    return one["alone"] / one["items"], one["best"] / one["items"]
-
-
-def _sentence(own: Sequence[Mapping[str, Any]]) -> str:
-    if not own:
-        return "No case in which it and another have a number to compare."
-    good = [one for one in own if one["best"]]
-    if not good:
-        return "Best at nothing here: in every case another is certainly better."
-    said = [
-        f"{_WORDS[one['question']]} ({one['best']} of {one['items']} cases"
-        + (f", alone in {one['alone']})" if one["alone"] else ")")
-        for one in sorted(good, key=_order, reverse=True)
-    ]
-    never = [_WORDS[one["question"]] for one in own if not one["best"]]
-    rest = f" Never in {', '.join(never)}." if never else ""
-    return f"Nobody is better in {', '.join(said)}.{rest}"
-
-
-def _row(own: Sequence[Mapping[str, Any]]) -> str:
-    clear = [one for one in own if one["case"]]
-    if not clear:
-        return "–"
-    one = max(clear, key=_order)
-    return (
-        f"{one['case']}: {_WORDS[one['question']]} {_written(one, one['value'])}, next "
-        f"{solver_title(one['next_solver'])} with {_written(one, one['next_value'])}"
-    )
-
-
-def _near(own: Sequence[Mapping[str, Any]]) -> str:
-    said = [f"{_WORDS[one['question']]} {one['near']} of {one['items']}" for one in own]
-    return "; ".join(said) or "–"
-
-
-def _written(one: Mapping[str, Any], value: float) -> str:
-    return f"{number(value, 3)}{' s' if one['question'] == _TIME else ''}"
 
 
 def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:

@@ -27,7 +27,7 @@ from verify.report.notation import (
     solver_title,
     spread_text,
 )
-from verify.report.ranking_tables import marked, rank
+from verify.report.ranking_tables import rank
 from verify.whole_files import write_whole
 
 PICTURES = "report-pictures"
@@ -90,7 +90,6 @@ def _environment(kind: str) -> Environment:
         "metric": metric_title,
         "error": error_title,
         "form": format,
-        "marked": marked,
         "rank": rank,
         "solver": solver_title,
         "signed": signed,

@@ -13,7 +13,6 @@ from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
 from verify.study.ranking.standing import compared_by_worst, item_on_finest
-from verify.study.ranking.strengths import strengths
 
 _REFERENCE = "reference"
 
@@ -46,7 +45,6 @@ def rank_solvers(
         cost=cost_comparisons(results, solvers),
         left_out=_left_out(results),
         contended=_why_times_may_be_off(results, solvers),
-        strengths=strengths(results, solvers),
         profiles=[performance_profile(results, solvers), *data_profiles(results, solvers)],
     )
     return asdict(found)
