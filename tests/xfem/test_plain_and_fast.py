@@ -154,3 +154,19 @@ def test_bodies_that_share_their_elements_do_not_see_one_another_move(scheme, ke
     alone, beside = motion(False), motion(True)
     # rotations start from others, and end within round-off; a step amplifies it by the tolerance
     assert np.abs(beside - alone).max() < 1e-9 * np.abs(alone).max()
+
+
+@pytest.mark.parametrize("scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum])
+def test_damping_that_sets_in_between_two_steps(scheme):
+    """The next step begins with the force that the last one ended with, and with other rotations."""
+    phantom = BODIES["block"]()
+    mass, moved = side_wise_mass(phantom, DENSITY), []
+    for kernels in KERNELS.values():
+        force = InternalForce(phantom, _stuff(phantom), kernels=kernels)
+        body = DynamicBody(force, mass, mass.weight([3.0, -2.0, 1.0]), supports=_held(phantom))
+        integrator, state = scheme(body, 0.02), body.rest()
+        for stiffness in (0.0, 0.0, 0.01, 0.01):
+            body.damping = RayleighDamping(0.0, stiffness)
+            integrator.step(state)
+        moved.append(state.velocity)
+    assert np.abs(moved[0] - moved[1]).max() < 1e-7 * np.abs(moved[0]).max()

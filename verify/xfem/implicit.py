@@ -164,9 +164,11 @@ class NewtonIntegrator(ABC):
     def _resistance_at_start(self) -> Resistance:
         """Take the resistance at the end of the last step, if this one goes on from there."""
         start, end = self._start.displacement, self._end
-        if end is not None and np.array_equal(end.displacement, start):
-            return end
-        return self._resistance(start)
+        if end is None or not np.array_equal(end.displacement, start):
+            return self._resistance(start)
+        if self.body.damping.stiffness > 0.0:  # which may be new
+            return end._replace(configuration=self._configuration(end))
+        return end
 
     @property
     def _stiffness_share(self) -> float:

@@ -19,7 +19,6 @@ _ITERATIONS = 60  # allowed per load step
 _HALVINGS = 12  # of a correction
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises (Armijo)
 _INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
-_COLLAPSED = 1e-3  # of the largest stretch
 
 
 class NotInEquilibriumError(RuntimeError):
@@ -104,7 +103,7 @@ class Newton:
 
     def _why(self, place: Place) -> str:
         """Say what stood in the way, as far as it can be seen."""
-        collapsed = collapsed_cells(self.force, place.displacement, _COLLAPSED)
+        collapsed = collapsed_cells(self.force, place.displacement)
         if len(collapsed) == 0:
             return "More load steps may help"
         return (
@@ -213,7 +212,7 @@ class Newton:
         return self._solver
 
 
-def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float) -> Ints:
+def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float = 1e-3) -> Ints:
     """Pieces (k,) whose rotation, and with it the force, is not unique, or nearly so.
 
     That is where the two principal stretches of a plane cell cancel (of an inverted cell the
