@@ -158,7 +158,7 @@ def test_bodies_that_share_their_elements_do_not_see_one_another_move(scheme, ke
 
 @pytest.mark.parametrize("scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum])
 def test_damping_that_sets_in_between_two_steps(scheme):
-    """The next step begins with the force that the last one ended with, and with other rotations."""
+    """The next step begins with the force of the last one, and needs its rotations too."""
     phantom = BODIES["block"]()
     mass, moved = side_wise_mass(phantom, DENSITY), []
     for kernels in KERNELS.values():
