@@ -33,8 +33,7 @@ class ReferenceRecord:
     judged_errors : dict of str to dict
         The errors that it judges, largest share of uncertainty first.
     overlap : dict
-        ``depth`` (m), ``measure`` (m or m²) and ``place`` of material of an exact solution that
-        lies in other material.
+        ``depth`` (m) and ``place`` of material of an exact solution that lies in other material.
     """
 
     kind: str | None = None

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pressed_halves import common, normal, pressed
+from pressed_halves import normal, pressed
 
 from verify.assess.closing import with_openings
 from verify.reference_record import ReferenceRecord
@@ -71,12 +71,10 @@ def levels(shift):
 
 def test_an_overlap_stands_in_the_record_of_every_solve_and_warns_for_each_solver(tmp_path):
     shift = -0.0185 * normal(2) + 0.1 * ALONG
-    measure, _ = common(2, [STILL, (np.eye(2), shift)])
     solutions = {"xfem": {0: moved(shift, 5, 7)}, "reference": levels(shift)}
     result = examined(scene(tmp_path), solutions)
     for solve in result.solves:
         assert solve.metric("overlap_depth").value == pytest.approx(0.0185, rel=1e-6)
-        assert solve.metric("overlap_area").value == pytest.approx(measure, rel=1e-5)
         assert "deformed (" in solve.notes["overlap_depth"]
     assert sorted(warned.solver for warned in result.warnings) == ["reference", "xfem"]
     assert all("0.0185 m at (" in warned.text for warned in result.warnings)

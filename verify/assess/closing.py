@@ -81,8 +81,8 @@ def with_openings(
     Returns
     -------
     CaseResult
-        With metrics ``overlap_depth`` and ``overlap_area`` or ``overlap_volume`` of each solve,
-        `openings`, and `notices` of what overlaps and is not meant to.
+        With the metric ``overlap_depth`` of each solve, `openings`, and `notices` of what overlaps
+        and is not meant to.
     """
     try:
         body = body_of(scene)
@@ -107,7 +107,7 @@ def with_openings(
             why = one_line(f"{COMPARISON_FAILED}: {type(problem).__name__}: {problem}")
             solves.append(_without(record, why))
         else:
-            solves.append(_recorded(record, own, scene))
+            solves.append(_recorded(record, own))
     result = replace(result, solves=solves)
     shown = _contestants(scene, body, result, solutions, exact)
     judge = shown[0] if shown and shown[0].name == REFERENCE else None
@@ -134,15 +134,10 @@ def _deepest(solution: Solution) -> _Found:
     return _Found(overlaps[worst], float(times[steps[worst]]), looked)
 
 
-def _recorded(record: SolveRecord, found: _Found, scene: Scene) -> SolveRecord:
+def _recorded(record: SolveRecord, found: _Found) -> SolveRecord:
     """Add what was found to the record of a solve."""
-    name, unit = _measure(scene)
     overlap = found.overlap
-    metrics = [
-        *record.metrics,
-        Metric(OVERLAP, overlap.depth, "m"),
-        Metric(name, overlap.measure, unit),
-    ]
+    metrics = [*record.metrics, Metric(OVERLAP, overlap.depth, "m")]
     said = [_place(found)] if overlap.depth > 0.0 else []
     said += [found.looked] if found.looked else []
     if overlap.inside_out:
@@ -161,7 +156,7 @@ def _without(record: SolveRecord, why: str) -> SolveRecord:
 def _with_overlap(reference: ReferenceRecord, found: _Found) -> ReferenceRecord:
     """Add the overlap of an exact solution to what is recorded of it."""
     overlap = found.overlap
-    entry: dict[str, Any] = {"depth": overlap.depth, "measure": overlap.measure}
+    entry: dict[str, Any] = {"depth": overlap.depth}
     if overlap.depth > 0.0:
         entry["place"] = _place(found)
     return replace(reference, overlap=entry)
@@ -230,15 +225,13 @@ def _warnings(
         overlap = found.overlap
         if overlap.depth <= max(limit, _NOTHING * _size(openings)):
             continue
-        measure, unit = _measure(scene)
         beside = (
             "how well the opening is known is not known"
             if known is None
             else f"more than three times the uncertainty of the opening, {known:.2g} m"
         )
         text = (
-            f"faces overlap by up to {overlap.depth:.4g} m at {_place(found)} "
-            f"({measure.split('_')[1]} covered twice: {overlap.measure:.3g} {unit}); {beside}. "
+            f"faces overlap by up to {overlap.depth:.4g} m at {_place(found)}; {beside}. "
             "There is no contact model: this is no answer to a cut that closes"
         )
         warned.append(Notice(NoticeKind.WARNING, "overlap of faces", name, text))
@@ -272,10 +265,6 @@ def _size(openings: Sequence[OpeningProfile]) -> float:
     """Diagonal of the box around the cuts, m."""
     places = [point for profile in openings for point in profile.points]
     return float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if places else 0.0
-
-
-def _measure(scene: Scene) -> tuple[str, str]:
-    return ("overlap_area", "m²") if scene.dimension == 2 else ("overlap_volume", "m³")
 
 
 def _place(found: _Found) -> str:

@@ -61,16 +61,12 @@ class DeformedCells:
         Of the deformed corners.
     upright : (m,) bool array
         Whether a cell has a volume and is not inside out; others are in no tree.
-    low, high : (m, d) arrays
-        Bounding boxes.
     tree : CellTree
     """
 
     nodes: Ints
     shape: Simplices
     upright: NDArray[np.bool_]
-    low: Array
-    high: Array
     tree: CellTree
 
 
@@ -144,7 +140,7 @@ def deformed_cells(
     upright = ~shape.degenerate & (_turn(places[nodes]) * _turn(solution.points[nodes]) > 0.0)
     lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
     tree = build_cell_tree(np.where(upright[:, None], lower, np.nan), upper)
-    return DeformedCells(nodes, shape, upright, lower, upper, tree)
+    return DeformedCells(nodes, shape, upright, tree)
 
 
 def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Overlap of the faces of cuts in the deformed body: how deep, how much, and where.
+"""Overlap of the faces of cuts in the deformed body: how deep, and where.
 
 There is no contact model, so that an answer may put two parts of a body into one place. Faces that
 slide along each other at a finite rotation have no opposite points left; therefore points of all
@@ -22,12 +22,7 @@ from verify.compare.deformed import (
 )
 from verify.compare.locate import SolutionField
 from verify.compare.locate_kernels import find_cells
-from verify.compare.overlap_kernels import (
-    facet_distances,
-    first_exits,
-    nearest_before,
-    overlapping,
-)
+from verify.compare.overlap_kernels import facet_distances, first_exits, nearest_before
 from verify.errors import UnsupportedSceneError
 from verify.solution import Solution
 
@@ -53,8 +48,6 @@ class Overlap:
     ----------
     depth : float
         Largest normal penetration of a face into other material, m; 0 if there is none.
-    measure : float
-        Area (2D, m²) or volume (3D, m³) that is covered twice.
     material, deformed : (d,) arrays or None
         Where the largest depth is: the point of the face before and after the deformation.
     inside_out : int
@@ -63,7 +56,6 @@ class Overlap:
     """
 
     depth: float = 0.0
-    measure: float = 0.0
     material: Array | None = None
     deformed: Array | None = None
     inside_out: int = 0
@@ -137,12 +129,7 @@ class OverlapSearch:
         material = np.einsum("nk,nkd->nd", weights, self.solution.points[nodes])
         deformed = np.einsum("nk,nkd->nd", weights, places[nodes])
         worst = int(np.argmax(depth[deep]))
-        seeds = self._holding(cells, deformed)
-        measure = overlapping(
-            np.unique(seeds[seeds >= 0]), cells.tree.lower, cells.tree.upper, cells.tree.cells,
-            cells.low, cells.high, cells.shape.corners, cells.shape.normals, _INSIDE * self._size,
-        )  # fmt: skip
-        return Overlap(float(depth.max()), float(measure), material[worst], deformed[worst])
+        return Overlap(float(depth.max()), material[worst], deformed[worst])
 
     def _depths(
         self, faces: Faces, cells: DeformedCells, places: Array
