@@ -75,7 +75,7 @@ def test_the_displacement_error_grows_by_less_than_two_percent(dim, count, polic
 def test_a_corner_cut_off_by_a_sliver_is_given_back_or_counted(dim):
     """It is a body of its own, without a root on its side: dropped, or kept and counted."""
     mesh = rectangle_mesh((3, 3)) if dim == 2 else box_mesh((3, 3, 3))
-    for size in (1e-1, 1e-4, 1e-12):
+    for size in (1e-1, 1e-2, 1e-4):
         corner = np.ones(dim) - size / 3.0 * np.eye(dim)[0]
         phantom = cut_mesh(mesh, [Plane(corner, np.arange(1.0, dim + 1.0))])
         assert phantom.bodies.max() == 1

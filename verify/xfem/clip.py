@@ -27,6 +27,10 @@ from verify.xfem.zero_points import ZeroPoints
 
 _Path = list[tuple[int, int]]
 
+# Share in the volume of its cell up to which a piece is of round-off size: what is lost in the sum
+# of the volumes of the pieces.
+ROUND_OFF_SHARE = np.finfo(float).eps
+
 
 class Staircase(NamedTuple):
     """Sub-simplices of a clipped simplex, for every pattern of signs: a table.
@@ -302,6 +306,8 @@ class Partition:
         Mesh nodes and zero points.
     snapped : int
         How many nodal level-set values within round-off were taken as exactly zero.
+    absorbed_by : (p,) int array
+        Piece that takes each piece of round-off size (`ROUND_OFF_SHARE`); itself for the others.
     tied : (t, 2) int array
         Pairs of pieces of one cell that no cut keeps apart: together they are one.
     """
@@ -311,6 +317,7 @@ class Partition:
     simplices: Simplices
     points: ZeroPoints
     snapped: int
+    absorbed_by: Ints
     tied: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     @staticmethod
@@ -318,7 +325,12 @@ class Partition:
         """One piece of each chosen cell, before any cut."""
         label = np.zeros((len(chosen), points.values.shape[1]), dtype=np.int8)
         simplices = Simplices.of_cells(np.arange(len(chosen)), cells[chosen])
-        return Partition(chosen, label, simplices, points, snapped)
+        return Partition(chosen, label, simplices, points, snapped, np.arange(len(chosen)))
+
+    @property
+    def solid(self) -> Bools:
+        """(p,) whether a piece is there: it is not of round-off size."""
+        return self.absorbed_by == np.arange(len(self.parent))
 
     @property
     def fraction(self) -> Floats:
@@ -351,4 +363,13 @@ class Partition:
             parent=self.parent[order],
             label=self.label[order],
             simplices=replace(kept, piece=number[kept.piece]),
+            absorbed_by=number[self.absorbed_by[order]],
         )
+
+    def absorbed(self) -> "Partition":
+        """Give the sub-simplices of pieces of round-off size to the pieces that take them."""
+        into = self.absorbed_by
+        while not np.array_equal(further := into[into], into):
+            into = further
+        sub = self.simplices[self.simplices.fraction > 0.0]
+        return replace(self, simplices=replace(sub, piece=into[sub.piece]), absorbed_by=into)

@@ -14,7 +14,6 @@ which calls all of this.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -31,7 +30,6 @@ Reached = Callable[[Ints, Floats], Bools]
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
 _ASIDE = 1e-4  # element sizes: steps of difference quotients, and to beside the end of a cut
-_SPECK = 1e-24  # of a cell: what rounding leaves between three planes with a common line
 
 
 class Crossing(NamedTuple):
@@ -166,16 +164,6 @@ def meeting_cells(
     return meets
 
 
-def without_specks(partition: Partition, cells: Bools) -> Partition:
-    """Take the volume of the pieces of some cells (m,) that rounding alone has made."""
-    speck = cells[partition.parent] & (partition.fraction <= _SPECK)
-    if not speck.any():
-        return partition
-    sub = partition.simplices
-    fraction = np.where(speck[sub.piece], 0.0, sub.fraction)
-    return replace(partition, simplices=replace(sub, fraction=fraction))
-
-
 def joint_cuts(
     trial: Partition,
     alone: Partition,
@@ -205,10 +193,10 @@ def joint_cuts(
     borne = _borne(trial, facets, cuts, sizes)
     loose = ~borne.any(axis=1)
     part = connected(len(trial.parent), facets.first[loose], facets.second[loose])
-    solid = trial.fraction > 0.0
+    solid = trial.solid
     first = np.unique(part[solid], return_index=True)[1]
     parts = np.bincount(trial.parent[solid][first], minlength=cells)
-    more = parts > np.bincount(alone.parent[alone.fraction > 0.0], minlength=cells)
+    more = parts > np.bincount(alone.parent[alone.solid], minlength=cells)
     if joint is not None:
         more |= joint & chosen
     through = np.zeros((cells, len(cuts)), dtype=bool)
@@ -228,9 +216,11 @@ def tied_pieces(partition: Partition, cuts: Sequence[Cut], sizes: Floats, cells:
 
 
 def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
-    """Facets between sub-simplices with a volume, in different pieces of one of some cells (m,)."""
+    """Facets between sub-simplices in different solid pieces of one of some cells (m,)."""
     sub = partition.simplices
-    sub = sub[cells[partition.parent[sub.piece]] & (sub.fraction > 0.0)]
+    sub = sub[
+        cells[partition.parent[sub.piece]] & partition.solid[sub.piece] & (sub.fraction > 0.0)
+    ]
     return _Facets(*facets_between(partition.parent, sub.piece, sub.points))
 
 

@@ -113,7 +113,8 @@ class PhantomMesh:
     snapped : int
         Nodal level-set values within round-off taken as exactly zero.
     dropped : int
-        Pieces left out because their volume is exactly zero.
+        Pieces of round-off size, left out: the piece beside them has the share of at most 2⁻⁵² of
+        the cell that each may have.
     aggregation : Constraint, optional
         Corners that follow the dof nodes of a root cell.
     """
@@ -310,8 +311,7 @@ def cut_mesh(
     (40, 10)
     """
     partition = split_cells(mesh, cuts, tip, opened=opened)
-    fraction = partition.fraction
-    solid = fraction > 0.0
+    fraction, solid = partition.fraction, partition.solid
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
@@ -333,7 +333,7 @@ def cut_mesh(
     number = np.full(len(parent), -1)
     number[order] = np.arange(len(order))
 
-    sub = partition.simplices[partition.simplices.fraction > 0.0]
+    sub = partition.simplices
     sub_cells = SubCells(
         number[sub.piece], sub.points, sub.barycentric, sub.fraction, partition.points
     )

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides, check_choice, finite_array
-from verify.xfem.clip import Partition, bisected, divided
+from verify.xfem.clip import ROUND_OFF_SHARE, Partition, bisected, divided
 from verify.xfem.crossing import (
     Crossing,
     TipRule,
@@ -27,7 +27,6 @@ from verify.xfem.crossing import (
     meeting_cells,
     reached,
     tied_pieces,
-    without_specks,
 )
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
@@ -108,24 +107,24 @@ def split_cells(
     rules = _Rules(cuts, sizes, tip, held, opened)
     partition, ends = parted(crossed, rules)
     if tip != "inside" or len(cuts) < 2:
-        return partition.only_split()
+        return partition.absorbed().only_split()
     # what all cuts part together they part when some of them are not open yet, too
     free = rules._replace(held=None, opened=None)
     alone, ends = (partition, ends) if opened is None else parted(crossed, free)
     meets = meeting_cells(alone, ends, len(mesh.cells), joint)
     suspects = np.flatnonzero(meets.any(axis=1))
     if len(suspects) == 0:
-        return partition.only_split()
+        return partition.absorbed().only_split()
     # where several meet and one ends, each divides on trial whatever its plane crosses
     trial = parted(suspects, free._replace(through=meets))[0]
-    through = joint_cuts(without_specks(trial, meets.any(axis=1)), alone, cuts, sizes, joint)
+    through = joint_cuts(trial, alone, cuts, sizes, joint)
     if not through.any():
-        return partition.only_split()
+        return partition.absorbed().only_split()
     # and once more with what the trial has found
     cells = through.any(axis=1)
-    partition = parted(crossed, rules._replace(through=through))[0]
-    partition = without_specks(partition, cells).only_split()
-    return replace(partition, tied=tied_pieces(partition, cuts, sizes, cells))
+    partition = parted(crossed, rules._replace(through=through))[0].only_split()
+    tied = tied_pieces(partition, cuts, sizes, cells)
+    return replace(partition, tied=tied).absorbed()
 
 
 def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
@@ -204,12 +203,23 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
     label = np.concatenate([partition.label, partition.label[active]])
     label[: len(active)][active, index] = 1
     label[len(active) :, index] = -1
-    return replace(
+    parted = replace(
         partition,
         parent=np.concatenate([partition.parent, partition.parent[active]]),
         label=label,
         simplices=divided(partition.simplices, partition.points, index, below),
+        absorbed_by=np.concatenate([partition.absorbed_by, below[active]]),
     )
+    # of two halves the larger takes one of round-off size, which keeps its place at the cut only;
+    # what has been taken before is taken with both halves
+    above = np.flatnonzero(active)
+    share, solid = parted.fraction, partition.solid[above]
+    halves = np.stack([above, below[active]])
+    swapped = solid & (share[halves[0]] <= share[halves[1]])
+    halves[:, swapped] = halves[::-1, swapped]
+    small = ~solid | (share[halves[1]] <= ROUND_OFF_SHARE)
+    parted.absorbed_by[halves[1, small]] = halves[0, small]
+    return parted
 
 
 def _bisect_beside(partition: Partition, index: int) -> Partition:

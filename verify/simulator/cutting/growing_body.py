@@ -23,9 +23,7 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.pieces import ROUND_OFF, Held, split_cells
-
-_NOTHING = ROUND_OFF**2  # share of a cell that a piece without volume may have when divided further
+from verify.xfem.pieces import Held, split_cells
 
 # the cuts near a patch: the number of each, and the cut as that patch sees it
 CutsNear = Callable[[MeshPatch], tuple[Ints, Sequence[Cut]]]
@@ -102,10 +100,6 @@ class GrowingBody:
     held : int
         How often a cut separated a piece only because it had done so before a later cut came:
         where that is not 0, the cuts at once would have left some element less divided.
-    vanished : int
-        How often a part of a piece without volume, left out when that was made, was left out though
-        rounding gives it some, less than 1e-29 of its cell: where that is not 0, the cuts at once
-        would have made more pieces.
     """
 
     def __init__(self, mesh: SimplexMesh) -> None:
@@ -131,7 +125,6 @@ class GrowingBody:
         self._dropped = np.zeros(cells, dtype=np.int64)
         self._tied = TiedParts(cells)
         self.held = 0
-        self.vanished = 0
 
     @property
     def node_count(self) -> int:
@@ -140,7 +133,7 @@ class GrowingBody:
 
     @property
     def dropped(self) -> int:
-        """Pieces left out because their volume is exactly zero, or was when they were made."""
+        """Pieces of round-off size, which are left out."""
         return int(self._dropped.sum())
 
     @property
@@ -207,7 +200,6 @@ class GrowingBody:
         self._dropped[cells] = 0
         empty = division.cell[~division.solid]
         np.add.at(self._dropped, empty[_among(empty, cells)], 1)
-        self.vanished += int(np.count_nonzero(division.fraction[~division.solid]))
         patch, level = division.patch, division.partition.points.values
         is_moved = _among(patch.whole_cells, distinct(np.concatenate([cells, self._moved])))
         # faces and edges on one side of all cuts are as they were where the unknowns are
@@ -230,8 +222,7 @@ class GrowingBody:
 
     def _compare(self, patch: MeshPatch, partition: Partition, numbers: Ints) -> Division:
         """Match the pieces of a patch with the stored ones."""
-        fraction = partition.fraction
-        solid = fraction > 0.0
+        fraction, solid = partition.fraction, partition.solid
         label = np.zeros((len(solid), self.cut_count), dtype=np.int8)
         label[:, numbers] = partition.label
         cell = patch.whole_cells[partition.parent]
@@ -241,13 +232,9 @@ class GrowingBody:
             side = label.copy()
             side[:, numbers] = _sides(partition)
             old, changed = self.pieces.match(cell, label, side)
-        orphans = solid & (old < 0)
-        if orphans.any():
-            # what had no volume was left out, and rounded otherwise it must not come back
-            solid &= ~(orphans & (self._dropped[cell] > 0) & (fraction <= _NOTHING))
-            left = np.flatnonzero(orphans & solid)
-            if len(left):
-                raise XfemError(f"a cut would join parts of cell {cell[left[0]]} that are separate")
+        orphans = np.flatnonzero(solid & (old < 0))
+        if len(orphans):
+            raise XfemError(f"a cut would join parts of cell {cell[orphans[0]]} that are separate")
         if len(partition.tied) or self._tied.joint[cell].any():
             of = np.where(solid, old, -1)
             partition = replace(partition, tied=self._tied.still(partition.tied, of))

@@ -177,6 +177,58 @@ def _beyond(piece, cell, opposite, body, parts, orientation, out, count):
     return count
 
 
+@njit(cache=True)
+def _share(x, vertices, which):
+    """Give the determinant of vertices (d, d), in barycentric coordinates, with x for one of them."""
+    v = vertices.copy()
+    if which >= 0:
+        v[which] = x
+    if len(v) == 2:
+        return v[0, 0] * v[1, 1] - v[0, 1] * v[1, 0]
+    return (
+        v[0, 0] * (v[1, 1] * v[2, 2] - v[1, 2] * v[2, 1])
+        - v[0, 1] * (v[1, 0] * v[2, 2] - v[1, 2] * v[2, 0])
+        + v[0, 2] * (v[1, 0] * v[2, 1] - v[1, 1] * v[2, 0])
+    )
+
+
+@njit(cache=True)
+def _beyond_centroid(barycentric, skip, cell, across, body, parts):
+    """Give the simplex of the cell across at the centroid of a facet on their face, or -1.
+
+    A cut that ends between two cells may have divided one of them since: their facets differ.
+    """
+    sub_range, sub_barycentric = parts.sub_range, parts.sub_barycentric
+    cells, neighbours, corners = body.cells, body.neighbours, body.cells.shape[1]
+    best, found = -np.inf, -1
+    x, vertices = np.empty(corners - 1), np.empty((corners - 1, corners - 1))
+    for t in range(sub_range[across, 0], sub_range[across, 1]):
+        for other in range(corners):
+            face = _face_of(sub_barycentric[t], other)
+            if face < 0 or neighbours[across, face] != cell:
+                continue
+            column = 0
+            for j in range(corners):
+                if j == face:
+                    continue
+                row, x[column] = 0, 0.0
+                for k in range(corners):
+                    if k != other:
+                        vertices[row, column] = sub_barycentric[t, k, j]
+                        row += 1
+                    for b in range(corners):
+                        if k != skip and cells[cell, b] == cells[across, j]:
+                            x[column] += barycentric[k, b] / (corners - 1)
+                column += 1
+            whole, least = _share(x, vertices, -1), np.inf
+            for k in range(corners - 1):
+                if whole != 0.0:
+                    least = min(least, _share(x, vertices, k) / whole)
+            if whole != 0.0 and least > best:
+                best, found = least, t
+    return found
+
+
 @njit(inline="always")
 def _rows(room, corners):
     """Point numbers, barycentric corners, piece, cell and whether on a cut, not yet written."""
@@ -233,9 +285,13 @@ def _expose_split(cell, body, parts, orientation, shared, out, count):
             across = neighbours[cell, face] if face >= 0 else -1
             if across >= 0 and _partner(piece, cell, face, body) >= 0:
                 # the same facet of the cell across may be that of a piece that moves otherwise
-                same = _find_facet(s, skip, sub_range[across, 0], sub_range[across, 1], sub_points)
+                begin_across, end_across = sub_range[across, 0], sub_range[across, 1]
+                same = _find_facet(s, skip, begin_across, end_across, sub_points)
+                whole = _is_whole(sub_points[s], skip, body.cells[cell])
+                if same < 0 and not whole:
+                    same = _beyond_centroid(sub_barycentric[s], skip, cell, across, body, parts)
                 if same < 0 or _meets(piece, sub_piece[same], cell, across, face, body):
-                    if _is_whole(sub_points[s], skip, body.cells[cell]):
+                    if whole:
                         count = _beyond(piece, cell, face, body, parts, orientation, out, count)
                     continue
             whose = (piece, cell, face < 0 or across >= 0)
