@@ -11,6 +11,7 @@ from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import across_interfaces
 from verify.solvers.runs import Record
 from verify.solvers.supports_of_scene import support_ends
+from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.phantom import PhantomMesh
@@ -129,6 +130,11 @@ def _of_the_cut(phantom: PhantomMesh) -> list[Regularisation]:
         entries.append(Regularisation("node taken as on the cut", phantom.snapped, 0.0, "m"))
     if phantom.dropped:
         entries.append(
-            Regularisation("piece without volume left out", phantom.dropped, 0.0, "volume fraction")
+            Regularisation(
+                "part of round-off size left to its neighbour",
+                phantom.dropped,
+                ROUND_OFF_SHARE,
+                "volume fraction",
+            )  # fmt: skip
         )
     return entries
