@@ -179,7 +179,7 @@ def _beyond(piece, cell, opposite, body, parts, orientation, out, count):
 
 @njit(cache=True)
 def _share(x, vertices, which):
-    """Give the determinant of vertices (d, d), in barycentric coordinates, with x for one of them."""
+    """Give the determinant of vertices (d, d), barycentric, with x in place of one of them."""
     v = vertices.copy()
     if which >= 0:
         v[which] = x
