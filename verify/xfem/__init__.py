@@ -76,12 +76,13 @@ on what the two after it define, and is easier read first):
 `cuts`, `faceted_cuts`, `tool_path`
     what a cut is: a plane or polygon, a polyline, a triangulated surface, what a tool sweeps. The
     solver asks a cut two things only
-`zero_points`, `clip`, `crossing`, `pieces`
-    exact division of cells at zero points of level sets; through which cells a cut goes. Begin
-    with the docstring of `pieces`, which says what the other three are for
-`join`, `phantom`
-    which pieces share dof nodes (by contact across faces), on which side of the cuts they lie, and
-    the result: standard finite elements with weights
+`zero_points`, `clip`, `crossing`, `junctions`, `pieces`
+    exact division of cells at zero points of level sets; through which cells a cut goes, and which
+    cells cuts part that end on one another. Begin with the docstring of `pieces`, which says what
+    the others are for
+`join`, `sides`, `phantom`
+    which pieces share dof nodes (by contact across faces); on which side of the cuts pieces and dof
+    nodes lie; the result: standard finite elements with weights
 `elasticity`, `polar`, `loads`, `supports`
     material, nearest rotations, load vectors, prescribed displacements
 `block_pattern`, `mass`

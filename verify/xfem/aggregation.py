@@ -282,13 +282,12 @@ def _continued(
 def _aggregated(phantom: PhantomMesh, followed: Ints, weights: Floats, root: Ints) -> PhantomMesh:
     """Return the mesh without the unknowns of nodes that follow others."""
     own = followed < 0
-    node_parent, node, old_of_new = renumber(phantom, own)
+    node_parent, node = renumber(phantom, own)
     gone = np.flatnonzero(~own)
     at = followed[gone]
     extension = extension_of(node, gone, node[phantom.cells[root[at]]], weights[at])
     return replace(
         phantom,
         node_parent=node_parent,
-        node_side=phantom.node_side[old_of_new],
         aggregation=Aggregation(phantom, extension, node),
     )

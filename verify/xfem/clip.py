@@ -308,8 +308,8 @@ class Partition:
         How many nodal level-set values within round-off were taken as exactly zero.
     absorbed_by : (p,) int array
         Piece that takes each piece of round-off size (`ROUND_OFF_SHARE`); itself for the others.
-    tied : (t, 2) int array
-        Pairs of pieces of one cell that no cut keeps apart: together they are one.
+    one_part : (t, 2) int array
+        Pairs of pieces of one cell that no cut keeps apart: they are one part.
     """
 
     parent: Ints
@@ -318,7 +318,7 @@ class Partition:
     points: ZeroPoints
     snapped: int
     absorbed_by: Ints
-    tied: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    one_part: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     @staticmethod
     def whole(cells: Ints, chosen: Ints, points: ZeroPoints, snapped: int) -> "Partition":

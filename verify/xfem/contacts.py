@@ -90,7 +90,7 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
     number = np.cumsum(stays) - 1
     used = np.zeros(phantom.node_count, dtype=bool)
     used[phantom.cells[stays]] = True
-    node_parent, node, old_of_new = renumber(phantom, used)
+    node_parent, node = renumber(phantom, used)
     gone = np.flatnonzero(~stays)
     fraction = phantom.fraction.copy()
     np.add.at(fraction, into[gone], phantom.fraction[gone])
@@ -102,9 +102,12 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
         fraction=fraction[stays],
         label=phantom.label[stays],
         node_parent=node_parent,
-        node_side=phantom.node_side[old_of_new],
         sub_cells=replace(sub, piece=number[into[sub.piece]]),
     )
+    # the cut has moved past nodes, but unknowns stay on their sides
+    treated.__dict__["node_side"] = phantom.node_side[
+        np.argsort(node)[np.count_nonzero(node < 0) :]
+    ]
     row, corner = np.nonzero(node[phantom.cells[gone]] < 0)
     lost = phantom.cells[gone][row, corner]
     # an unknown that several absorbed pieces used takes the mean of what they follow
@@ -113,7 +116,7 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
     return treated, extension_of(node, lost, columns[:, None], share), node
 
 
-def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
+def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints]:
     """Give the unknowns that stay, N of N_old, new numbers.
 
     Each mesh node must keep an unknown; the first of them takes the node's number.
@@ -129,7 +132,6 @@ def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
         Mesh node of each.
     node : (N_old,) int array
         New number of each old unknown, −1 if it goes.
-    old_of_new : (N,) int array
     """
     kept = np.flatnonzero(used)
     parent = phantom.node_parent[kept]
@@ -140,9 +142,7 @@ def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
     node = np.full(phantom.node_count, -1)
     node[kept[first]] = parent[first]
     node[kept[~first]] = nodes + np.arange(int((~first).sum()))
-    old_of_new = np.empty(len(kept), dtype=np.int64)
-    old_of_new[node[kept]] = kept
-    return np.concatenate([np.arange(nodes), parent[~first]]), node, old_of_new
+    return np.concatenate([np.arange(nodes), parent[~first]]), node
 
 
 def extension_of(node: Ints, rows: Ints, columns: Ints, weights: Floats) -> csr_array:

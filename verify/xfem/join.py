@@ -4,16 +4,14 @@ Two (piece, local node) pairs at one node are the same dof node when the pieces,
 a face with that node, touch across the face, in an area (2D: a length). What touches in a corner
 or an edge only is apart, as pieces that turn about a hinge are no body, and a piece without volume
 joins nothing. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along
-faces all follow from this one rule. The last two functions tell on which side of every cut the
-material of a dof node lies, whether the cut splits a cell there or not.
+faces all follow from this one rule.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats, Ints, Sides
+from verify.xfem.arrays import Bools, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
 from verify.xfem.mesh import SimplexMesh, connected, facets_of
 from verify.xfem.zero_points import ZeroPoints
@@ -40,7 +38,7 @@ class PatchNodes:
 
 
 def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNodes:
-    """Join the local nodes of tied pieces, and of all that touch, around the nodes of split cells.
+    """Join the local nodes of one part, and of pieces that touch, around the nodes of split cells.
 
     Parameters
     ----------
@@ -82,9 +80,9 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     local = on_face[opposite[face]]
     other = mesh.cells[patch[there[face]]]
     other_local = (other[:, None, :] == nodes[face][:, :, None]).argmax(axis=2)
-    tied = partition.tied[:, :, None] * corners + np.arange(corners)
-    one = np.concatenate([(first[:, None] * corners + local).ravel(), tied[:, 0].ravel()])
-    two = np.concatenate([(second[:, None] * corners + other_local).ravel(), tied[:, 1].ravel()])
+    pairs = partition.one_part[:, :, None] * corners + np.arange(corners)
+    one = np.concatenate([(first[:, None] * corners + local).ravel(), pairs[:, 0].ravel()])
+    two = np.concatenate([(second[:, None] * corners + other_local).ravel(), pairs[:, 1].ravel()])
     group = connected(len(piece_cell) * corners, one, two).reshape(-1, corners)
     return PatchNodes(patch, piece_cell, group)
 
@@ -187,95 +185,3 @@ def number_nodes(
     outer = np.flatnonzero((node_of >= 0) & ~inner[node_of])
     number[outer] = node_of[outer]
     return np.concatenate([np.arange(len(mesh.points)), node_of[used[~first]]]), number
-
-
-class PieceSides(NamedTuple):
-    """Sides of the cuts on which some pieces lie.
-
-    Attributes
-    ----------
-    rows : (s,) int array
-        The pieces.
-    side : (s, cuts) int8 array
-        Of a cut that splits it the label; else where its centroid is: a cut that leaves a piece of
-        a split cell whole may have all nodes of the cell on its other side.
-    share : (s,) float array
-        Volume over that of the cell.
-    """
-
-    rows: Ints
-    side: Sides
-    share: Floats
-
-
-def node_sides(
-    level_sets: Floats,
-    node_parent: Ints,
-    cells: Ints,
-    label: Sides,
-    pieces: PieceSides,
-) -> Sides:
-    """Side (N, cuts) of each cut on which the material of each unknown lies.
-
-    It is that of its labelled pieces if they agree. Where no cut has split them, or they lie
-    around the end of it, it is that of the node for the unknown of the node's own material. An
-    unknown beyond another cut says nothing by the place of its node: it lies where its pieces do.
-
-    Parameters
-    ----------
-    level_sets : (n, cuts) float array
-        At the nodes of the mesh, in metres.
-    node_parent : (N,) int array
-        Node of each unknown.
-    cells : (p, d + 1) int array
-        Dof nodes of each piece.
-    label : (p, cuts) int8 array
-        Its sides, as in `PhantomMesh`.
-    pieces : PieceSides
-        Of the pieces that are not just their whole cells.
-    """
-    side = np.empty((len(node_parent), label.shape[1]), dtype=np.int8)
-    # where a node's own material has no volume, its number is of an unknown beyond a cut
-    own = np.zeros(len(node_parent), dtype=bool)
-    own[cells[(label[:, None] * level_sets[node_parent[cells]] >= 0.0).all(axis=2)]] = True
-    nodes = cells[pieces.rows].ravel()
-    for cut in range(label.shape[1]):
-        above, below = np.zeros((2, len(node_parent)), dtype=bool)
-        above[cells[label[:, cut] > 0]] = True
-        below[cells[label[:, cut] < 0]] = True
-        weight = np.repeat(pieces.share * pieces.side[:, cut], cells.shape[1])
-        vote = np.bincount(nodes, weight, minlength=len(node_parent))
-        level = level_sets[node_parent, cut]
-        # a node exactly on the cut has its material where its pieces are
-        says = np.where((vote == 0.0) | (own & (level != 0.0)), level, vote)
-        side[:, cut] = np.where(above != below, np.where(above, 1, -1), np.where(says >= 0, 1, -1))
-    return side
-
-
-def piece_sides(
-    level_sets: Floats,
-    corners: Ints,
-    label: Sides,
-    sub_piece: Ints,
-    sub_barycentric: Floats,
-    sub_fraction: Floats,
-) -> PieceSides:
-    """Sides of the pieces that consist of sub-simplices.
-
-    Parameters
-    ----------
-    level_sets : (n, cuts) float array
-        At the nodes of the mesh, in metres.
-    corners : (p, d + 1) int array
-        Nodes of the cell of each piece.
-    label : (p, cuts) int8 array
-    sub_piece, sub_barycentric, sub_fraction
-        See `verify.xfem.phantom.SubCells`.
-    """
-    share = np.bincount(sub_piece, sub_fraction, minlength=len(label))
-    rows = np.flatnonzero(share > 0.0)
-    weights = np.zeros(corners.shape)
-    np.add.at(weights, sub_piece, sub_fraction[:, None] * sub_barycentric.mean(axis=1))
-    level = np.einsum("pi,pic->pc", weights[rows], level_sets[corners[rows]])
-    side = np.where(label[rows] != 0, label[rows], np.where(level >= 0.0, 1, -1)).astype(np.int8)
-    return PieceSides(rows, side, share[rows])

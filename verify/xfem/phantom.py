@@ -16,9 +16,10 @@ from scipy.sparse import csr_array
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.join import join_parts, node_sides, number_nodes, piece_sides
+from verify.xfem.join import join_parts, number_nodes
 from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.pieces import split_cells
+from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.zero_points import ZeroPoints
 
 
@@ -106,8 +107,6 @@ class PhantomMesh:
         material in which it lies; further ones are phantom nodes.
     level_sets : (n, cuts) float array
         Nodal level set of each cut as used: snapped to zero within round-off, in metres.
-    node_side : (N, cuts) int8 array
-        Side of each cut on which the material of the unknown lies (+1 or −1).
     sub_cells : SubCells
         Sub-simplices of the split cells.
     snapped : int
@@ -126,7 +125,6 @@ class PhantomMesh:
     label: Sides
     node_parent: Ints
     level_sets: Floats
-    node_side: Sides
     sub_cells: SubCells
     snapped: int
     dropped: int
@@ -197,14 +195,19 @@ class PhantomMesh:
     @cached_property
     def piece_side(self) -> Sides:
         """(p, cuts) side of each cut on which a piece lies, whether split by it or not."""
-        corners, sub = self.mesh.cells[self.parent], self.sub_cells
-        mean = self.level_sets[corners].sum(axis=1)
-        side = np.where(self.label != 0, self.label, np.where(mean >= 0.0, 1, -1)).astype(np.int8)
-        split = piece_sides(
-            self.level_sets, corners, self.label, sub.piece, sub.barycentric, sub.fraction
+        weights = np.ones(self.cells.shape)
+        weights[self.split] = self.shape_integrals[self.split]
+        return piece_sides(self.level_sets, self.mesh.cells[self.parent], self.label, weights)
+
+    @cached_property
+    def node_side(self) -> Sides:
+        """(N, cuts) side of each cut on which the material of a dof node lies."""
+        if self.aggregation is not None:
+            return self.corners.node_side[self.node_corner]
+        share = np.where(self.split, self.fraction, 0.0)
+        return node_sides(
+            self.level_sets, self.node_parent, self.cells, self.label, self.piece_side, share
         )
-        side[split.rows] = split.side
-        return side
 
     @cached_property
     def volumes(self) -> Floats:
@@ -311,48 +314,33 @@ def cut_mesh(
     (40, 10)
     """
     partition = split_cells(mesh, cuts, tip, opened=opened)
-    fraction, solid = partition.fraction, partition.solid
+    solid = partition.solid
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
-    # the pieces of the patch, and the cells around it
-    pieces = len(partition.label)
-    untouched = np.ones(len(mesh.cells), dtype=bool)
-    untouched[joined.cells] = False
-    rest = np.flatnonzero(untouched)
+    # the pieces that are there, and the cells around the patch, in the order of the cells
+    rest = np.setdiff1d(np.arange(len(mesh.cells)), joined.cells, assume_unique=True)
     parent = np.concatenate([joined.cells[joined.piece_cell], rest])
     cells = np.concatenate([numbering[joined.group], mesh.cells[rest]])
-    label = np.zeros((len(parent), len(cuts)), dtype=np.int8)
-    label[:pieces] = partition.label
-    share = np.ones(len(parent))
-    share[:pieces] = fraction
-    keep = np.ones(len(parent), dtype=bool)
-    keep[:pieces] = solid
-    order = np.flatnonzero(keep)
+    whole = len(parent) - len(solid)
+    label = np.concatenate([partition.label, np.zeros((whole, len(cuts)), dtype=np.int8)])
+    share = np.concatenate([partition.fraction, np.ones(whole)])
+    order = np.flatnonzero(np.concatenate([solid, np.ones(whole, dtype=bool)]))
     order = order[np.argsort(parent[order], kind="stable")]
     number = np.full(len(parent), -1)
     number[order] = np.arange(len(order))
-
     sub = partition.simplices
-    sub_cells = SubCells(
-        number[sub.piece], sub.points, sub.barycentric, sub.fraction, partition.points
-    )
-    level_sets = partition.points.values[: len(mesh.points)]
-    cells, label, parent = cells[order], label[order], parent[order]
-    sides = piece_sides(
-        level_sets, mesh.cells[parent], label, sub_cells.piece, sub_cells.barycentric,
-        sub_cells.fraction,
-    )  # fmt: skip
     return PhantomMesh(
         mesh=mesh,
-        cells=cells,
-        parent=parent,
+        cells=cells[order],
+        parent=parent[order],
         fraction=share[order],
-        label=label,
+        label=label[order],
         node_parent=node_parent,
-        level_sets=level_sets,
-        node_side=node_sides(level_sets, node_parent, cells, label, sides),
-        sub_cells=sub_cells,
+        level_sets=partition.points.values[: len(mesh.points)],
+        sub_cells=SubCells(
+            number[sub.piece], sub.points, sub.barycentric, sub.fraction, partition.points
+        ),
         snapped=partition.snapped,
         dropped=int((~solid).sum()),
     )

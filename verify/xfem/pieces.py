@@ -13,28 +13,22 @@ afterwards.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides, check_choice, finite_array
 from verify.xfem.clip import ROUND_OFF_SHARE, Partition, bisected, divided
-from verify.xfem.crossing import (
-    Crossing,
-    TipRule,
-    crossed_through,
-    joint_cuts,
-    meeting_cells,
-    reached,
-    tied_pieces,
-)
+from verify.xfem.crossing import Crossing, TipRule, crossed_through
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
+from verify.xfem.junctions import junction_cuts, pieces_of_one_part, reached
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 
 # cells (q,) and labels (q, cuts) of pieces, and the number of a cut, to whether it splits them
-Held = Callable[[Ints, Sides, int], Bools]
+Separated = Callable[[Ints, Sides, int], Bools]
 
 ROUND_OFF = 8.0 * np.finfo(float).eps  # of the extent of the mesh: a level set that is zero
 
@@ -45,7 +39,7 @@ class _Rules(NamedTuple):
     cuts: Sequence[Cut]
     sizes: Floats
     tip: TipRule
-    held: Held | None
+    separated: Separated | None
     opened: Bools | None
     through: Bools | None = None  # (m, cuts) cells in which a cut has no end
 
@@ -54,11 +48,11 @@ def split_cells(
     mesh: SimplexMesh,
     cuts: Sequence[Cut],
     tip: TipRule = "inside",
-    held: Held | None = None,
+    separated: Separated | None = None,
     opened: Bools | None = None,
-    joint: Bools | None = None,
+    junction_cells: Bools | None = None,
 ) -> Partition:
-    """Split every cell that a cut goes through, or that several part together.
+    """Split every cell that a cut goes through, or that several part at a junction.
 
     The others do not appear in the result.
 
@@ -72,13 +66,13 @@ def split_cells(
         thesis, 3.2.1), split it, or whichever of the two moves the tip less. With the last two
         the order of the cuts matters where one ends in an element that another divides: it splits
         what it finds, the element or a piece.
-    held : callable, optional
+    separated : callable, optional
         For a cut that grows: given the cells and labels of pieces that a cut meets but does not
         go through, and its number, tells which it shall split: those that it split before.
     opened : (m, cuts) bool array, optional
         Cells in which each cut may split anything; without it all.
-    joint : (m,) bool array, optional
-        Cells that several cuts have parted together before.
+    junction_cells : (m,) bool array, optional
+        Cells with a junction before.
 
     Raises
     ------
@@ -99,32 +93,29 @@ def split_cells(
     sizes = np.zeros(len(mesh.cells))
     sizes[crossed] = mesh.longest_edges(crossed)
 
-    def parted(cells: Ints, rules: _Rules) -> tuple[Partition, list[Ints]]:
+    def divide(cells: Ints, rules: _Rules) -> tuple[Partition, list[Ints]]:
         points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
         return _split_by_all(Partition.whole(mesh.cells, cells, points, snapped), rules)
 
-    # first each cut divides what it goes through
-    rules = _Rules(cuts, sizes, tip, held, opened)
-    partition, ends = parted(crossed, rules)
+    rules = _Rules(cuts, sizes, tip, separated, opened)
+    partition, ends = divide(crossed, rules)
     if tip != "inside" or len(cuts) < 2:
-        return partition.absorbed().only_split()
-    # what all cuts part together they part when some of them are not open yet, too
-    free = rules._replace(held=None, opened=None)
-    alone, ends = (partition, ends) if opened is None else parted(crossed, free)
-    meets = meeting_cells(alone, ends, len(mesh.cells), joint)
-    suspects = np.flatnonzero(meets.any(axis=1))
-    if len(suspects) == 0:
-        return partition.absorbed().only_split()
-    # where several meet and one ends, each divides on trial whatever its plane crosses
-    trial = parted(suspects, free._replace(through=meets))[0]
-    through = joint_cuts(trial, alone, cuts, sizes, joint)
-    if not through.any():
-        return partition.absorbed().only_split()
-    # and once more with what the trial has found
-    cells = through.any(axis=1)
-    partition = parted(crossed, rules._replace(through=through))[0].only_split()
-    tied = tied_pieces(partition, cuts, sizes, cells)
-    return replace(partition, tied=tied).absorbed()
+        return partition.only_split().absorbed()
+    # a junction is one of all cuts, also when some of them are not open yet
+    free = rules._replace(separated=None, opened=None)
+    junctions = junction_cuts(
+        *((partition, ends) if opened is None else divide(crossed, free)),
+        lambda cells, through: divide(cells, free._replace(through=through))[0],
+        cuts,
+        sizes,
+        junction_cells,
+    )
+    cells = junctions.any(axis=1)
+    if not cells.any():
+        return partition.only_split().absorbed()
+    partition = divide(crossed, rules._replace(through=junctions))[0].only_split()
+    pairs = pieces_of_one_part(partition, cuts, sizes, cells)
+    return replace(partition, one_part=pairs).absorbed()
 
 
 def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
@@ -175,19 +166,16 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
         size=rules.sizes[parent[piece]],
         pieces=len(parent),
     )
-    further = None
+    on_others = None
     if rules.tip == "inside" and len(rules.cuts) > 1:
-
-        def further(past: Ints, size: Floats) -> Bools:
-            return reached(rules.cuts, index, points, past, size)
-
-    active, ending = crossed_through(cut, points.positions, crossing, rules.tip, further)
+        on_others = partial(reached, rules.cuts, index, points)
+    active, ending = crossed_through(cut, points.positions, crossing, rules.tip, on_others)
     meets = np.bincount(piece, minlength=len(active)) > 0
     if rules.through is not None:
         active |= meets & rules.through[parent, index]
-    if rules.held is not None:
+    if rules.separated is not None:
         doubtful = np.flatnonzero(meets & ~active)
-        active[doubtful] = rules.held(parent[doubtful], partition.label[doubtful], index)
+        active[doubtful] = rules.separated(parent[doubtful], partition.label[doubtful], index)
     if rules.opened is not None:
         active &= rules.opened[parent, index]
     ends = parent[ending]

@@ -23,7 +23,7 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.pieces import Held, split_cells
+from verify.xfem.pieces import Separated, split_cells
 
 # the cuts near a patch: the number of each, and the cut as that patch sees it
 CutsNear = Callable[[MeshPatch], tuple[Ints, Sequence[Cut]]]
@@ -174,7 +174,7 @@ class GrowingBody:
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
             held, joint = self._held_in(patch, numbers), self._tied.joint[patch.whole_cells]
-            partition = split_cells(patch, cuts, held=held, joint=joint)
+            partition = split_cells(patch, cuts, separated=held, junction_cells=joint)
             division = self._compare(patch, partition, numbers)
             all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
             if len(all_wanted) == len(wanted):
@@ -194,7 +194,7 @@ class GrowingBody:
         cells = division.changed_cells
         before = self.node_count
         place = self._renumber(division)
-        self._tied.store(division.partition.tied, division.cell, place, len(self.piece_parent))
+        self._tied.store(division.partition.one_part, division.cell, place, len(self.piece_parent))
         self._store_simplices(division, cells, place)
         self.split_cells[cells] = True
         self._dropped[cells] = 0
@@ -209,7 +209,7 @@ class GrowingBody:
         touched = patch.whole_cells[is_moved | (shares_edge & beside)]
         return Increment(cells, touched, patch.whole_cells[is_moved], before, self._source)
 
-    def _held_in(self, patch: MeshPatch, numbers: Ints) -> Held:
+    def _held_in(self, patch: MeshPatch, numbers: Ints) -> Separated:
         """Make the rule that what a cut has separated it separates, whatever came later."""
 
         def held(parent: Ints, label: Sides, index: int) -> Bools:
@@ -235,10 +235,10 @@ class GrowingBody:
         orphans = np.flatnonzero(solid & (old < 0))
         if len(orphans):
             raise XfemError(f"a cut would join parts of cell {cell[orphans[0]]} that are separate")
-        if len(partition.tied) or self._tied.joint[cell].any():
+        if len(partition.one_part) or self._tied.joint[cell].any():
             of = np.where(solid, old, -1)
-            partition = replace(partition, tied=self._tied.still(partition.tied, of))
-            changed |= self._tied.parted(partition.tied, of)
+            partition = replace(partition, one_part=self._tied.still(partition.one_part, of))
+            changed |= self._tied.parted(partition.one_part, of)
         return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
     def _renumber(self, division: Division) -> Ints:

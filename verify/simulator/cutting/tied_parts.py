@@ -8,7 +8,7 @@ from verify.xfem.mesh import connected
 
 
 class TiedParts:
-    """Which stored pieces are tied: see `verify.xfem.crossing`.
+    """Which stored pieces are tied: see `verify.xfem.junctions`.
 
     Parameters
     ----------

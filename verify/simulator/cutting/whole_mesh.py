@@ -6,7 +6,6 @@ import numpy as np
 
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.xfem.arrays import Floats, Ints
-from verify.xfem.join import node_sides, piece_sides
 from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.zero_points import ZeroPoints
 
@@ -27,23 +26,15 @@ def whole_mesh(body: GrowingBody, level_sets: Floats) -> PhantomMesh:
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
     used = np.flatnonzero(body.sub_piece.rows >= 0)
-    cells, label = body.piece_cells.rows[order], body.piece_label.rows[order]
-    node_parent = body.node_parent.rows.copy()
-    sub_cells = _GrownSubCells(body, number, used, level_sets)
-    sides = piece_sides(
-        level_sets, body.mesh.cells[parent[order]], label, sub_cells.piece, sub_cells.barycentric,
-        sub_cells.fraction,
-    )  # fmt: skip
     return PhantomMesh(
         mesh=body.mesh,
-        cells=cells,
+        cells=body.piece_cells.rows[order],
         parent=parent[order],
         fraction=body.piece_fraction.rows[order],
-        label=label,
-        node_parent=node_parent,
+        label=body.piece_label.rows[order],
+        node_parent=body.node_parent.rows.copy(),
         level_sets=level_sets,
-        node_side=node_sides(level_sets, node_parent, cells, label, sides),
-        sub_cells=sub_cells,
+        sub_cells=_GrownSubCells(body, number, used, level_sets),
         snapped=int(np.count_nonzero(level_sets == 0.0)),
         dropped=body.dropped,
     )

@@ -1,0 +1,77 @@
+"""Sides of the cuts (+1 or −1) on which pieces and dof nodes lie.
+
+The *label* of a piece has the sides of the cuts that split it off, 0 for the others. Its *side* of
+those is that of its centroid: a cut that leaves a piece of a split cell whole may have all nodes of
+the cell on its other side. The side of a dof node is that of its pieces.
+"""
+
+import numpy as np
+
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
+
+
+def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats) -> Sides:
+    """Sides (p, cuts) of the cuts on which pieces lie.
+
+    Parameters
+    ----------
+    level_sets : (n, cuts) float array
+        At the nodes of the mesh, in metres.
+    corners : (p, d + 1) int array
+        Nodes of the cell of each piece.
+    label : (p, cuts) int8 array
+    weights : (p, d + 1) float array
+        Barycentric coordinates of the centroids, up to a positive factor.
+    """
+    # φ(centroid) = Σ_i λ_i φ_i
+    level = np.einsum("pi,pic->pc", weights, level_sets[corners])
+    return np.where(label != 0, label, np.where(level >= 0.0, 1, -1)).astype(np.int8)
+
+
+def node_sides(
+    level_sets: Floats,
+    node_parent: Ints,
+    cells: Ints,
+    label: Sides,
+    piece_side: Sides,
+    share: Floats,
+) -> Sides:
+    """Sides (N, cuts) of the cuts on which the material of each dof node lies.
+
+    It is that of its labelled pieces if they agree. Where no cut has split them, or they lie
+    around the end of it, it is that of the node for the dof node of the node's own material. A dof
+    node beyond another cut lies where its pieces do, not where its node is.
+
+    Parameters
+    ----------
+    level_sets : (n, cuts) float array
+        At the nodes of the mesh, in metres.
+    node_parent : (N,) int array
+        Node of each dof node.
+    cells : (p, d + 1) int array
+        Dof nodes of each piece.
+    label, piece_side : (p, cuts) int8 array
+    share : (p,) float array
+        Volume over that of the cell; 0 for whole cells, which have no vote.
+    """
+    side = np.empty((len(node_parent), label.shape[1]), dtype=np.int8)
+    # where a node's own material has no volume, its number is of an unknown beyond a cut
+    own = np.zeros(len(node_parent), dtype=bool)
+    own[cells[(label[:, None] * level_sets[node_parent[cells]] >= 0.0).all(axis=2)]] = True
+    voters = np.flatnonzero(share)
+    nodes = cells[voters].ravel()
+    for cut in range(label.shape[1]):
+        above, below = (_at_any(cells[sign * label[:, cut] > 0], len(side)) for sign in (1, -1))
+        weight = np.repeat(share[voters] * piece_side[voters, cut], cells.shape[1])
+        vote = np.bincount(nodes, weight, minlength=len(node_parent))
+        level = level_sets[node_parent, cut]
+        # a node exactly on the cut has its material where its pieces are
+        told = np.where((vote == 0.0) | (own & (level != 0.0)), level, vote)
+        side[:, cut] = np.where(above != below, np.where(above, 1, -1), np.where(told >= 0, 1, -1))
+    return side
+
+
+def _at_any(cells: Ints, count: int) -> Bools:
+    found = np.zeros(count, dtype=bool)
+    found[cells] = True
+    return found
