@@ -135,6 +135,6 @@ def _of_the_cut(phantom: PhantomMesh) -> list[Regularisation]:
                 phantom.dropped,
                 ROUND_OFF_SHARE,
                 "volume fraction",
-            )  # fmt: skip
+            )
         )
     return entries
