@@ -53,7 +53,7 @@ class TreatedBody(NamedTuple):
 
 
 def treated_body(phantom, policy="merge", held=None):
-    treated, report = treat_slivers(phantom, policy, held=held)
+    treated, report = treat_slivers(phantom, policy, supported=held)
     force = InternalForce(treated, material(phantom.mesh.dim))
     return TreatedBody(treated, force, side_wise_mass(treated, DENSITY), report)
 

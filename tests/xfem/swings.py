@@ -46,7 +46,7 @@ def uniform(points):
 
 def aggregated(phantom):
     """The body and the report of the default sliver policy, held where `let_go` holds it."""
-    return treat_slivers(phantom, held=phantom.node_points[:, 0] < 1e-9)
+    return treat_slivers(phantom, supported=phantom.node_points[:, 0] < 1e-9)
 
 
 def let_go(phantom, share, steps, every=10, start=stretched):

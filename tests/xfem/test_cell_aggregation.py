@@ -28,7 +28,7 @@ def aggregated(phantom, nodes=()):
     """Default policy, with a support at some nodes of the uncut mesh."""
     held = np.zeros(len(phantom.mesh.points), dtype=bool)
     held[np.asarray(nodes, dtype=int)] = True
-    return treat_slivers(phantom, held=held[phantom.node_parent])
+    return treat_slivers(phantom, supported=held[phantom.node_parent])
 
 
 def mesh_of(dim, count, seed):
@@ -98,7 +98,7 @@ def test_the_patch_test_holds_without_values_on_slivers(dim, count):
         phantom = cut_mesh(mesh, [cut])
         field = stretched_sides(cut, random)
         far = np.abs(mesh.points[:, -1] - 0.5) > 0.5 - 1e-9
-        treated, _ = treat_slivers(phantom, held=far[phantom.node_parent])
+        treated, _ = treat_slivers(phantom, supported=far[phantom.node_parent])
         supports = Supports.none(treated).prescribe(treated, far, field)
         # what the exact stress asks of the other nodes: internal forces of the uncut policy
         everywhere = field(phantom.node_points, phantom.node_side)
@@ -222,7 +222,7 @@ def test_the_condition_number_without_scaling_is_bounded(dim):
     for size in (0.3, 1e-1, 1e-2, 1e-4, 1e-8, 1e-12, 0.0, -1e-12, -1e-8, -1e-4):
         phantom = near_nodes(dim, size)
         ends = phantom.node_points[:, -1] % 1.0 < 1e-9
-        treated, _ = treat_slivers(phantom, held=ends)
+        treated, _ = treat_slivers(phantom, supported=ends)
         assert condition(treated) < 20.0 * uncut
     assert condition(near_nodes(dim, 1e-4)) > 1e4 * uncut
 
@@ -235,7 +235,7 @@ def test_prescribed_values_on_slivers_are_what_they_are(policy):
     tip = (mesh.points > 0.87).all(axis=1) & (mesh.points[:, 1] == 1.0)
     base = mesh.points[:, 1] == 0.0
     held = (tip | base)[phantom.node_parent]
-    treated, report = treat_slivers(phantom, policy, held=held)
+    treated, report = treat_slivers(phantom, policy, supported=held)
     assert (report.aggregated > 0) == (policy == "merge")
     supports = Supports.none(treated).prescribe(treated, base)
     supports = supports.prescribe(treated, tip, lambda x, side: 0.01 * x)
@@ -291,7 +291,7 @@ def test_static_equilibrium_at_large_rotation_is_that_of_the_kept_slivers_but_fo
         force = InternalForce(treated, SOFT[dim])
         return static_equilibrium(force, supports.fixed, prescribed, load, 4).energy
 
-    treated, report = treat_slivers(phantom, held=ends[phantom.node_parent])
+    treated, report = treat_slivers(phantom, supported=ends[phantom.node_parent])
     assert report.aggregated > 0
     kept, found = energy(phantom), energy(treated)
     assert found == pytest.approx(kept, rel=report.volume_share)

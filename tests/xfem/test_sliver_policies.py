@@ -43,7 +43,7 @@ def test_the_halves_stay_separate(dim, size, policy):
 def solved_f3(mesh, policy):
     phantom = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
     ends = np.isin(np.arange(len(mesh.points)), boundary_nodes(mesh))
-    treated, report = treat_slivers(phantom, policy, held=ends[phantom.node_parent])
+    treated, report = treat_slivers(phantom, policy, supported=ends[phantom.node_parent])
 
     def field(points, sides):
         plane = exact.f3(points[:, :2], sides)

@@ -9,7 +9,7 @@ from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.supports_of_scene import supports_of
 from verify.xfem.errors import XfemError
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.slivers import join_specks
+from verify.xfem.slivers import join_fragments
 from verify.xfem.supports import UnsupportedBodyError, check_bodies
 
 _NODES = 3000  # of the mesh on which it is looked: cut in 0.1 s
@@ -32,7 +32,7 @@ def check_pieces_are_held(scene: Scene, exact: object) -> None:
     ]
     try:
         phantom = cut_mesh(mesh, cuts)
-        phantom, _ = join_specks(phantom, supports_of(scene, phantom, exact))
+        phantom, _ = join_fragments(phantom, supports_of(scene, phantom, exact))
         check_bodies(phantom, supports_of(scene, phantom, exact))
     except UnsupportedBodyError as error:
         apart = mesh_warning(scene)

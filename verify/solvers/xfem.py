@@ -26,7 +26,7 @@ from verify.system import System
 from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.slivers import join_specks, treat_slivers
+from verify.xfem.slivers import join_fragments, treat_slivers
 
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _CHOICES: Mapping[str, Collection[str]] = {
@@ -179,12 +179,12 @@ def _cut(
     policy: Any = given.slivers
     asked = to_cut(mesh, cuts_of(scene, size), given.tip)
     phantom = cut_mesh(asked.mesh, asked.cuts, asked.rule)
-    phantom, specks = join_specks(phantom, supports_of(scene, phantom, exact))
+    phantom, fragments = join_fragments(phantom, supports_of(scene, phantom, exact))
     report = None
     if policy in ("merge", "drop"):
         held = supports_of(scene, phantom, exact).fixed.any(axis=1)
-        phantom, report = treat_slivers(phantom, policy, held=held)
-    return phantom, report, [*asked.done, *joined(specks)]
+        phantom, report = treat_slivers(phantom, policy, supported=held)
+    return phantom, report, [*asked.done, *joined(fragments)]
 
 
 def _check_penalty(scene: Scene, mass: str) -> None:

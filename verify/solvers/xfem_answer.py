@@ -15,7 +15,7 @@ from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.slivers import SliverReport, Specks
+from verify.xfem.slivers import Fragments, SliverReport
 from verify.xfem.subdivision import Subdivision, extrapolation, subdivide
 
 
@@ -96,12 +96,12 @@ def treated(report: SliverReport | None) -> list[Regularisation]:
     ]
 
 
-def joined(specks: Specks) -> list[Regularisation]:
+def joined(fragments: Fragments) -> list[Regularisation]:
     """Report loose parts of round-off size that move with their neighbours."""
-    if not specks.count:
+    if not fragments.count:
         return []
     kind = "loose part of round-off size joined to its neighbour"
-    return [Regularisation(kind, specks.count, specks.largest, "volume fraction")]
+    return [Regularisation(kind, fragments.count, fragments.largest, "volume fraction")]
 
 
 def springs_left_out(force: InternalForce) -> list[Regularisation]:
@@ -131,7 +131,7 @@ def _of_the_cut(phantom: PhantomMesh) -> list[Regularisation]:
     if phantom.dropped:
         entries.append(
             Regularisation(
-                "part of round-off size left to its neighbour",
+                "piece within round-off of its cell left to its neighbour",
                 phantom.dropped,
                 ROUND_OFF_SHARE,
                 "volume fraction",

@@ -79,7 +79,7 @@ class XfemOpening:
         policy: Any = self.cutting.slivers
         if policy in ("merge", "drop"):
             held = motion_of_supports(self.scene, phantom, self.exact).fixed.any(axis=1)
-            phantom, report = treat_slivers(phantom, policy, held=held)
+            phantom, report = treat_slivers(phantom, policy, supported=held)
             self._slivers = treated(report)
         return phantom
 

@@ -179,7 +179,9 @@ class AggregatedMass(Mass):
         return found
 
 
-def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Bools, Bools]:
+def aggregate(
+    phantom: PhantomMesh, small: Bools, supported: Bools
+) -> tuple[PhantomMesh, Bools, Bools]:
     """Let nodes that only small pieces use follow root cells.
 
     Parameters
@@ -187,8 +189,8 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
     phantom : PhantomMesh
         Without aggregation.
     small : (p,) bool array
-    held : (N,) bool array
-        Dof nodes that keep their unknown, such as those that a support holds.
+    supported : (N,) bool array
+        Dof nodes that keep their unknown, those of supports.
 
     Returns
     -------
@@ -201,7 +203,7 @@ def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomM
     """
     alone = np.ones(phantom.node_count, dtype=bool)
     alone[phantom.cells[~small]] = False
-    alone &= ~held
+    alone &= ~supported
     sliver, root = _reached(phantom, small)
     node, weights, cell = _continued(phantom, alone, sliver, root)
     followed = np.full(phantom.node_count, -1)

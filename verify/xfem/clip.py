@@ -199,6 +199,7 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
     at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
     kind, a, b = np.moveaxis(stairs.factors[entry], 2, 0)
     with np.errstate(divide="ignore", invalid="ignore"):  # pairs on one side, which no entry uses
+        # z_pm = s p + r m on the edge of p, above, and m, below; f = Π r s along each path
         r = level[:, :, None] / (level[:, :, None] - level[:, None, :])
         s = -level[:, None, :] / (level[:, :, None] - level[:, None, :])
         diagonal = np.arange(ids.shape[1])

@@ -5,6 +5,7 @@ to the faces of the cell. The result is a cut mesh like any other.
 """
 
 from dataclasses import replace
+from math import factorial
 
 import numpy as np
 from scipy.sparse import csr_array, triu
@@ -55,7 +56,9 @@ def sibling_contacts(phantom: PhantomMesh, cells: Ints) -> tuple[Ints, Ints, Flo
     facets, first, second = facets_between(phantom.parent, sub.piece[rows], sub.points[rows])
     at = sub.zero_points.positions[facets]
     edges = at[:, 1:] - at[:, :1]
+    # A = √det(E Eᵀ)/(d − 1)! with the edges E of the facet
     area = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0))
+    area /= factorial(edges.shape[1])
     return np.concatenate([first, second]), np.concatenate([second, first]), np.tile(area, 2)
 
 

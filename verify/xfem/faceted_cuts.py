@@ -216,6 +216,7 @@ def _foot(points: Floats, facets: FacetArrays) -> _Foot:
     facet, weights, square = _nearest(points, facets.corners)
     part = (weights == 0.0) @ (1 << np.arange(weights.shape[1]))
     normal, rim = facets.part_normals[facet, part], facets.part_rim[facet, part]
+    # x − y with the nearest point y = Σ_k w_k c_k; φ = (x − y)·n beside a face or past the rim
     off = points - np.einsum("nk,nki->ni", weights, facets.corners[facet])
     along = np.einsum("ni,ni->n", off, normal)
     distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)

@@ -121,10 +121,11 @@ class SimplexMesh:
     @cached_property
     def gradients(self) -> Floats:
         """(m, dim + 1, space) gradients of the linear shape functions, in 1/m."""
+        # E_jk (∇N_i)_k = δ_ij with the edges E from the first node; Σ_j ∇N_j = 0
         edges = self.edge_vectors
         if self.dim == self.space:
             others = np.linalg.inv(edges).transpose(0, 2, 1)
-        else:
+        else:  # ∇N_1 = e_2 × n / |n|², ∇N_2 = n × e_1 / |n|² with n = e_1 × e_2
             across = self._across / np.sum(self._across**2, axis=1)[:, None]
             others = np.stack(
                 [np.cross(edges[:, 1], across), np.cross(across, edges[:, 0])], axis=1

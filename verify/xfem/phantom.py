@@ -222,6 +222,7 @@ class PhantomMesh:
     @cached_property
     def shape_integrals(self) -> Floats:
         """(p, d + 1) exact integrals of the shape functions over the pieces, in m^d."""
+        # ∫ N_i dV = V Σ_s f_s λ̄_i(s): share and mean barycentric coordinates of sub-simplex s
         corners = self.cells.shape[1]
         integrals = np.repeat(self.volumes[:, None] / corners, corners, axis=1)
         integrals[self.split] = 0.0
@@ -233,6 +234,7 @@ class PhantomMesh:
     @cached_property
     def piece_centroids(self) -> Floats:
         """(p, space) centroid of each piece, in metres."""
+        # x̄ = Σ_i x_i ∫ N_i dV / V
         weights = self.shape_integrals / self.volumes[:, None]
         return np.einsum("pi,pij->pj", weights, self.mesh.points[self.mesh.cells[self.parent]])
 

@@ -17,9 +17,9 @@ policies do:
 Ghost penalties are another remedy, see `verify.xfem.ghost_penalty`; measurements in
 ``docs/theory/slivers.md``.
 
-A speck is a loose part of a thousandth of an element across: cuts that should meet in a point miss
-it by a little, and enclose a part that nothing holds. That is no material that anybody meant to cut
-out: it moves with the largest piece of its element, and is counted (`join_specks`).
+A fragment is a loose part of less than a thousandth of an element across: cuts that should meet in
+a point miss it by a little, and enclose a part without support. Nobody meant to cut it out: it
+moves with the largest piece of its element, and is counted (`join_fragments`).
 """
 
 from dataclasses import dataclass
@@ -41,8 +41,8 @@ SliverPolicy = Literal["keep", "drop", "merge"]
 DEFAULT_POLICY: SliverPolicy = "merge"
 DEFAULT_THRESHOLD = 0.1
 
-# Size across over that of an element, below which a loose part is a speck. Its volume is below the
-# power d of this, which changes the energy of a body by less than a solution is accurate to.
+# Size across over that of an element, below which a loose part is a fragment. Its volume is below
+# the power d of this, which changes the energy of a body by less than a solution is accurate to.
 _ACROSS = 1e-3
 
 
@@ -90,7 +90,7 @@ def treat_slivers(
     phantom: PhantomMesh,
     policy: SliverPolicy = DEFAULT_POLICY,
     threshold: float = DEFAULT_THRESHOLD,
-    held: Bools | None = None,
+    supported: Bools | None = None,
 ) -> tuple[PhantomMesh, SliverReport]:
     """Apply a sliver policy to a cut mesh.
 
@@ -101,7 +101,7 @@ def treat_slivers(
     policy : {"keep", "drop", "merge"}
     threshold : float
         Volume fraction in (0, ½) below which a piece is a sliver.
-    held : (N,) bool array, optional
+    supported : (N,) bool array, optional
         Dof nodes that a support is going to hold. Aggregation leaves them their unknown, so
         that a prescribed value is what they have; elsewhere a root decides.
 
@@ -113,7 +113,7 @@ def treat_slivers(
     Raises
     ------
     XfemError
-        If the policy is unknown, the threshold outside its bounds, or `held` of another body.
+        If the policy is unknown, the threshold outside its bounds, or `supported` of another body.
 
     Examples
     --------
@@ -128,11 +128,13 @@ def treat_slivers(
     if not (isinstance(threshold, float | np.floating) and 0.0 < threshold < 0.5):
         raise XfemError(f"sliver threshold {threshold!r}; expected a volume fraction in (0, 0.5)")
     phantom = phantom.corners
-    kept_nodes = np.zeros(phantom.node_count, dtype=bool) if held is None else np.asarray(held)
+    kept_nodes = (
+        np.zeros(phantom.node_count, dtype=bool) if supported is None else np.asarray(supported)
+    )
     if kept_nodes.shape != (phantom.node_count,) or kept_nodes.dtype != bool:
         raise XfemError(
-            f"held nodes: {kept_nodes.dtype} array of shape {kept_nodes.shape}; expected bool and "
-            f"({phantom.node_count},)"
+            f"supported nodes: {kept_nodes.dtype} array of shape {kept_nodes.shape}; expected "
+            f"bool and ({phantom.node_count},)"
         )
     small = phantom.part_fraction < threshold
     # a cell of many pieces keeps its largest one whatever its size
@@ -218,8 +220,8 @@ def _siblings(phantom: PhantomMesh, small: Bools) -> Ints:
 
 
 @dataclass(frozen=True)
-class Specks:
-    """Specks that were joined to their neighbours.
+class Fragments:
+    """Fragments that were joined to their neighbours.
 
     Attributes
     ----------
@@ -232,7 +234,7 @@ class Specks:
     largest: float
 
 
-def join_specks(phantom: PhantomMesh, supports: Supports) -> tuple[PhantomMesh, Specks]:
+def join_fragments(phantom: PhantomMesh, supports: Supports) -> tuple[PhantomMesh, Fragments]:
     """Join loose parts of less than a thousandth of an element across to the pieces beside them.
 
     Parameters
@@ -245,21 +247,21 @@ def join_specks(phantom: PhantomMesh, supports: Supports) -> tuple[PhantomMesh, 
     Returns
     -------
     phantom : PhantomMesh
-        The same object if there is no speck.
-    specks : Specks
+        The same object if there is no fragment.
+    fragments : Fragments
     """
     body = phantom.bodies[phantom.cells[:, 0]]
     share = np.bincount(body, phantom.fraction)
     small = np.flatnonzero(share <= _ACROSS**phantom.mesh.dim)
-    specks = loose_bodies(phantom, supports, small)
-    if not len(specks):
-        return phantom, Specks(0, 0.0)
-    is_speck = np.isin(body, specks)
-    # the largest piece of each cell comes first; it is no speck, as fractions add up to one
+    fragments = loose_bodies(phantom, supports, small)
+    if not len(fragments):
+        return phantom, Fragments(0, 0.0)
+    is_fragment = np.isin(body, fragments)
+    # the largest piece of each cell comes first; it is no fragment, as fractions add up to one
     order = np.lexsort([-phantom.fraction, phantom.parent])
     first = order[np.diff(phantom.parent[order], prepend=-1) != 0]
     largest = np.empty(len(phantom.mesh.cells), dtype=np.int64)
     largest[phantom.parent[first]] = first
     into = np.arange(len(body))
-    into[is_speck] = largest[phantom.parent[is_speck]]
-    return absorb(phantom, into)[0], Specks(len(specks), float(share[specks].max()))
+    into[is_fragment] = largest[phantom.parent[is_fragment]]
+    return absorb(phantom, into)[0], Fragments(len(fragments), float(share[fragments].max()))

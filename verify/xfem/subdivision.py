@@ -64,7 +64,8 @@ def subdivide(phantom: PhantomMesh) -> Subdivision:
     simplices = _conforming(phantom)
     piece, ids, barycentric = simplices.piece, simplices.points, simplices.barycentric
 
-    # a mesh node moves with one unknown, a point of the cut with those of its edge
+    # u(z) = Σ_i λ_i(z) u_i: a mesh node moves with one unknown, a point of the cut with those of
+    # its edge
     unknowns = phantom.cells[piece]
     row, corner = np.nonzero(ids >= len(mesh.points))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
@@ -125,6 +126,7 @@ def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
     shares = np.zeros(shape)
     if len(beyond):  # of no entries SciPy returns a matrix
         shares[:] = interpolation[rows, columns].reshape(shape)
+    # in each cell u(z_k) = Σ_i λ_i(z_k) u_i, hence u_i = Σ_k (Λ⁻¹)_ik u(z_k)
     cell, local = np.nonzero(unknown[dofs])
     order = np.argsort(np.abs(np.linalg.det(shares))[cell], kind="stable")
     largest = np.full(phantom.node_count, -1)

@@ -97,7 +97,7 @@ class Supports:
         if mark[following].any():
             raise XfemError(
                 f"{int(mark[following].sum())} nodes of slivers at supported nodes follow a root "
-                "cell, so that no value can be prescribed there; say held= to the sliver policy"
+                "cell, so that no value can be prescribed there; see `treat_slivers`: supported"
             )
         at = np.flatnonzero(mark[phantom.node_parent])
         axes = range(dim) if components is None else components
