@@ -107,8 +107,11 @@ def patch_error(phantom):
 
 
 def surprises(dim, seeds):
-    """Seeds of bodies with other zero modes than rigid ones, with a patch test above 1e-8, and
-    with other parts if they are cut step by step; and the least share of a piece in its cell.
+    """Seeds of bodies with other zero modes than rigid ones, with a wrong patch test, and with
+    other parts if they are cut step by step; and the least share of a piece in its cell.
+
+    Where supports hold a body by a piece of share w only, round-off of its other stiffness is to
+    that of the hold as 2⁻⁵² to w: so many digits are lost, and no more.
     """
     modes, patches, steps, least = [], [], [], 1.0
     for seed in seeds:
@@ -120,7 +123,7 @@ def surprises(dim, seeds):
         assert phantom.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
         if zero_modes(phantom)[0] != RIGID[dim] * (phantom.bodies.max() + 1):
             modes.append(seed)
-        if patch_error(phantom) > 1e-8:
+        if patch_error(phantom) > max(1e-8, ROUND_OFF_SHARE / phantom.fraction.min()):
             patches.append(seed)
         once = bodies_and_parts(phantom)
         grown = bodies_and_parts(step_by_step(mesh, paths, rng.choice([2, 5])))
