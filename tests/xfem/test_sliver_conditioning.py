@@ -152,7 +152,7 @@ def test_a_ghost_penalty_keeps_the_explicit_step_only_with_its_mass(dim):
     """With its mass the penalty's own waves are no faster than those of the elements."""
     uncut = cut_mesh(body(dim, 0.5).mesh, [])
     whole = critical_step(csr_array(sparse_stiffness(uncut)), side_wise_mass(uncut, 1.0))
-    for size in (0.5, 1e-2, 1e-4, 1e-8):
+    for size in (0.5, 1e-2, 1e-4, 1e-7):
         phantom = body(dim, size)
         ghost = GhostPenalty(phantom, isotropic(1.0, 0.3, "plane strain"), 0.01)
         lumped = side_wise_mass(phantom, 1.0)
@@ -160,7 +160,7 @@ def test_a_ghost_penalty_keeps_the_explicit_step_only_with_its_mass(dim):
         with_mass = ghost.mass(lumped, 1.0)
         assert critical_step(stiffness, with_mass) > 0.99 * whole
         assert with_mass.matrix.sum() == pytest.approx(1.0, rel=1e-12)
-    assert critical_step(stiffness, lumped) < 1e-6 * whole
+    assert critical_step(stiffness, lumped) < 1e-5 * whole
 
 
 def test_a_ghost_penalty_costs_less_than_half_a_percent_of_accuracy_and_nothing_if_linear():
