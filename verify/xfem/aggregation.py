@@ -111,11 +111,11 @@ class AggregatedPattern(BlockPattern):
 
     @property
     def corners(self) -> BlockPattern:
-        """That of K, to which elements add."""
+        """Sparsity of K, to which elements add."""
         return self.of_corners
 
     def unfold(self, blocks: Floats) -> Floats:
-        """Zero blocks of K."""
+        """Return zero blocks of K."""
         return np.zeros((self.folding.shape[1], *blocks.shape[1:]))
 
     def fold(self, added: Floats, blocks: Floats) -> None:

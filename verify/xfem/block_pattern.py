@@ -36,15 +36,15 @@ class BlockPattern:
 
     @property
     def corners(self) -> "BlockPattern":
-        """Sparsity of what elements add up: this one, unless some corners follow others."""
+        """Sparsity of the corners of cells: this one, unless some corners follow others."""
         return self
 
     def unfold(self, blocks: Floats) -> Floats:
-        """Room for the blocks of `corners`, zero or filled: these if the pattern is their own."""
+        """Return an array for the blocks of `corners`: the given one, or zeros for others."""
         return blocks
 
     def fold(self, added: Floats, blocks: Floats) -> None:
-        """Add to the blocks (B, d, d) what elements have added to that room."""
+        """Add what elements have added to the array of `unfold` to the blocks (B, d, d)."""
 
     @property
     def node_count(self) -> int:
@@ -131,7 +131,7 @@ def _pattern(cells, first, around):
 
 
 def _order(keys: NDArray, count: int) -> _Places:
-    """Stable order of keys in 0…count − 1: a transposition counts, and does not compare."""
+    """Stable order of keys in 0…count − 1, in linear time by transposing a sparse matrix."""
     rows = np.arange(len(keys) + 1)
     matrix = csr_array((np.zeros(len(keys), np.int8), keys, rows), shape=(len(keys), count))
     order: _Places = matrix.tocsc().indices.astype(np.int32)

@@ -174,7 +174,7 @@ class DynamicBody:
         self._hold(self.supports)
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Let load, weight and damping be replaced; not what the sparsity and the like come from.
+        """Let load, weight and damping be replaced, but not supports, force and mass.
 
         Raises
         ------
@@ -299,7 +299,7 @@ class Integrator(Protocol):
 
 
 def check_step(step_size: float) -> float:
-    """Return the step size, if it is one.
+    """Check a step size, and return it.
 
     Raises
     ------

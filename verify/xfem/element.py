@@ -26,7 +26,7 @@ _SINGULAR = 1e-8  # determinant over the power of the trace: a rotation without 
 
 
 class Elements(NamedTuple):
-    """What the loops over the cells of a cut body read.
+    """Cells of a cut body, as the loops over them read them.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ def add_moduli(elements, A, scale, targets, blocks):
 
 
 def restricted(elements: Elements) -> Floats:
-    """Projections (p, d, d) on the tangent plane of membranes; one identity of other bodies."""
+    """Project on the tangent plane of membranes, (p, d, d); the identity (1, d, d) for solids."""
     identity = np.eye(len(elements.axes))[None]
     if not elements.is_membrane:
         return identity
@@ -243,7 +243,7 @@ def restricted(elements: Elements) -> Floats:
 
 
 def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floats, Bools]:
-    """∂R/∂F (p, d, d, d, d) of nearest rotations; zero, and listed as such, where there is none.
+    """Return ∂R/∂F (p, d, d, d, d) of nearest rotations; zero where there is none.
 
     With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b,
     H = tr(U) I − U in space and tr(U) in the plane.

@@ -15,7 +15,7 @@ from verify.xfem.static_newton import ROUND_OFF, Newton, NotInEquilibriumError
 from verify.xfem.supports import check_fixed
 
 _HALVINGS = 6  # of a load step
-_FURTHER = 2  # of them, to compare with a step that has converged
+_COMPARED = 2  # of them, on a second path
 _SAMPLES = 16  # places of the supports on the whole path that are looked at beforehand
 _MOST_STRAIN = 0.5  # root mean square of held edges: parts of a body turn by 58° against each other
 _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
@@ -25,7 +25,7 @@ _MOST_WAYS_OUT = 4
 
 
 class PathCheck(NamedTuple):
-    """What an equilibrium was checked by.
+    """Checks that an equilibrium has passed.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class PathCheck(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """State (N, d) at the end of a step, and what it is judged by."""
+    """State (N, d) at the end of a load step, and its energies."""
 
     displacement: Floats
     corrections: int
@@ -104,7 +104,7 @@ class LoadPath:
         return turned if straight else prescribed
 
     def check(self) -> PathCheck:
-        """Sum up what has been done so far."""
+        """Return the checks so far."""
         return PathCheck(self._stable, self._compared, tuple(self._dismissed))
 
     def follow(self, displacement: Floats, parts: int) -> tuple[Floats, tuple[int, ...]]:
@@ -150,7 +150,7 @@ class LoadPath:
         )
 
     def _advance(self, start: Floats, since: float, until: float, room: int) -> list[_Step]:
-        """Take steps from a state at one load factor to another, in as few parts as count."""
+        """Take steps from one load factor to another, halved as often as the checks ask for."""
         middle = 0.5 * (since + until)
 
         def halves(room: int) -> list[_Step]:
@@ -173,13 +173,13 @@ class LoadPath:
             return [whole]
         self._compared += 1
         try:
-            path = halves(min(room - 1, _FURTHER))
+            path = halves(min(room - 1, _COMPARED))
         except NotInEquilibriumError as error:
             raise self._refusal(whole, until, f"in two halves: {error}") from None
         return self._better(whole, path)
 
     def _better(self, whole: _Step, path: list[_Step]) -> list[_Step]:
-        """Of two paths to one load factor, that to the lower potential energy."""
+        """Choose the path to the lower potential energy of two to one load factor."""
         other = path[-1]
         near = _SAME * max(whole.energy, other.energy) + self._floor()
         if abs(whole.energy - other.energy) <= near:

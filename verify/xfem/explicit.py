@@ -22,7 +22,7 @@ from verify.xfem.errors import XfemError
 
 
 class _Explicit:
-    """Accelerations of a body, and the end of a step: what the schemes have in common."""
+    """Base of the schemes: accelerations of a body, and the end of a step."""
 
     def __init__(self, body: DynamicBody, step_size: float) -> None:
         """Prepare a body and a step in seconds."""
@@ -103,7 +103,7 @@ class CentralDifferences(_Explicit):
         self._end: tuple[MotionState, Floats, StepForces] | None = None
 
     def _start(self, state: MotionState) -> tuple[Floats, StepForces]:
-        """Acceleration at the start: that at the end of the last step, if it goes on from there."""
+        """Acceleration at the start, reused from the last step if this one continues it."""
         if self._end is not None and self.body.damping == RayleighDamping():
             end, acceleration, forces = self._end
             goes_on = end.time == state.time and np.array_equal(

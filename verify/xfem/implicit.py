@@ -50,7 +50,7 @@ class Resistance(NamedTuple):
 
 
 class Iterate(NamedTuple):
-    """A guess of the end of a step, and what is left of its equation.
+    """An iterate of Newton's method: a guess of the end of a step, and its residual.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class NewtonIntegrator(ABC):
 
     @abstractmethod
     def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
-        """Return the forces of a step that ends like this."""
+        """Return the forces in the balance of a step with this end."""
 
     def _prepare(self) -> None:  # noqa: B027
         """Evaluate what is needed of the start of the step; nothing by default."""
@@ -143,7 +143,7 @@ class NewtonIntegrator(ABC):
         return self.body.external(time - _JUST * self.step_size)
 
     def _resistance(self, displacement: Floats) -> Resistance:
-        """Resistance of a step that ends like this, with its derivative if one pass finds both."""
+        """Evaluate the internal force of a step that ends there."""
         body, force = self.body, self.body.force
         if not (force.has_one_pass and force.is_corotational):
             at = force.configuration(displacement)
@@ -156,7 +156,7 @@ class NewtonIntegrator(ABC):
         return self._by_one_pass(displacement, found)
 
     def _by_one_pass(self, displacement: Floats, force: Floats) -> Resistance:
-        """Resistance whose derivative is in the blocks; damping wants rotations too."""
+        """Return a force whose derivative is in the blocks; damping needs rotations too."""
         damped = self.body.damping.stiffness > 0.0
         at = self.body.force.configuration(displacement) if damped else None
         return Resistance(displacement, force, at, self._blocks)
@@ -302,7 +302,7 @@ class NewtonIntegrator(ABC):
         return float(np.linalg.norm(np.maximum(left, 0.0)))
 
     def _why(self, displacement: Floats, leaps: int) -> str:
-        """Say what stood in the way of Newton's method."""
+        """Explain why Newton's method failed."""
         if not np.isfinite(displacement).all():
             return "The iterates left the finite numbers: the step is far too long"
         force = self.body.force

@@ -35,7 +35,7 @@ _CHUNK = 512  # cells whose moduli are held at once
 
 
 class Configuration(NamedTuple):
-    """Cells of a body at a displacement.
+    """Deformation of the cells of a body at a displacement.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class InternalForce:
         return self.evaluate_at(self.configuration(displacement), out)
 
     def evaluate_at(self, at: Configuration, out: Floats | None = None) -> tuple[Floats, float]:
-        """As `evaluate`, with the rotations at hand."""
+        """As `evaluate`, for a configuration."""
         force = np.empty(self._shape) if out is None else out
         self._check(force=force)
         force[:] = 0.0
@@ -355,7 +355,7 @@ class InternalForce:
         whole: bool = True,
         rotational: float = 0.0,
     ) -> Configuration | None:
-        """Overwrite force and stiffness as an implicit step wants them.
+        """Overwrite force and stiffness of an implicit step.
 
         Parameters
         ----------

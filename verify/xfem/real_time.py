@@ -108,11 +108,11 @@ class RealTimeEuler:
         return at
 
     def _solve(self) -> None:
-        """Write the change of velocity; an iterative solver starts from where the last three point.
+        """Write the change of velocity; iterations start from a parabola through the last three.
 
-        A parabola through them takes one iteration in five off steps of a millisecond, one in
-        eight off those of ten, and adds one in twenty where steps are so long that nothing goes on
-        as it was (measured with the bodies of the benchmarks).
+        That takes one iteration in five off steps of a millisecond, one in eight off those of ten,
+        and adds one in twenty where steps are so long that nothing goes on as it was (measured
+        with the bodies of the benchmarks).
         """
         last, before, first = self._changes
         self._change[:] = 3.0 * (last - before) + first
@@ -155,7 +155,7 @@ class RealTimeEuler:
         return np.where(body.fixed[nodes], change, 0.0)
 
     def _support(self, driven: Floats) -> None:
-        """Let fixed components move as prescribed: what that does to others is a load on them."""
+        """Prescribe the change of velocity of fixed components: a load on the others."""
         body, nodes = self.body, self._supported
         if driven.any():
             whole = np.zeros(body.shape)

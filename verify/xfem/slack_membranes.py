@@ -11,7 +11,7 @@ _TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
 
 
 class Descent(Newton):
-    """Down the potential energy of a membrane.
+    """Newton's method down the potential energy of a membrane.
 
     Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
     steps lower the energy. The consistent tangent follows where it is positive definite.
@@ -22,12 +22,12 @@ class Descent(Newton):
         self._least = _TAUT
 
     def _spread(self, start: Place, change: Floats) -> Floats:
-        """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
+        """Respond linearly to a prescribed change, as a taut membrane does."""
         self._least = _TAUT
         return self._solve(start, change, 0.0, self._least)
 
     def _next(self, place: Place, load: Floats) -> Place:
-        """Place further down; the same one with more tension if no way leads there."""
+        """Go down the energy; where no correction does, raise the least tension and stay."""
         correction = self._downhill(place)
         share = self._share_downhill(place, correction, load)
         if share == 0.0:
@@ -37,7 +37,7 @@ class Descent(Newton):
         return self.place(place.displacement + share * correction, load)
 
     def _downhill(self, place: Place) -> Floats:
-        """Correction along which the energy falls."""
+        """Solve for a correction along which the energy falls."""
         if self._least < _SLACK:
             try:
                 return self._solve(place, None, 1.0)

@@ -26,7 +26,7 @@ class NotInEquilibriumError(RuntimeError):
 
 
 class Place(NamedTuple):
-    """An iterate: displacement (N, d) in m, residual (N, d) in N and what both are judged by."""
+    """An iterate of Newton's method: displacement (N, d) in m, residual (N, d) in N, measures."""
 
     displacement: Floats
     residual: Floats
@@ -102,7 +102,7 @@ class Newton:
         )
 
     def _why(self, place: Place) -> str:
-        """Say what stood in the way, as far as it can be seen."""
+        """Explain why the iterations failed, where cells that have collapsed are the reason."""
         collapsed = collapsed_cells(self.force, place.displacement)
         if len(collapsed) == 0:
             return "More load steps may help"
@@ -113,7 +113,7 @@ class Newton:
         )
 
     def place(self, displacement: Floats, load: Floats) -> Place:
-        """Judge a displacement (N, d) under a load (N, d)."""
+        """Evaluate the equilibrium of a displacement (N, d) under a load (N, d)."""
         internal, energy = self.force.evaluate(displacement)
         scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
         potential = energy - float(np.vdot(load, displacement))
@@ -121,14 +121,14 @@ class Newton:
         return Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
 
     def _spread(self, start: Place, change: Floats) -> Floats:
-        """Spread the prescribed change with the stiffness before it."""
+        """Respond linearly to a prescribed change."""
         try:
             return self._solve(start, change, 1.0)
         except SingularStiffnessError:
             return self._solve(start, change, 0.0)
 
     def _next(self, place: Place, load: Floats) -> Place:
-        """Place with a smaller residual; if that is not a correction away, one further down."""
+        """Take a correction that lowers the residual, else part of one that lowers the energy."""
         leap = None
         for rotational in SHARES:
             try:
@@ -181,7 +181,7 @@ class Newton:
         return correction if change is None else correction + change
 
     def linearise(self, displacement: Floats, rotational: float, least: float = 0.0) -> bsr_array:
-        """Tangent (N d, N d) at a displacement, in the memory of the next one.
+        """Assemble the tangent (N d, N d) at a displacement, over that of the last call.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class Newton:
         return pattern.matrix(blocks)
 
     def inverse(self) -> StaticSolver:
-        """Solver with the tangent that was linearised last, and the supports.
+        """Factorise the tangent that was assembled last, with the supports.
 
         Raises
         ------

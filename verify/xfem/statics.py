@@ -191,7 +191,7 @@ class StaticSolver:
         self._first.factorize(blocks)
 
     def solve(self, load: Floats) -> Floats:
-        """Solve, by a factorisation if iterations that are not insisted on do not converge."""
+        """Solve; by a factorisation where iterations that are optional do not converge."""
         if self._iterative is not None:
             try:
                 found = self._iterative.solve(load)
