@@ -189,17 +189,13 @@ class FirstUse:
     ----------
     kernels : int
         Compilations; 0 if all were found in the cache.
-    stages : dict
-        Processor seconds of compilation by stage, in the order in which they were run: of later
-        ones only what earlier ones had not compiled.
     seconds : dict
-        The same by ``module:kernel``.
+        Processor seconds of compilation by ``module:kernel``.
     wall : float
         Seconds until all was done.
     """
 
     kernels: int
-    stages: dict[str, float]
     seconds: dict[str, float]
     wall: float
 
@@ -212,19 +208,17 @@ def compile_here(stages: list[str]) -> FirstUse:
     stages : list of str
         Of `STAGES`.
     """
-    begun, spent = perf_counter(), {}
+    begun = perf_counter()
     collecting = gc.isenabled()
     gc.disable()  # the compiler makes millions of objects that live on: 8 % of its time
     try:
         with compile_times() as times:
             for stage in stages:
-                before = times.whole
                 STAGES[stage]()
-                spent[stage] = times.whole - before
     finally:
         if collecting:
             gc.enable()
-    return FirstUse(times.kernels, spent, dict(times.seconds), perf_counter() - begun)
+    return FirstUse(times.kernels, dict(times.seconds), perf_counter() - begun)
 
 
 def compile_all() -> FirstUse:
@@ -250,7 +244,7 @@ def compile_all() -> FirstUse:
         )
         for share in _SHARES
     ]  # fmt: skip
-    kernels, stages = 0, {}
+    kernels = 0
     seconds: dict[str, float] = defaultdict(float)
     try:
         for process in running:
@@ -260,7 +254,6 @@ def compile_all() -> FirstUse:
                 raise FirstUseError(f"a kernel does not compile: {last[0]}")
             found = json.loads(said)
             kernels += found["kernels"]
-            stages.update(found["stages"])
             for kernel, spent in found["seconds"].items():
                 seconds[kernel] += spent
     except subprocess.TimeoutExpired:
@@ -269,7 +262,7 @@ def compile_all() -> FirstUse:
         for process in running:
             process.kill()
             process.wait()
-    return FirstUse(kernels, stages, dict(seconds), perf_counter() - begun)
+    return FirstUse(kernels, dict(seconds), perf_counter() - begun)
 
 
 if __name__ == "__main__":

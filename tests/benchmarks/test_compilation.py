@@ -57,7 +57,7 @@ def measure(cache, *stages):
 def in_units(found):
     whole = sum(found["seconds"].values())
     print(f"\n{found['kernels']} compilations, {whole:.1f} s, unit {found['unit']:.3f} s")
-    for name, seconds in [*found["stages"].items(), *found["seconds"].items()]:
+    for name, seconds in found["seconds"].items():
         if seconds > 0.01 * whole:
             print(f"{seconds:6.2f}  {name}")
     return whole / found["unit"]

@@ -40,12 +40,11 @@ def _compile(as_json: bool) -> int:
         return 0
     whole = sum(use.seconds.values())
     print(f"{use.kernels} compilations in {use.wall:.1f} s, {whole:.1f} s of processor time")
-    for title, spent in (("stage", use.stages), ("module", _by_module(use.seconds))):
-        if whole > 0.0:
-            print(f"\nseconds  {title}")
-        for name, seconds in spent.items():
-            if seconds >= 0.05:
-                print(f"{seconds:7.1f}  {name}")
+    if whole > 0.0:
+        print("\nseconds  module")
+    for name, seconds in _by_module(use.seconds).items():
+        if seconds >= 0.05:
+            print(f"{seconds:7.1f}  {name}")
     return 0
 
 
