@@ -83,14 +83,12 @@ def _check_every_piece_is_held(
 ) -> None:
     """Refuse a piece that its supports leave a rigid motion, naming the piece and the motion."""
     pieces = space.mesh.pieces
-    owner = np.zeros(len(value), dtype=np.int64)
-    owner[space.cell_nodes.ravel()] = np.repeat(pieces, space.cell_nodes.shape[1])
     node, component = np.nonzero(~np.isnan(value))
     for piece in range(pieces.max() + 1):
         corners = space.mesh.points[np.unique(space.mesh.cells[pieces == piece])]
         centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
         size = float(np.ptp(corners, axis=0).max())
-        mine = owner[node] == piece
+        mine = space.piece_of_node[node] == piece
         free = _free_motion(space.node_points[node[mine]] - centre, component[mine], size)
         if free:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Opening times of the facets of a mesh that conforms to all cuts of a scene."""
+"""When the facets of a mesh open that conforms to all cuts of a scene; meshes before and after."""
 
 from itertools import pairwise
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing import ConformingMesh, open_cut
+from reference.space import ConformingSpace
+from verify.errors import InputError
 from verify.scene import (
     ArcCut,
     CylinderCut,
@@ -66,6 +68,30 @@ def partly_opened(mesh: ConformingMesh, opened: NDArray[np.bool_]) -> Conforming
     points = np.empty((int(mesh.parent.max()) + 1, mesh.dimension))
     points[mesh.parent] = mesh.points
     return open_cut(points, mesh.parent[mesh.cells], mesh.cut_facets[opened])
+
+
+def inherit(closed: ConformingSpace, opened: ConformingSpace, field: Array) -> Array:
+    """Carry nodal values (n, d) over to the same mesh with more of its cuts open.
+
+    Every copy of a node starts with the value that the node had: nothing jumps when a cut
+    opens, so energy and momentum go on.
+
+    Raises
+    ------
+    InputError
+        If the two are not the same cells.
+    """
+    same = closed.cell_nodes.shape == opened.cell_nodes.shape and np.allclose(
+        closed.node_points[closed.cell_nodes],
+        opened.node_points[opened.cell_nodes],
+        rtol=0.0,
+        atol=1e-12 * float(np.ptp(closed.node_points, axis=0).max()),
+    )
+    if not same:
+        raise InputError("the opened mesh does not have the cells of the closed one")
+    values = np.empty((len(opened.node_points), field.shape[1]))
+    values[opened.cell_nodes] = field[closed.cell_nodes]
+    return values
 
 
 def _distance(cut: object, points: Array) -> Array:

@@ -1,4 +1,4 @@
-"""One implicit step of a body in motion, solved to the end, for every scheme of the family."""
+"""One implicit step of a body in motion, by generalised-α, Newmark or implicit Euler."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.dynamics import Scheme
 from reference.dynamics_body import MovingBody
 from reference.nodal_algebra import NodalSolver
 from reference.ties import TiedSolver
+from verify.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,44 @@ _SHORTEST = 1e-2  # share of a correction
 _MOST_LEAPS = 3
 _SLOW = 0.1  # a factorisation that contracts the residual by less is made anew
 _JUST = 1e-12  # of the step: loads are taken that much inside of it, on their side of a jump
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Parameters of one-step schemes with one unknown acceleration a₊.
+
+    M a_{n+1−α_m} + C v_{n+1−α_f} + K u_{n+1−α_f} = f, where n+1−α is (1−α)·new + α·old, with
+    u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
+    """
+
+    alpha_m: float
+    alpha_f: float
+    beta_old: float
+    beta: float
+    gamma_old: float
+    gamma: float
+
+
+def generalised_alpha(spectral_radius: float = 1.0) -> Scheme:
+    """Make the generalised-α scheme of a spectral radius at infinite frequency.
+
+    Of second order (Chung & Hulbert, J. Appl. Mech. 60, 1993). At 1 it is the midpoint form of
+    the trapezoidal rule and dissipates nothing.
+    """
+    rho = spectral_radius
+    if not 0.0 <= rho <= 1.0:
+        raise InputError(f"spectral radius {rho}; expected 0 to 1")
+    alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+    beta, gamma = (1 - alpha_m + alpha_f) ** 2 / 4, 0.5 - alpha_m + alpha_f
+    return Scheme(alpha_m, alpha_f, 0.5 - beta, beta, 1 - gamma, gamma)
+
+
+def implicit_euler() -> Scheme:
+    """Make implicit Euler: u₊ = u + Δt v₊, v₊ = v + Δt a₊.
+
+    Of first order; an amplitude is multiplied by 1/√(1+(ωΔt)²) per step.
+    """
+    return Scheme(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
 
 
 @dataclass

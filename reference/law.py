@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from reference.deformation import Deformation, MembraneStretch, PolarStretch
 from reference.linear_solvers import factorised
 from reference.moduli import density, lame_constants
-from reference.nodal_algebra import assembled_matrix, nodal_forces
+from reference.nodal_algebra import assembled_matrix, compiled, nodal_forces
 from reference.space import ConformingSpace, mixed_unknowns
 from reference.unknowns import Unknowns
 from verify.errors import InputError
@@ -149,7 +149,6 @@ class Law:
         self, material: Material, space: ConformingSpace, energy: str, pressure: bool = False
     ) -> None:
         import ufl
-        from dolfinx import fem
 
         self.unknowns: Unknowns = mixed_unknowns(space) if pressure else space
         V = self.unknowns.function_space
@@ -160,7 +159,7 @@ class Law:
             self._kind = kind = MembraneStretch
         self.linear = energy == "linear"
         self._degree = None if self.linear else quadrature(space)
-        self.solution = fem.Function(V)
+        self.solution = self._function()
         self.state = state = kind(self.solution, self._degree)
         self.test, self.trial = v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
         self._lam, self.mu = lam, mu = lame_constants(material, v, material.thickness or 1.0)
@@ -197,22 +196,16 @@ class Law:
     @cached_property
     def work_form(self) -> Any:
         """Virtual work, compiled."""
-        from dolfinx import fem
-
-        return fem.form(self.work)
+        return compiled(self.work)
 
     @cached_property
     def stiffness_form(self) -> Any:
         """Stiffness, compiled."""
-        from dolfinx import fem
-
-        return fem.form(self.stiffness)
+        return compiled(self.stiffness)
 
     @cached_property
     def _stored_form(self) -> Any:
-        from dolfinx import fem
-
-        return fem.form(self._stored)
+        return compiled(self._stored)
 
     # ---------------------------------------------------------------- of nodal displacements
 
@@ -252,6 +245,11 @@ class Law:
         self._put(u)
         return assembled_matrix(self._viscous_forms[1])
 
+    def _function(self) -> Any:
+        from dolfinx import fem
+
+        return fem.Function(self.unknowns.function_space)
+
     def _fill(self, function: Any, values: Array) -> None:
         function.x.array[: len(self.unknowns.nodal)] = self.unknowns.own_part(values)
         function.x.scatter_forward()
@@ -266,15 +264,12 @@ class Law:
 
     @cached_property
     def _before(self) -> Any:
-        from dolfinx import fem
-
-        return fem.Function(self.unknowns.function_space)
+        """Displacement at the start of a step."""
+        return self._function()
 
     @cached_property
     def _velocity(self) -> Any:
-        from dolfinx import fem
-
-        return fem.Function(self.unknowns.function_space)
+        return self._function()
 
     @cached_property
     def _first(self) -> Any:
@@ -285,19 +280,16 @@ class Law:
     def _mean_forms(self) -> tuple[Any, Any]:
         """Work of the mean force of a step, and its derivative; see the module."""
         import ufl
-        from dolfinx import fem
 
         first, last = self._first, self.state
         turn, away = _mean_turn(first, last)
         stress = 2 * self.mu * away + self._lam / 2 * (first.trace + last.trace) * turn
         work = ufl.inner(stress, ufl.grad(self.test)) * last.measure
-        return fem.form(work), fem.form(last.derivative(work, self.trial))
+        return compiled(work), compiled(last.derivative(work, self.trial))
 
     @cached_property
     def _viscous_forms(self) -> tuple[Any, Any]:
-        from dolfinx import fem
-
-        return tuple(fem.form(self._turned(rate)) for rate in (self._velocity, self.trial))
+        return compiled(self._turned(self._velocity)), compiled(self._turned(self.trial))
 
     def _turned(self, rate: Any) -> Any:
         """Linear elastic work of a velocity, turned back by the rotations of the solution."""

@@ -15,6 +15,7 @@ from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, faces_of, is_uniform
 from verify.scene.part_pieces import Pieces, pieces_on_part
+from verify.scene.physics import field_values
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,11 +110,11 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
             force = (
                 _sided_function(space, exact.body_force, (space.dimension,))
                 if load.force == "exact"
-                else thickness * _density(space, load, load.force, time)
+                else thickness * _given(space, load.force, time)
             )
             form += ufl.inner(force, v) * ufl.dx
         elif isinstance(load, CutFaces):
-            given = _face_density(space, load, time)
+            given = _given(space, load.components, time)
             one, other = ds(_FACE + 2 * i), ds(_FACE + 2 * i + 1)
             if load.traction is None:
                 form -= given[0] * ufl.inner(ufl.FacetNormal(domain), v) * (one + other)
@@ -123,7 +124,7 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
             stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
-            traction = thickness * _density(space, load, load.traction, time)
+            traction = thickness * _given(space, load.traction, time)
             form += ufl.inner(traction, v) * ds(i)
         for mark, given in parted.get(i, []):
             form += thickness * ufl.inner(given, v) * ds(mark)
@@ -154,25 +155,15 @@ def _parted(
         yield int(corner), _pairs(space, cell[here], opposite[here]), function
 
 
-def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any, time: float) -> Any:
-    """Give a force per volume or area as a constant, or interpolated if it is a formula."""
+def _given(space: ConformingSpace, components: Any, time: float) -> Any:
+    """Give components of a load as a constant, or interpolated if one is a formula."""
     from dolfinx import fem
 
-    if is_uniform(given):
-        return fem.Constant(space.function_space.mesh, np.asarray(given, dtype=float))
-    values = lambda points, _near: load.values(points, time)  # noqa: E731
-    return _sided_function(space, values, (space.dimension,))
-
-
-def _face_density(space: ConformingSpace, load: CutFaces, time: float) -> Any:
-    """Give what acts on the faces of a cut as a vector: a pressure (1,) or a traction (d,)."""
-    from dolfinx import fem
-
-    if is_uniform(load.components):
-        given = np.asarray(load.components, dtype=float)
+    if is_uniform(components):
+        given = np.asarray(components, dtype=float)
         return fem.Constant(space.function_space.mesh, given)
-    shape = (len(load.components),)
-    return _sided_function(space, lambda points, _near: load.given(points, time), shape)
+    values = lambda points, _near: field_values(components, points, time)  # noqa: E731
+    return _sided_function(space, values, (len(components),))
 
 
 def _pairs(

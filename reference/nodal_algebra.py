@@ -146,12 +146,18 @@ class NodalSolver:
                 entry.destroy()
 
 
+def compiled(form: Any) -> Any:
+    """Compile a form of UFL; one that is compiled stays."""
+    from dolfinx import fem
+
+    return fem.form(form)
+
+
 def assembled_matrix(form: Any) -> Any:
     """Assemble a bilinear form (of UFL, or compiled)."""
-    from dolfinx import fem
     from dolfinx.fem import petsc
 
-    matrix = petsc.assemble_matrix(fem.form(form))
+    matrix = petsc.assemble_matrix(compiled(form))
     matrix.assemble()
     return matrix
 
@@ -160,6 +166,6 @@ def nodal_forces(form: Any, unknowns: Unknowns) -> Array:
     """Assemble a linear form (of UFL, or compiled); (k,)."""
     from dolfinx import fem, la
 
-    vector = fem.assemble_vector(fem.form(form))
+    vector = fem.assemble_vector(compiled(form))
     vector.scatter_reverse(la.InsertMode.add)
     return unknowns.everywhere(vector.array).ravel()

@@ -25,11 +25,9 @@ class RigidMotions:
         place = np.full(self._points.shape, -1, dtype=np.int64)
         place.ravel()[unknowns] = np.arange(len(unknowns))
         whole = (place >= 0).all(axis=1)
-        pieces = space.mesh.pieces
-        owner = np.zeros(len(self._points), dtype=np.int64)
-        owner[space.cell_nodes.ravel()] = np.repeat(pieces, space.cell_nodes.shape[1])
+        owner = space.piece_of_node
         self._parts = []
-        for piece in range(int(pieces.max()) + 1):
+        for piece in range(int(owner.max()) + 1):
             held = np.flatnonzero(whole & (owner == piece))
             if len(held):
                 self._parts.append((np.flatnonzero(owner == piece), held, place[held]))

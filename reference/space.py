@@ -113,6 +113,13 @@ class ConformingSpace(Unknowns):
         found, first = np.unique(nodes, return_index=True)
         return found, np.repeat(cell, nodes.shape[1])[first]
 
+    @cached_property
+    def piece_of_node(self) -> NDArray[np.int64]:
+        """(n,) number of the connected piece of material that each node belongs to."""
+        owner = np.zeros(len(self.node_points), dtype=np.int64)
+        owner[self.cell_nodes] = self.mesh.pieces[:, None]
+        return owner
+
     def beside_nodes(self) -> NDArray[np.float64]:
         """Centroid (n, d) of a cell of each node, m: on which side of a cut the node is."""
         beside = np.empty_like(self.node_points)

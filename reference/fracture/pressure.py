@@ -20,7 +20,7 @@ _CHUNK = 20_000  # cells
 class NodalPressure:
     """Continuous linear pressures, p = λ div u in the mean with every one of them (Taylor–Hood).
 
-    That is the equation by which `reference.nearly_incompressible` finds both, so that this is
+    That is the equation by which `reference.elasticity` finds both, so that this is
     the pressure it found, though a solution keeps its displacement only. λ div u itself is off by
     far more where ν is near ½.
 

@@ -12,6 +12,7 @@ from reference.meshing.grading import Grading
 from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.outline import divided_outline
+from reference.meshing.refinement import shrink_to_points
 from reference.meshing.separation import APART, check_separation, check_strips
 from reference.meshing.session import (
     add_polygon,
@@ -22,7 +23,6 @@ from reference.meshing.session import (
     simplices,
 )
 from reference.meshing.solid import solid_mesh
-from reference.meshing.tip_rings import shrink_to_points
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene, ToolPathCut
 

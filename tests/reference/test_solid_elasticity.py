@@ -151,18 +151,23 @@ if world.rank == 0:
     mesh = conforming_mesh(scene, Grading({size}, np.zeros((0, 3)), 0.5, 2 / 3, curves=True))
 mesh = world.bcast(mesh)
 space = conforming_space(mesh, {degree}, world)
-found = solve_linear(scene, space, None, {method!r})
+found = solve_linear(scene, space, None, {method!r}, pressure={pressure})
 memory = world.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 answer = [found.displacement.size, found.strain_energy, float(np.linalg.norm(found.displacement)),
           memory / 1e6, sum(found.timings.values())]
 """
 
 
-@pytest.mark.parametrize("degree, method", [(1, "direct"), (2, "multigrid")])
-def test_two_ranks_give_the_answer_of_one(degree, method, tmp_path):
-    script = _PARALLEL.format(size=0.3, degree=degree, method=method)
+@pytest.mark.parametrize(
+    "degree, method, pressure",
+    [(1, "direct", False), (2, "multigrid", False), (2, "multigrid", True)],
+)
+def test_two_ranks_give_the_answer_of_one(degree, method, pressure, tmp_path):
+    size = 0.6 if pressure else 0.3
+    script = _PARALLEL.format(size=size, degree=degree, method=method, pressure=pressure)
     one, two = (on_ranks(count, script, tmp_path)[:3] for count in (1, 2))
-    assert two == pytest.approx(one, rel=1e-10)
+    # multigrid leaves a residual of 1e-10, of which the energy is off by less
+    assert two == pytest.approx(one, rel=1e-8 if pressure else 1e-10)
 
 
 TISSUE = Material(young=1.0, poisson=0.3)

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
-from reference.dynamics import Scheme, generalised_alpha, implicit_euler, inherit
 from reference.dynamics_body import MovingBody
-from reference.dynamics_cuts import opening_times, partly_opened
+from reference.dynamics_cuts import inherit, opening_times, partly_opened
 from reference.dynamics_ledger import Ledger, momenta_of
-from reference.dynamics_step import State, Stepper
+from reference.dynamics_step import Scheme, State, Stepper, generalised_alpha, implicit_euler
 from reference.fracture.pressure import MIXED
 from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
