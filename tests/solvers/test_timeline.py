@@ -79,7 +79,8 @@ def test_kinks_end_a_step_where_they_are_asked_for_and_jumps_always(kinks, stops
 def test_steps_between_stops_are_equal_and_no_larger_than_asked_for():
     body = Noted(0.3)
     sizes = march(timeline(opens=[0.35], outputs=2), body)
-    np.testing.assert_allclose(sizes, [0.175] * 2 + [0.65 / 3] * 3, rtol=1e-13)
+    assert sizes == {0.175: 2, 0.65 / 3: 3}
+    np.testing.assert_allclose(body.times("step"), [0.175] * 2 + [0.65 / 3] * 3, rtol=1e-13)
     assert body.times("output") == pytest.approx([0.0, 1.0])
     assert step_sizes(sizes) == "0.175 s … 0.216667 s"
 
@@ -87,9 +88,10 @@ def test_steps_between_stops_are_equal_and_no_larger_than_asked_for():
 def test_halvings_halve_also_the_steps_that_stops_cut_short():
     stops = timeline(opens=[0.1], outputs=2)
     for halvings in (0, 1, 2):
-        sizes = march(stops, Noted(0.3), halvings)
-        np.testing.assert_allclose(sizes[0], 0.1 / 2**halvings)
-        assert len(sizes) == (1 + 3) * 2**halvings
+        body = Noted(0.3)
+        sizes = march(stops, body, halvings)
+        np.testing.assert_allclose(body.times("step")[0], 0.1 / 2**halvings)
+        assert sizes.total() == (1 + 3) * 2**halvings
 
 
 def test_what_opens_on_the_way_opens_at_the_first_step_that_begins_then_or_later():
@@ -107,17 +109,24 @@ def test_an_output_is_after_what_opens_then():
 
 def test_steps_are_counted_anew_where_an_opening_makes_them_smaller():
     body = Noted(0.25, events=[0.4], shrinks=0.4)
-    sizes = march(timeline(outputs=2), body, halvings=1)
-    np.testing.assert_allclose(sizes, [0.125] * 4 + [0.05] * 10, rtol=1e-13)
+    march(timeline(outputs=2), body, halvings=1)
+    np.testing.assert_allclose(body.times("step"), [0.125] * 4 + [0.05] * 10, rtol=1e-13)
     assert body.time == pytest.approx(1.0, abs=1e-12)
 
 
 def test_an_opening_that_leaves_the_step_as_it_is_leaves_the_halved_steps_too():
     body = Noted(0.3, events=[0.1])
-    assert len(march(timeline(outputs=2), body, halvings=2)) == 16
+    assert march(timeline(outputs=2), body, halvings=2).total() == 16
 
 
 def test_a_trial_is_one_step():
     body = Noted(0.1, events=[0.0])
-    assert len(march(timeline(outputs=2), body, trial=True)) == 1
+    assert march(timeline(outputs=2), body, trial=True).total() == 1
     assert len(body.times("output")) == 1
+
+
+def test_steps_of_one_size_are_one_size_whatever_the_state_has_added_up():
+    """An integrator is made for a size: of a thousand stops apart alike there is one."""
+    body = Noted(1e-4)
+    assert list(march(timeline(outputs=1001), body).values()) == [10_000]
+    assert body.time != 1.0

@@ -144,7 +144,7 @@ class TiedMotion:
         for stepper in self.steppers.values():
             stepper.close()
         newton = sum(stepper.solves for stepper in self.steppers.values())
-        record.iterations |= {"steps": len(sizes), "newton": newton}
+        record.iterations |= {"steps": sizes.total(), "newton": newton}
         record.notes |= {
             "scheme": marching.name,
             "mass": CONSISTENT,

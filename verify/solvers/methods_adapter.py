@@ -26,7 +26,7 @@ from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import solution_on, springs_left_out
 from verify.solvers.xfem_static import Law, solve_equilibrium
 from verify.solvers.xfem_steps import EXPLICIT, SCHEMES
-from verify.solvers.xfem_system import system_of
+from verify.solvers.xfem_system import elasticity_of, system_of
 from verify.system import System
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
@@ -131,8 +131,8 @@ class MethodSolver:
         with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
             body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
-            material = material_of(scene, body.resisting.mesh)
-            return system_of(scene, body.phantom, body.resisting, material, exact_of(scene))
+            resisting = elasticity_of(scene, body.resisting, "linear")
+            return system_of(scene, body.phantom, *resisting, exact_of(scene))
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         for name in parameters:

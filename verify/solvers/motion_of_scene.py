@@ -1,5 +1,6 @@
 """Motion of a body on virtual nodes, which is made anew whenever its cuts open further."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -281,10 +282,10 @@ class CutMotion:
         _, mass = self.opening.inertia(phantom)
         return mass.of_corners.matrix if isinstance(mass, AggregatedMass) else mass.matrix
 
-    def _say(self, sizes: list[float]) -> None:
+    def _say(self, sizes: Counter[float]) -> None:
         """Record steps and choices."""
         record = self.record
-        record.iterations["steps"] = len(sizes)
+        record.iterations["steps"] = sizes.total()
         if self._solves:
             record.iterations["newton"] = self._solves
         record.notes |= {

@@ -1,6 +1,7 @@
 """One timeline for all that moves: outputs, openings, jumps of histories, and the steps between."""
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -11,6 +12,7 @@ from verify.scene import Scene, ToolPathCut
 from verify.scene.history import jumps
 
 Array = NDArray[np.float64]
+_ROUND_OFF = 1e-14  # of a time that steps have added up to
 _CLOSE = 1e-9  # of the duration: times that close are one, steps added up are off by less
 
 
@@ -95,7 +97,9 @@ class Mover(Protocol):
         ...
 
 
-def march(timeline: Timeline, mover: Mover, halvings: int = 0, trial: bool = False) -> list[float]:
+def march(
+    timeline: Timeline, mover: Mover, halvings: int = 0, trial: bool = False
+) -> Counter[float]:
     """Step from stop to stop by equal steps, and open on the way what the cuts have passed.
 
     Parameters
@@ -111,47 +115,51 @@ def march(timeline: Timeline, mover: Mover, halvings: int = 0, trial: bool = Fal
 
     Returns
     -------
-    list of float
-        Sizes of all steps, s.
+    Counter
+        How many steps of each size were taken, s.
     """
-    sizes: list[float] = []
-    for k, stop in enumerate(timeline.stops.tolist()):
+    sizes: Counter[float] = Counter()
+    stops = timeline.stops.tolist()
+    for k, stop in enumerate(stops):
         begun = mover.open(stop) or k == 0
         if begun:
             mover.begin()
         if stop in timeline.outputs:
             mover.put_out()
-        if k == len(timeline.stops) - 1:
+        if k == len(stops) - 1:
             break
         if not begun and stop in timeline.breaks:
             mover.begin()
-        sizes += _steps_to(float(timeline.stops[k + 1]), mover, halvings, trial)
+        _step_between(stop, stops[k + 1], mover, halvings, sizes, trial)
         if trial:
             break
     return sizes
 
 
-def _steps_to(stop: float, mover: Mover, halvings: int, trial: bool) -> list[float]:
-    """Step to a stop; count the steps anew where an opening has changed the largest one."""
-    sizes: list[float] = []
+def _step_between(
+    start: float, stop: float, mover: Mover, halvings: int, sizes: Counter[float], trial: bool
+) -> None:
+    """Step between two stops; count the steps anew where an opening has changed the largest one."""
     left, size, largest = 0, 0.0, np.nan
-    while left or not sizes:
+    while True:
         if mover.largest != largest:
-            largest, span = mover.largest, stop - mover.time
+            # at first from the stop itself: the state's time has the round-off of added steps
+            span, largest = stop - (mover.time if size else start), mover.largest
             left = max(1, int(np.ceil(span / largest * (1 - 1e-9)))) * 2**halvings
-            size = float(f"{span / left:.14g}")  # the same up to round-off: one integrator
+            size = span / left
+            # the same up to the round-off of times: one integrator
+            known = min(sizes, key=lambda one: abs(one - size), default=size)
+            size = known if abs(known - size) * left <= _ROUND_OFF * stop else size
         mover.step(size)
-        sizes.append(size)
+        sizes[size] += 1
         left -= 1
-        if trial:
-            break
-        if left and mover.open(mover.time):
+        if trial or not left:
+            return
+        if mover.open(mover.time):
             mover.begin()
-    return sizes
 
 
-def step_sizes(sizes: list[float]) -> str:
+def step_sizes(sizes: Collection[float]) -> str:
     """Say the smallest and the largest of some steps."""
-    if not sizes:
-        return "none"
-    return " … ".join(dict.fromkeys(f"{size:.6g} s" for size in (min(sizes), max(sizes))))
+    ends = (min(sizes), max(sizes)) if sizes else ()
+    return " … ".join(dict.fromkeys(f"{size:.6g} s" for size in ends)) or "none"

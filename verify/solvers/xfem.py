@@ -4,12 +4,15 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from reference.exact import exact_of
 from verify.accelerated import FAST
 from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import background_mesh, material_of
+from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import CutMotion, Marching
@@ -21,12 +24,12 @@ from verify.solvers.xfem_answer import joined, solution_on, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
-from verify.solvers.xfem_system import system_of
+from verify.solvers.xfem_system import elasticity_of, system_of
 from verify.system import System
 from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.slivers import join_fragments, treat_slivers
+from verify.xfem.slivers import join_fragments
 
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _CHOICES: Mapping[str, Collection[str]] = {
@@ -165,26 +168,24 @@ class XfemSolver:
         given, exact = _Parameters(**parameters), exact_of(scene)
         with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
-            phantom = _cut(scene, mesh, size, exact, given)[0]
-            return system_of(
-                scene, phantom, phantom, material_of(scene, phantom.mesh), exact, given.mass,
-                given.slivers == "penalise",
-            )  # fmt: skip
+            phantom, _ = _cut(scene, mesh, size, exact, given)
+            resisting = elasticity_of(scene, phantom, "linear", given.slivers == "penalise")
+            return system_of(scene, phantom, *resisting, exact, given.mass)
 
 
 def _cut(
     scene: Scene, mesh: SimplexMesh, size: float, exact: Any, given: _Parameters
-) -> tuple[PhantomMesh, Any, list[Regularisation]]:
-    """Cut the mesh and treat its slivers; report what was treated, and what was moved or joined."""
-    policy: Any = given.slivers
+) -> tuple[PhantomMesh, list[Regularisation]]:
+    """Cut the mesh and treat its slivers; report what was moved, joined and treated."""
+
+    def held(body: PhantomMesh) -> NDArray[np.bool_]:
+        return supports_of(scene, body, exact).fixed
+
     asked = to_cut(mesh, cuts_of(scene, size), given.tip)
     phantom = cut_mesh(asked.mesh, asked.cuts, asked.rule)
     phantom, fragments = join_fragments(phantom, supports_of(scene, phantom, exact))
-    report = None
-    if policy in ("merge", "drop"):
-        held = supports_of(scene, phantom, exact).fixed.any(axis=1)
-        phantom, report = treat_slivers(phantom, policy, supported=held)
-    return phantom, report, [*asked.done, *joined(fragments)]
+    phantom, slivers = treated(phantom, given.slivers, held)
+    return phantom, [*slivers, *asked.done, *joined(fragments)]
 
 
 def _check_penalty(scene: Scene, mass: str) -> None:
@@ -213,8 +214,7 @@ def _run(
         motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)
     with record.timed("enrichment"):
-        phantom, slivers, changes = _cut(scene, mesh, size, exact, given)
-    record.regularisations += [*treated(slivers), *changes]
+        phantom, record.regularisations = _cut(scene, mesh, size, exact, given)
     fields = solve_equilibrium(
         scene, phantom, exact, record, load_steps=given.load_steps,
         penalise=given.slivers == "penalise", kernels=_KERNELS[given.kernels],

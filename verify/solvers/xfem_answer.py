@@ -1,5 +1,6 @@
 """Fields of a cut body as a neutral solution, with everything that was changed in it."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.slivers import Fragments, SliverReport
+from verify.xfem.slivers import Fragments, treat_slivers
 from verify.xfem.subdivision import Subdivision, extrapolation, subdivide
 
 
@@ -80,16 +81,28 @@ def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Re
     return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
 
 
-def treated(report: SliverReport | None) -> list[Regularisation]:
-    """Report what was done to slivers, each kind with its largest volume fraction."""
-    if report is None:
-        return []
+def treated(
+    phantom: PhantomMesh, policy: Any, held_in: Callable[[PhantomMesh], NDArray[np.bool_]]
+) -> tuple[PhantomMesh, list[Regularisation]]:
+    """Treat slivers by a policy; report each kind with its largest volume fraction.
+
+    Parameters
+    ----------
+    phantom : PhantomMesh
+    policy : str
+        As of the solver ``xfem``; but for "merge" and "drop" they stay.
+    held_in : callable
+        Components (N, d) of a body that supports hold.
+    """
+    if policy not in ("merge", "drop"):
+        return phantom, []
+    phantom, report = treat_slivers(phantom, policy, supported=held_in(phantom).any(axis=1))
     counts = {
         "sliver that follows a root cell (aggregation)": report.aggregated,
         "sliver absorbed across the cut": report.dropped,
         "sliver without a root cell, kept": report.rootless,
     }
-    return [
+    return phantom, [
         Regularisation(kind, count, report.largest, "volume fraction")
         for kind, count in counts.items()
         if count

@@ -6,25 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Regularisation
-from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.cuts_of_scene import to_cut
 from verify.solvers.openings_of_scene import Openings
 from verify.solvers.supports_of_scene import motion_of_supports
 from verify.solvers.xfem_answer import penalised, treated
-from verify.solvers.xfem_steps import MASSES
+from verify.solvers.xfem_system import elasticity_of, mass_of
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import Kernels
-from verify.xfem.mass import Mass, side_wise_mass
+from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.slivers import treat_slivers
 
 _Floats = NDArray[np.float64]
 
@@ -76,30 +73,20 @@ class XfemOpening:
         """Cut the mesh where the cuts have opened it at a time, and treat its slivers."""
         mesh, cuts, rule, _ = self._to_cut
         phantom = cut_mesh(mesh, cuts, rule, self._opening <= time)
-        policy: Any = self.cutting.slivers
-        if policy in ("merge", "drop"):
-            held = motion_of_supports(self.scene, phantom, self.exact).fixed.any(axis=1)
-            phantom, report = treat_slivers(phantom, policy, supported=held)
-            self._slivers = treated(report)
+        phantom, self._slivers = treated(
+            phantom,
+            self.cutting.slivers,
+            lambda body: motion_of_supports(self.scene, body, self.exact).fixed,
+        )
         return phantom
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
-        material, density = (
-            material_of(self.scene, phantom.mesh),
-            density_of(self.scene, phantom.mesh),
-        )
-        kinematics, kernels = self.scene.analysis.kinematics, self.cutting.kernels
-        if self.cutting.slivers == "penalise":
-            ghost = GhostPenalty(phantom, material)
-            self._penalised = penalised(ghost)
-            force = InternalForce(phantom, material, kinematics, kernels, ghost)
-            return force, ghost.mass(side_wise_mass(phantom, density), density)
-        try:
-            mass = MASSES[self.mass](phantom, density)
-        except XfemError as error:  # a lumping of the thesis, where cuts cross
-            raise UnsupportedSceneError(f"mass = '{self.mass}': {error}") from None
-        return InternalForce(phantom, material, kinematics, kernels), mass
+        cutting = self.cutting
+        kinematics, penalise = self.scene.analysis.kinematics, cutting.slivers == "penalise"
+        force, ghost = elasticity_of(self.scene, phantom, kinematics, penalise, cutting.kernels)
+        self._penalised = penalised(ghost)
+        return force, mass_of(self.scene, phantom, self.mass, ghost)
 
     def inherited(self, old: PhantomMesh, state: MotionState, further: DynamicBody) -> MotionState:
         """Hand a state on to the body that is cut further.
