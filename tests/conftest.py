@@ -68,20 +68,6 @@ def _is_claim(failed):
     return bool(failed) and _said(failed).startswith(("assert", "AssertionError"))
 
 
-@pytest.fixture(scope="session")
-def warm():
-    """A process that has imported what solving needs; solves of the own solvers are forked off."""
-    from verify.warm import warm_parent
-
-    folders = [*(str(FOLDER / name) for name in ("runner", "..")), os.environ.get("PYTHONPATH", "")]
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PYTHONPATH", os.pathsep.join(folders))
-        opened = warm_parent()
-        opened.__enter__()
-    yield
-    opened.__exit__(None, None, None)
-
-
 def time_of_others():
     """Processor time in s that programs other than this one and its children have taken so far."""
     try:

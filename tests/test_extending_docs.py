@@ -66,7 +66,6 @@ def test_the_page_shows_the_example_files_as_they_are():
 
 
 @needs_skfem
-@pytest.mark.usefixtures("warm")
 def test_every_command_on_extending_succeeds_in_order(examples):
     said = {}
     for line in commands("guide/your-solver.md"):
@@ -134,7 +133,6 @@ def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(exa
     assert "stretched_plate" in wrong.stderr
 
 
-@pytest.mark.usefixtures("warm")
 def test_every_command_on_regression_succeeds_in_order(tmp_path):
     for line in commands("guide/regression.md"):
         done = run(line, tmp_path)

@@ -49,7 +49,7 @@ reason = "the second check is wrong"
 
 
 @pytest.fixture
-def session(pytester, monkeypatch, warm):
+def session(pytester, monkeypatch):
     """Run a session of its own on files made here; the cases run in processes of their own."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
     installed = {point.value for point in entry_points(group="pytest11")}

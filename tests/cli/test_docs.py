@@ -29,7 +29,6 @@ def run(line: str, folder: Path) -> CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-@pytest.mark.usefixtures("warm")
 def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
     (tmp_path / "my_case.toml").write_text(
         blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8"

@@ -153,7 +153,6 @@ def test_each_solver_gets_its_own():
     assert of_solvers(given) == wanted
 
 
-@pytest.mark.usefixtures("warm")
 def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
     # one level and scheme: first order in time, which the case does not accept
     run = ["run", "dynamics/freed_half", "--solver", "xfem", "--repetitions", "1", "--no-report"]

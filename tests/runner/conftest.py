@@ -80,7 +80,7 @@ def forked(name):
 
 
 @pytest.fixture
-def verify(tmp_path, warm):
+def verify(tmp_path):
     (tmp_path / "square.toml").write_text(CASE)
     paths = [str(HERE), str(HERE.parent.parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

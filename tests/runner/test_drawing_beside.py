@@ -31,7 +31,7 @@ def drawn(tmp_path_factory):
     return folder / "out", drawings
 
 
-def test_every_judged_case_is_drawn_by_a_process_of_its_own_and_the_page_is_the_same(
+def test_every_judged_case_is_drawn_by_a_process_beside_and_the_page_is_the_same(
     drawn, monkeypatch
 ):
     run, drawings = drawn
@@ -70,4 +70,4 @@ def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypat
     with pytest.raises(RunStoppedError):
         run_cases(scenes, source, options, Silent(), drawings=tmp_path)
     assert started
-    assert all(one._process.wait() is not None for one in started)
+    assert all(one.poll() is not None for one in started)

@@ -1,14 +1,14 @@
-"""``verify conform``: the process that solves are forked from loads while this one does."""
+"""``verify conform``: the server that solves are forked from loads while this one does."""
 
 import argparse
-from contextlib import nullcontext
 from importlib import import_module
 
-from verify.warm import warm_parent
+from verify.processes import start_server
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""
-    with nullcontext() if ":" in arguments.solver else warm_parent():
-        code: int = import_module("verify.cli.conformance_table").execute(arguments)
-        return code
+    if ":" not in arguments.solver:
+        start_server()
+    code: int = import_module("verify.cli.conformance_table").execute(arguments)
+    return code

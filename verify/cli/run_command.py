@@ -1,15 +1,15 @@
-"""``verify run``: the process that solves are forked from loads while this one does."""
+"""``verify run``: the server that solves are forked from loads while this one does."""
 
 import argparse
-from contextlib import nullcontext
 from importlib import import_module
 
-from verify.warm import warm_parent
+from verify.processes import start_server
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the cases."""
     guests = bool(arguments.solvers) and all(":" in name for name in arguments.solvers)
-    with nullcontext() if guests else warm_parent():
-        code: int = import_module("verify.cli.running").execute(arguments)
-        return code
+    if not guests:
+        start_server()
+    code: int = import_module("verify.cli.running").execute(arguments)
+    return code

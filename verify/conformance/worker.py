@@ -10,7 +10,7 @@ from pathlib import Path
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.runner.childhood import die_with_parent
+from verify.processes import die_with_parent
 from verify.runner.solve import solve_job
 from verify.solvers import check_parameters, find_solver
 from verify.solvers.named import solver_in

@@ -1,7 +1,7 @@
-"""Cases drawn, here or beside solves: ``python -m verify.report.drawing QUESTION.json``.
+"""Cases drawn, here or beside solves: ``python -m verify.report.drawing FOLDER``.
 
-The question names a run directory, the folder of a case in it, and the file to write. What is
-written is read back by the process that asked for it, and by nobody else.
+Each question in the folder names a run directory, the folder of a case in it, and the file to
+write. What is written is read back by the process that asked for it, and by nobody else.
 """
 
 import pickle
@@ -9,10 +9,12 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from time import sleep
+from typing import Any, NoReturn
 
 from verify.json_files import read_json
 from verify.printable import words_of
+from verify.processes import die_with_parent
 from verify.report.case_view import CaseView, case_view
 from verify.report.drawn_bodies import draw
 from verify.report.figures.style import Palette, Style
@@ -21,6 +23,8 @@ from verify.report.picture import CasePictures
 from verify.report.pictures import case_pictures
 from verify.report.run_directory import CaseEntry, load_entry, load_record
 from verify.whole_files import write_whole
+
+_LOOK_SECONDS = 0.02
 
 
 @dataclass(frozen=True)
@@ -31,13 +35,18 @@ class Drawn:
     styles: dict[str, Style]
 
 
-def main(question: Path) -> None:
-    """Draw the case that the file `question` names."""
-    asked = read_json(question)
-    root = Path(asked["root"])
-    palette = run_palette(load_record(root)[0])
-    drawn = drawn_case(root, asked["index"], load_entry(root / asked["folder"]), palette)
-    write_whole(Path(asked["target"]), pickle.dumps(drawn))
+def main(folder: Path) -> NoReturn:
+    """Draw each case that a question in `folder` names, and remove the question."""
+    die_with_parent()
+    while True:
+        for question in sorted(folder.glob("*.json")):
+            asked = read_json(question)
+            root = Path(asked["root"])
+            palette = run_palette(load_record(root)[0])
+            drawn = drawn_case(root, asked["index"], load_entry(root / asked["folder"]), palette)
+            write_whole(Path(asked["target"]), pickle.dumps(drawn))
+            question.unlink()
+        sleep(_LOOK_SECONDS)
 
 
 def run_palette(record: Mapping[str, Any]) -> Palette:

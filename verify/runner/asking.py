@@ -14,8 +14,8 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.result import Status
 from verify.runner.child import Child, Ending
-from verify.runner.childhood import ANSWER, ASKING
 from verify.runner.log import telling_line
+from verify.runner.survey import ANSWER, ASKING
 from verify.scene import Scene, scene_content
 from verify.solvers.interface import is_built_in
 

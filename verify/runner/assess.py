@@ -21,10 +21,10 @@ from verify.compare.body import body_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import words_of
+from verify.processes import die_with_parent
 from verify.result import CaseResult, Notice, NoticeKind, SolveRecord, Status, error_picture
 from verify.result_files import write_result
-from verify.runner.childhood import JUDGING, die_with_parent
-from verify.runner.directory import folder_name
+from verify.runner.directory import JUDGING, folder_name
 from verify.runner.error_field import truth_of, write_error_field
 from verify.runner.job import check_files, load_record
 from verify.scene import Scene, restore_scene

@@ -5,24 +5,35 @@ Those count what a process reserves, and LLVM, OpenBLAS and MPI reserve gigabyte
 never touch; and a solver that hits them dies in an unlucky place with an unclear message. The
 watch looks fifty times a second, so that a solve may overshoot by what it can touch in 20 ms.
 
-Its end is the end of everything that it started: of its process group, and of processes that
-left the group, which are found as its descendants and by a mark in their environment.
+Its end is the end of everything that it started: of its process group, of its descendants as the
+watch has seen them, and of what bears its mark in the environment that it was started with.
 """
 
+import atexit
 import contextlib
+import ctypes
+import faulthandler
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import ModuleType
 from uuid import uuid4
 
+import psutil
+
+from verify.processes import FORKED, PARENT_VARIABLE, die_with_parent, start_server
 from verify.threads import ONE_THREAD
-from verify.warm import PARENT_VARIABLE, Forked, fork
 
 POLL_SECONDS = 0.02
+_SEARCH_SECONDS = 0.2  # between two looks at all processes of the machine for its children
 _MARK_VARIABLE = "VERIFY_CHILD"
 _LONGEST_LOG = 64 * 2**20  # bytes; beyond, only its beginning and what comes next are kept
 _BEGINNING = 2**20
@@ -49,8 +60,8 @@ class Child:
     """A running ``python -m MODULE ARGUMENT`` with its log, watched by calling `poll`.
 
     With more than one of `ranks` it is mpiexec that runs it as often; the limits are for all
-    ranks together. One that is `own`, and runs no code of a guest, is forked from a process that
-    has imported what it needs, where there is one.
+    ranks together. One that is `own`, and runs no code of a guest, is forked from a server that
+    has imported what it needs; its module has a function ``main`` that is given the argument.
     """
 
     def __init__(
@@ -63,41 +74,39 @@ class Child:
         ranks: int = 1,
         own: bool = False,
     ) -> None:
-        environment = {**os.environ, **ONE_THREAD}
-        environment[PARENT_VARIABLE] = str(os.getpid())
+        environment = {**os.environ, **ONE_THREAD, PARENT_VARIABLE: str(os.getpid())}
         self._mark = environment[_MARK_VARIABLE] = uuid4().hex
         self.log, self.timeout, self.memory = log, timeout, memory
         self.peak, self.killed_for = 0.0, ""
         argument = argument.resolve()  # a solver may change the working directory
+        log.unlink(missing_ok=True)
+        log.touch()
         run = [module, str(argument)]
         if ranks > 1:
             run, own = ["verify.runner.ranks", str(ranks), *run], False
-        log.unlink(missing_ok=True)
-        with log.open("ab") as stream:  # appending, so that it can be cut from outside
-            forked = fork(module, argument, stream.fileno(), environment) if own else None
-            self._process: Forked | subprocess.Popen[bytes] = forked or subprocess.Popen(
-                # -P: a stray numpy.py in the working directory is not imported
-                [sys.executable, "-P", "-X", "faulthandler", "-m", *run],
-                stdin=subprocess.DEVNULL,
-                stdout=stream,
-                stderr=stream,
-                env=environment,
-                start_new_session=True,
-            )
+        forked = _forked(module, argument, log.resolve(), environment) if own else None
+        self._process: BaseProcess | subprocess.Popen[bytes] = forked or _fresh(
+            run, log, environment
+        )
         self.start, self._starved_before = time.monotonic(), _starved()
+        self._searched, self._seen = 0.0, set[psutil.Process]()
+        self._pid = self._process.pid or 0
+        with contextlib.suppress(psutil.Error):  # it may have ended
+            self._seen.add(psutil.Process(self._pid))
+        self._root = set(self._seen)
 
     def poll(self) -> Ending | None:
         """Look once; kill it if it is over a limit; tell how it ended if it has."""
-        returncode = self._process.poll()
+        returncode = self._returncode()
         wall = time.monotonic() - self.start
         if returncode is not None:
             self._kill_all()  # compilers and the like that it left behind
             starved = _starved() > self._starved_before
             return Ending(returncode, wall, self.peak, self.killed_for, starved)
         _shorten(self.log)
-        # a keeper shares all that it holds with the process that it keeps
-        own = descendants(self._process.pid)[isinstance(self._process, Forked) :]
-        resident = _resident_memory(own)
+        if time.monotonic() - self._searched > _SEARCH_SECONDS:
+            self._search()
+        resident = _resident_memory(self._seen)
         self.peak = max(self.peak, resident)
         if not self.killed_for:
             if resident > self.memory:
@@ -111,53 +120,121 @@ class Child:
     def kill(self) -> None:
         """Kill it and everything that it started, and wait for it."""
         self._kill_all()
-        self._process.wait()
+        if isinstance(self._process, BaseProcess):
+            self._process.join()
+        else:
+            self._process.wait()
+
+    def _returncode(self) -> int | None:
+        if isinstance(self._process, BaseProcess):
+            return self._process.exitcode
+        return self._process.poll()
+
+    def _search(self) -> None:
+        """Find its descendants; those that have lost their parents since stay known."""
+        self._searched = time.monotonic()
+        for root in self._root:
+            with contextlib.suppress(psutil.Error):
+                self._seen |= set(root.children(recursive=True))
+        self._seen = set(filter(_is_alive, self._seen))
 
     def _kill_all(self) -> None:
-        """Kill its group, its descendants, and what bears its mark, until nothing is left."""
-        if isinstance(self._process, Forked):
-            self._process.end()
-            return
-        mark = f"{_MARK_VARIABLE}={self._mark}".encode()
+        """Kill its group, what it started, and what bears its mark, until nothing is left."""
         for _ in range(_ROUNDS):
-            found = {*descendants(self._process.pid), *_marked(mark)}
+            self._search()
             with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, signal.SIGKILL)  # it leads its own session and group
-            for pid in found - {self._process.pid}:
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.kill(pid, signal.SIGKILL)
-            if not found - {self._process.pid}:
+                os.killpg(self._pid, signal.SIGKILL)  # it leads its own session and group
+            found = self._seen | _marked(self._mark)
+            for process in found:
+                with contextlib.suppress(psutil.Error):
+                    process.kill()
+            if found <= self._root:
                 return
 
 
-def descendants(pid: int) -> list[int]:
-    """Return process `pid` and all that it started and that has not been orphaned."""
-    found, waiting = [], [pid]
-    while waiting:
-        found.append(waiting.pop())
-        with contextlib.suppress(OSError, ValueError):
-            for task in Path("/proc", str(found[-1]), "task").iterdir():
-                waiting += map(int, (task / "children").read_text().split())
-    return found
+def _fresh(run: list[str], log: Path, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    """Start a Python that knows nothing of this one."""
+    with log.open("ab") as stream:  # appending, so that it can be cut from outside
+        return subprocess.Popen(
+            # -P: a stray numpy.py in the working directory is not imported
+            [sys.executable, "-P", "-X", "faulthandler", "-m", *run],
+            stdin=subprocess.DEVNULL,
+            stdout=stream,
+            stderr=stream,
+            env=environment,
+            start_new_session=True,
+        )
 
 
-def _marked(mark: bytes) -> list[int]:
+def _forked(
+    module: str, argument: Path, log: Path, environment: Mapping[str, str]
+) -> BaseProcess | None:
+    """Fork a process from the server; None if there is none that answers."""
+    work = (module, argument, log, os.getcwd(), environment)
+    process = FORKED.Process(target=_work, args=work, daemon=True)
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")  # or it would be run once more, over there
+    try:
+        start_server()
+        process.start()
+    except (OSError, EOFError):
+        return None
+    finally:
+        sys.modules["__main__"] = main
+    return process
+
+
+def _work(
+    module: str, argument: Path, log: Path, folder: str, environment: Mapping[str, str]
+) -> None:
+    """Do in a forked process what ``python -m MODULE ARGUMENT`` does in a fresh one."""
+    os.setsid()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    output = os.open(log, os.O_WRONLY | os.O_APPEND)
+    for descriptor in (1, 2):
+        os.dup2(output, descriptor)
+    os.close(output)
+    faulthandler.enable()
+    os.environ.clear()
+    os.environ.update({**environment, PARENT_VARIABLE: str(os.getppid())})
+    die_with_parent()
+    os.chdir(folder)
+    sys.argv = [module, str(argument)]
+    numpy_random = import_module("numpy.random")
+    numpy_random.seed()  # that of the server would be everyone's
+    random.seed()
+    try:
+        import_module(module).main(argument)
+    finally:  # multiprocessing leaves at once
+        atexit._run_exitfuncs()
+        mpi = sys.modules.get("mpi4py.MPI")
+        if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
+            mpi.Finalize()
+        ctypes.CDLL(None).fflush(None)
+
+
+def _marked(mark: str) -> set[psutil.Process]:
     """Living processes with `mark` in the environment that they were started with."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError, ValueError):  # a zombie has no environment
-            if mark in (folder / "environ").read_bytes():
-                found.append(int(folder.name))
+    found = set()
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            if process.environ().get(_MARK_VARIABLE) == mark:
+                found.add(process)
     return found
 
 
-def _resident_memory(pids: list[int]) -> float:
+def _is_alive(process: psutil.Process) -> bool:
+    with contextlib.suppress(psutil.Error):
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    return False
+
+
+def _resident_memory(processes: set[psutil.Process]) -> float:
     """Resident memory in bytes of processes (0 of one that has gone)."""
     total = 0.0
-    for one in pids:
-        with contextlib.suppress(OSError, IndexError, ValueError):
-            pages = int(Path("/proc", str(one), "statm").read_bytes().split()[1])
-            total += pages * os.sysconf("SC_PAGE_SIZE")
+    for process in processes:
+        with contextlib.suppress(psutil.Error):
+            total += process.memory_info().rss
     return total
 
 

@@ -24,6 +24,7 @@ from verify.json_files import read_json, write_json
 from verify.whole_files import asked_place
 
 RUN_SCHEMA = 1
+JUDGING = "judging"  # file of a case: the solve that its comparison is at, if it dies there
 _IDENTITY = ("cases", "options_of_result")
 
 

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from verify.errors import InputError
 from verify.json_files import write_json
-from verify.runner.childhood import die_with_parent, under_a_launcher
+from verify.processes import die_with_parent, under_a_launcher
 
 RANKS_VARIABLE = "VERIFY_RANKS"
 _WAIT_SECONDS = 2.0

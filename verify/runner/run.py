@@ -1,13 +1,13 @@
 """The run: solves in parallel processes, then the comparison of each finished case."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.processes import start_server
 from verify.provenance import provenance
 from verify.result import CaseResult
 from verify.runner.checking import check_scene
@@ -21,8 +21,6 @@ from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.work import Progress, Work
 from verify.scene import Scene
-from verify.solvers.interface import is_built_in
-from verify.warm import warm_parent
 
 
 @dataclass(frozen=True)
@@ -84,9 +82,10 @@ def run_cases(
     if len(set(map(folder_name, names))) < len(names):
         said = f"{', '.join(sorted(names))}: two would have the same folder"
         raise InputError(f"{said}; expected other parameters", "--solver")
-    with listening() as stop, warm_parent() if any(map(is_built_in, names)) else nullcontext():
+    with listening() as stop:
         origin = provenance()
-        for name in names:  # asked below; the process to fork from is still loading
+        start_server()
+        for name in names:  # asked below; the server is still loading
             code_of_solver(name)
         survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:

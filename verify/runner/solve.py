@@ -16,8 +16,8 @@ from typing import Any
 from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
+from verify.processes import die_with_parent, peak_memory
 from verify.result import COMPILING, CRITICAL_STEP, Status
-from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.directory import emptied
 from verify.runner.ranks import give_up, world
 

@@ -15,10 +15,11 @@ from typing import Any
 from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
-from verify.runner.childhood import ANSWER, ASKING, die_with_parent
+from verify.processes import die_with_parent
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.whole_files import write_whole
 
+ANSWER, ASKING = "answer.json", "asking"  # files by which it says where it is
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
 

@@ -7,8 +7,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
-from verify.runner.childhood import die_with_parent
-from verify.warm import PARENT_VARIABLE
+from verify.processes import PARENT_VARIABLE, die_with_parent
 
 
 def in_processes[T](

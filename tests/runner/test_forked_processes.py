@@ -1,4 +1,4 @@
-"""Processes forked from a warm parent: as apart from each other as fresh ones, ended as whole."""
+"""Processes forked from a server: as apart from each other as fresh ones, ended as a whole."""
 
 import os
 import signal
@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,6 @@ import pytest
 from verify.json_files import read_json, write_json
 from verify.runner.child import Child
 from verify.scene import load_scene, scene_content
-from verify.warm import Forked, warm_parent
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux only")
 
@@ -49,20 +49,14 @@ def prepared(tmp_path, case_text, monkeypatch):
     return prepare
 
 
-@pytest.fixture(scope="module")
-def parent():
-    with warm_parent():
-        yield
-
-
 @pytest.fixture
-def solved(parent, prepared):
+def solved(prepared):
     """Give a function that runs a solver of a folder of its own, forked."""
 
     def start(name, body="", said="''"):
         folder = prepared(name, body, said)
         child = _child(folder)
-        assert isinstance(child._process, Forked)
+        assert isinstance(child._process, BaseProcess)
         return child, folder
 
     return start
@@ -118,7 +112,7 @@ def test_it_is_in_its_folder_with_its_environment_and_random_numbers(solved, mon
     assert answers[0][3] != answers[1][3]
 
 
-def test_the_parent_has_started_neither_threads_nor_mpi_and_has_one_thread(solved):
+def test_the_server_has_started_neither_threads_nor_mpi_and_has_one_thread(solved):
     said = (
         "str([m for m in ('mpi4py.MPI', 'dolfinx', 'petsc4py.PETSc', 'gmsh', 'vtk') "
         "if m in sys.modules]) + str(len(os.listdir('/proc/self/task'))) "
@@ -130,13 +124,13 @@ def test_the_parent_has_started_neither_threads_nor_mpi_and_has_one_thread(solve
     assert reason(folder) == "ValueError: []1True1"
 
 
-def test_memory_is_that_of_the_process_without_its_keeper(solved):
+def test_memory_is_that_of_the_process_alone(solved):
     child, _ = solved("memory", body="x = np.ones(50_000_000); time.sleep(1)")
     assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and what is imported
 
 
 def test_all_of_them_die_with_the_runner(prepared):
-    """Killed with no chance to end anything: parent, keeper, process and what that has started."""
+    """Killed with no chance to end anything: server, process and what that has started."""
     body = (
         "p = subprocess.Popen(['sleep', '600'], start_new_session=True)\n"
         "            Path('new').write_text(f'{os.getpid()} {os.getppid()} {p.pid}')\n"
@@ -147,18 +141,15 @@ def test_all_of_them_die_with_the_runner(prepared):
         [sys.executable, "-c", textwrap.dedent("""
             import time
             from pathlib import Path
-            from verify import warm
             from verify.runner.child import Child
-            with warm.warm_parent():
-                job, log = Path("job.json"), Path("log.txt")
-                child = Child("verify.runner.solve", job, log, 600, 4e9, own=True)
-                Path("parent").write_text(str(warm._own.parents["solving"]._process.pid))
-                while child.poll() is None:
-                    time.sleep(0.02)
+            job, log = Path("job.json"), Path("log.txt")
+            child = Child("verify.runner.solve", job, log, 600, 4e9, own=True)
+            while child.poll() is None:
+                time.sleep(0.02)
         """)],
         cwd=folder,
     )  # fmt: skip
-    pids = [*written(folder / "pids"), *written(folder / "parent")]
+    pids = written(folder / "pids")
     os.kill(runner.pid, signal.SIGKILL)
     runner.wait()
     for _ in range(500):

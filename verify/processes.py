@@ -1,0 +1,63 @@
+"""First and last acts of processes that the runner starts, and the server that forks its own."""
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from multiprocessing import forkserver
+from pathlib import Path
+
+from verify.threads import ONE_THREAD
+
+PARENT_VARIABLE = "VERIFY_RUNNER_PID"
+FORKED = multiprocessing.get_context("forkserver")
+_LAUNCHER = "launcher"  # instead of a number: started by something that the runner started
+_PR_SET_PDEATHSIG = 1
+
+
+def start_server() -> None:
+    """Begin to load the process that solves and comparisons are forked from, if there is none.
+
+    It has one thread, and imports nothing from the folder that the runner was started in. It dies
+    with the thread that calls this.
+    """
+    FORKED.set_forkserver_preload(["verify.runner.preloaded"])
+    before = dict(os.environ)
+    here = {PARENT_VARIABLE: str(os.getpid()), "PYTHONSAFEPATH": "1"}
+    os.environ.update({**ONE_THREAD, **here})
+    try:
+        with contextlib.suppress(OSError):  # without it each process is a fresh one
+            forkserver.ensure_running()
+    finally:
+        for name in (*ONE_THREAD, *here):
+            del os.environ[name]
+        os.environ.update(before)
+
+
+def die_with_parent(by: signal.Signals = signal.SIGKILL) -> None:
+    """Have the kernel kill this process when the runner dies, however it dies."""
+    parent = os.environ.get(PARENT_VARIABLE)
+    if parent is None or not sys.platform.startswith("linux"):
+        return
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, by, 0, 0, 0)
+    if parent != _LAUNCHER and os.getppid() != int(parent):  # it died before we asked
+        os.kill(os.getpid(), by)
+
+
+def under_a_launcher() -> None:
+    """Have what this process starts die with its own parent, which is not the runner."""
+    if PARENT_VARIABLE in os.environ:
+        os.environ[PARENT_VARIABLE] = _LAUNCHER
+
+
+def peak_memory() -> float:
+    """Largest resident memory of this process so far, bytes.
+
+    From ``VmHWM``; ``getrusage`` would count what the parent held when it started us.
+    """
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return float(line.split()[1]) * 1024.0
+    return float("nan")

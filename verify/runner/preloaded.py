@@ -1,0 +1,80 @@
+"""Imports of the server that solves and comparisons are forked from.
+
+A fresh Python takes longer to import what solving and judging need than many a solve takes. Nothing
+that starts threads or MPI is imported: FEniCSx is not, only the Python packages that it builds on.
+Compiled kernels are loaded, and none is compiled.
+
+The server ends whatever was started below it when the runner dies: what has lost its parent is
+given to it by the kernel. What is imported here by something else is imported, and no more.
+"""
+
+import contextlib
+import ctypes
+import gc
+import os
+import signal
+from importlib import import_module
+from typing import Any
+
+import psutil
+from numba.core import event
+
+from verify.first_use import STAGES
+from verify.processes import PARENT_VARIABLE, die_with_parent
+
+_NEEDED = (
+    "numpy.random", "verify.calibration", "verify.solvers.xfem", "verify.solvers.methods_adapter",
+    "verify.runner.solve", "meshio", "reference.exact", "verify.runner.assess",
+)  # fmt: skip
+_IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")
+_PR_SET_CHILD_SUBREAPER = 36
+
+
+def _serve() -> None:
+    """Make this process one that ends with the runner, and all below it with it."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nowhere, descriptor)
+    os.setsid()  # Ctrl-C is for the runner
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: _end())
+    die_with_parent(signal.SIGTERM)
+
+
+def _end() -> None:
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            process.kill()
+    os._exit(0)
+
+
+def _load() -> None:
+    gc.disable()  # imports make objects that live on
+    for name in _NEEDED:
+        import_module(name)
+    for name in _IF_THERE:
+        with contextlib.suppress(ImportError):
+            import_module(name)
+    with event.install_listener("numba:compile", _CompilingNothing()):
+        for stage in (call for name, call in STAGES.items() if "scalpel" not in name):
+            with contextlib.suppress(_NotCompiledError):
+                stage()
+    gc.freeze()  # what all share is not touched by their collections
+    gc.enable()
+
+
+class _NotCompiledError(Exception):
+    """A kernel is not in the cache; who needs it compiles it."""
+
+
+class _CompilingNothing(event.Listener):
+    def on_start(self, event_: Any) -> None:
+        raise _NotCompiledError
+
+    def on_end(self, event_: Any) -> None:
+        pass
+
+
+if os.environ.get(PARENT_VARIABLE) == str(os.getppid()):
+    _serve()
+_load()
