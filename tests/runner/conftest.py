@@ -13,7 +13,7 @@ import pytest
 from case_texts import STRETCHED, body_text
 from command_line import run_here
 
-from verify.runner import asking, engine
+from verify.runner import engine, loading
 from verify.solvers.interface import is_built_in
 
 HERE = Path(__file__).parent
@@ -64,7 +64,10 @@ class CommandLine:
             return subprocess.CompletedProcess(arguments, process.returncode, out, err)
         if arguments[0] == "run":
             arguments = (*arguments, "--no-report")
-        with patch.multiple(engine, is_built_in=forked), patch.multiple(asking, is_built_in=forked):
+        with (
+            patch.object(engine, "is_built_in", forked),
+            patch.object(loading, "is_built_in", forked),
+        ):
             return run_here(arguments, self.folder, {**self.environment, **environment})
 
     def records(self, out="out"):

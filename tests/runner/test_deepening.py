@@ -52,9 +52,13 @@ def judged(scene, *solves):
     return CaseResult("slit", "", "", "", {}, found, list(solves), [], [])
 
 
+def job_of(solver, level):
+    return Job("slit", solver, level, 1, "key", Path())
+
+
 def plan(scene):
     spare = [Job("slit", "reference", level, 1, "key", Path()) for level in (3, 4)]
-    return CasePlan(scene, ["xfem", "reference"], spare=spare)
+    return CasePlan(scene, ["xfem", "reference"], job_of, spare=spare)
 
 
 def test_the_finest_solution_of_every_solver_sets_the_measure(scene):
@@ -100,12 +104,12 @@ def test_levels_wait_in_vain_when_fewer_than_three_can_have_an_answer(scene, sta
     levels = [Job("slit", "reference", level, 1, "key", Path()) for level in range(4)]
     others = [Job("slit", "xfem", 0, 1, "key", Path()), Job("other", "reference", 2, 1, "", Path())]
     waiting = [others[0], *levels[1:3], others[1]]
-    three = CasePlan(scene, ["xfem", "reference"], jobs=[others[0], *levels[:3]])
+    three = CasePlan(scene, ["xfem", "reference"], job_of, jobs=[others[0], *levels[:3]])
     in_vain = levels_in_vain(three, levels[0], levels[0].blank(status, "why"), waiting)
     assert [job for job, _ in in_vain] == levels[1:3]
     assert all(record.status is Status.FAILED for _, record in in_vain)
     assert all("level 0" in record.reason for _, record in in_vain)
-    four = CasePlan(scene, ["xfem", "reference"], jobs=levels)
+    four = CasePlan(scene, ["xfem", "reference"], job_of, jobs=levels)
     assert not levels_in_vain(four, levels[0], levels[0].blank(status, "why"), levels[1:])
     assert not levels_in_vain(three, levels[0], levels[0].blank(Status.SOLVED, ""), waiting)
     assert not levels_in_vain(three, others[0], others[0].blank(status, "why"), waiting)

@@ -7,7 +7,6 @@ import pytest
 from verify.result import Status
 from verify.result_files import read_result
 from verify.runner.solve import solve_job
-from verify.runner.survey import survey
 from verify.scene import load_scene, scene_content
 
 # reasons, as they begin
@@ -38,11 +37,16 @@ def scene(tmp_path, case_text):
     return load_scene(tmp_path / "square.toml")
 
 
+def solved(scene, name, folder):
+    """Return how level 0 of a guest ends, which is asked first whether it takes the case."""
+    job = {"scene": scene_content(scene), "solver": f"guests:{name}", "level": 0}
+    return solve_job({**job, "repetitions": 1, "parameters": {}, "tell_levels": True}, folder)
+
+
 @pytest.mark.parametrize("name", ANSWERS)
 def test_an_answer_that_is_none_has_its_reason(tmp_path, monkeypatch, scene, name):
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    job = {"scene": scene_content(scene), "solver": f"guests:{name}", "level": 0}
-    outcome = solve_job({**job, "repetitions": 1, "parameters": {}}, tmp_path)
+    outcome = solved(scene, name, tmp_path)
     assert (outcome["status"], outcome["reason"][: len(ANSWERS[name])]) == ("failed", ANSWERS[name])
     assert len(outcome["reason"]) < 500
     assert outcome["reason"].isprintable()
@@ -81,16 +85,19 @@ def test_a_link_in_its_folder_is_not_written_through(tmp_path, scene, monkeypatc
     assert not list(folder.glob("outcome*"))
 
 
-def test_a_refusal_of_any_length_is_a_sentence(scene):
-    answer = survey("guests:Talking", [scene_content(scene)])
-    assert answer["cases"]["square"]["refusal"].startswith("no no no")
-    assert len(answer["cases"]["square"]["refusal"]) <= 400
+def test_a_refusal_of_any_length_is_a_sentence(scene, tmp_path):
+    outcome = solved(scene, "Talking", tmp_path)
+    assert outcome["status"] is Status.REFUSED
+    assert outcome["reason"].startswith("no no no")
+    assert len(outcome["reason"]) <= 400
 
 
 @pytest.mark.parametrize("name", ASKED)
-def test_nonsense_when_it_is_asked_has_its_reason(scene, name):
-    answer = survey(f"guests:{name}", [scene_content(scene)])
-    assert answer["cases"]["square"]["failure"].startswith(ASKED[name])
+def test_nonsense_when_it_is_asked_has_its_reason(scene, name, tmp_path):
+    outcome = solved(scene, name, tmp_path)
+    assert outcome["status"] is Status.FAILED
+    assert outcome["reason"].startswith(ASKED[name])
+    assert not list(tmp_path.glob("solution*"))
 
 
 def run(verify, names, *options):

@@ -70,6 +70,9 @@ class _Lines:
         self.running = {what: monotonic()}
 
     def planned(self, solves: int, cases: int) -> None:
+        if self.total:  # more or fewer than it seemed
+            self.total = solves
+            return
         self.total, self.running = solves, {}
         if self.expected:
             self.say(self.expected)
@@ -80,7 +83,6 @@ class _Lines:
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         self.done += 1
-        self.total = max(self.total, self.done)  # a reference may get further levels
         self.running.pop(label, None)
         self.say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
 
@@ -127,10 +129,12 @@ class _Bars:
         self._describe()
 
     def planned(self, solves: int, cases: int) -> None:
-        if self.expected:
-            self.say(self.expected)
-        self.running = {}
-        self.bars.update(self.task, description="", total=solves + cases)
+        if self.bars.tasks[self.task].total is None:
+            self.running = {}
+            if self.expected:
+                self.say(self.expected)
+        self.bars.update(self.task, total=solves + cases)
+        self._describe()
 
     def started(self, label: str) -> None:
         self.running[label] = monotonic()

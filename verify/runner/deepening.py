@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from verify.result import CaseResult, SolveRecord, Status
-from verify.runner.job import Job, stored_record
+from verify.runner.job import Job
 from verify.runner.plan import CasePlan
 from verify.runner.reference_cache import REFERENCE
 
@@ -30,12 +30,6 @@ def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
         return None
     plan.jobs.append(plan.spare.pop(0))
     return plan.jobs[-1]
-
-
-def take_up_known_levels(plan: CasePlan) -> None:
-    """Make jobs of the spare levels that an interrupted or earlier run has solved already."""
-    while plan.spare and stored_record(plan.spare[0]) is not None:
-        plan.jobs.append(plan.spare.pop(0))
 
 
 def levels_in_vain(

@@ -24,7 +24,9 @@ from verify.json_files import read_json, write_json
 from verify.whole_files import asked_place
 
 RUN_SCHEMA = 1
-JUDGING = "judging"  # file of a case: the solve that its comparison is at, if it dies there
+# files by which a process says what is needed if it dies: the solve that a comparison is at, and
+# how many levels a solver has that takes the case
+JUDGING, LEVELS = "judging", "levels"
 _IDENTITY = ("cases", "options_of_result")
 
 

@@ -9,7 +9,10 @@ from verify.printable import memory_text
 from verify.result import SolveRecord, Status
 from verify.result_files import checked
 from verify.runner.child import Ending
+from verify.runner.directory import LEVELS
+from verify.runner.job import Job
 from verify.runner.log import telling_line
+from verify.solvers.interface import MOST_LEVELS
 
 
 def outcome_in(folder: Path) -> dict[str, Any] | None:
@@ -24,6 +27,14 @@ def outcome_in(folder: Path) -> dict[str, Any] | None:
     except InputError:
         return None
     return {name: getattr(record, name) for name in outcome}
+
+
+def levels_told(job: Job) -> int:
+    """Return how many levels a solver has that was asked for level 0; 0 if it has not said."""
+    try:
+        return min(int((job.folder / LEVELS).read_text()), MOST_LEVELS)
+    except (OSError, ValueError):
+        return 0
 
 
 def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Status, str]:

@@ -1,20 +1,16 @@
-"""From cases to solves: which solvers, which levels, what they refuse."""
+"""From cases to solves: which solvers, which levels, in which order."""
 
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from time import sleep
 from typing import Any
 
 from verify.errors import InputError
 from verify.result import SolveRecord, Status
-from verify.runner.asking import Asking
-from verify.runner.child import POLL_SECONDS
+from verify.runner.cost import case_cost
 from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
-from verify.runner.interruption import StopRequest
-from verify.runner.job import Job
+from verify.runner.job import Job, stored_record
+from verify.runner.loading import Loaded
 from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
@@ -22,38 +18,107 @@ from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solvers.named import parameters_of
 
-Survey = dict[str, dict[str, Any]]
-
 
 @dataclass
 class CasePlan:
-    """The solves of one case, and the records of those that are known not to run.
+    """The solves of one case.
 
-    `spare` are levels of the reference that are solved only if the others do not suffice, `models`
-    those of other models, whose scenes are `other_scenes`.
+    Level 0 of each solver is laid out at once; it says whether the solver takes the case, and how
+    many levels there are, and the others follow then. The reference is held back until a solver
+    has not refused the case: if all do, there is nothing to be judged.
+
+    Attributes
+    ----------
+    scene : Scene
+    solvers : list of str
+        The reference last.
+    job_of : callable
+        Makes a job from solver and level.
+    jobs : list of Job
+        All that run, have run or are held back.
+    refused : list of (Job, SolveRecord)
+        The records of those that are known not to run.
+    spare : list of Job
+        Levels of the reference that are solved only if the others do not suffice.
+    most_levels : int
+        Of the reference, with spare ones.
+    models : list of Job
+        Of other models, whose scenes are `other_scenes`.
+    held : list of Job
+        Those that wait for a solver that does not refuse.
+    awaited : dict of str to int
+        How many levels are expected to follow level 0, by solver.
     """
 
     scene: Scene
     solvers: list[str]
+    job_of: Callable[[str, int], Job]
     jobs: list[Job] = field(default_factory=list)
     refused: list[tuple[Job, SolveRecord]] = field(default_factory=list)
     spare: list[Job] = field(default_factory=list)
+    most_levels: int = 0
     models: list[Job] = field(default_factory=list)
     other_scenes: dict[str, Scene] = field(default_factory=dict)
+    held: list[Job] = field(default_factory=list)
+    awaited: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Number of solves, as far as it is known."""
+        known = len(self.jobs) + len(self.refused) + len(self.models)
+        return known + sum(self.awaited.values())
 
     def scene_of(self, job: Job) -> Scene:
         """Return the scene that a job solves: that of the case, or of another model of it."""
         return self.other_scenes.get(job.model, self.scene)
 
+    def ordered(self) -> list[Job]:
+        """Return the case's own jobs by solver and level."""
+        jobs = [*self.jobs, *(job for job, _ in self.refused)]
+        return sorted(jobs, key=lambda job: (self.solvers.index(job.solver), job.level))
+
+    def following(self, job: Job, record: SolveRecord, levels: int) -> list[Job]:
+        """Return what may begin now that a job has ended: after level 0, the other levels.
+
+        Parameters
+        ----------
+        job : Job
+        record : SolveRecord
+            Of `job`.
+        levels : int
+            Of the solver; 0 if it has not said how many.
+        """
+        if job.level or job.model or job.solver not in self.awaited:
+            return []
+        del self.awaited[job.solver]
+        new = [self.job_of(job.solver, level) for level in range(1, levels)]
+        if job.solver == REFERENCE and levels:
+            more = range(levels, max(levels, self.most_levels))
+            self.spare = [self.job_of(REFERENCE, level) for level in more]
+        while self.spare and stored_record(self.spare[0]) is not None:
+            new.append(self.spare.pop(0))  # an interrupted or earlier run has solved it
+        self.jobs += new
+        if record.status is not Status.REFUSED:
+            new, self.held = new + self.held, []
+        elif self.held and set(self.awaited) == {REFERENCE}:  # all have refused
+            self.jobs = [own for own in self.jobs if own not in self.held]
+            self.held, self.models, self.other_scenes, self.awaited = [], [], {}, {}
+        return new
+
 
 def solvers_of(scene: Scene, options: Options) -> list[str]:
     """Return the names of the solvers that a run of `scene` takes, the reference last."""
-    named = [check.solver for check in scene.acceptance if check.solver is not None]
-    named += [check.compared for check in scene.acceptance if check.compared]
-    names = list(dict.fromkeys(options.solvers or ("xfem", "conforming", *named)))
-    if options.judged and not scene.judged_by_exact and REFERENCE not in names:
-        names.append(REFERENCE)
-    return names
+    named = _named(scene, options)
+    if options.judged and not scene.judged_by_exact and REFERENCE not in named:
+        named.append(REFERENCE)
+    return named
+
+
+def _named(scene: Scene, options: Options) -> list[str]:
+    """Names of the solvers that the command line or else the checks ask for."""
+    checks = [check.solver for check in scene.acceptance if check.solver is not None]
+    checks += [check.compared for check in scene.acceptance if check.compared]
+    return list(dict.fromkeys(options.solvers or ("xfem", "conforming", *checks)))
 
 
 def check_judged(scenes: Sequence[Scene], options: Options) -> None:
@@ -64,120 +129,77 @@ def check_judged(scenes: Sequence[Scene], options: Options) -> None:
             raise InputError(f"solver '{name}' is not asked{nearest(name, asked)}", "--judge")
 
 
-def survey_solvers(
-    scenes: Sequence[Scene],
-    options: Options,
-    stop: StopRequest,
-    bundle: ReferenceBundle | None = None,
-) -> Survey:
-    """Ask each solver, in a process of its own, what it refuses and how many levels it has.
-
-    The reference is not asked if there is a `bundle`, so that it need not be installed.
-
-    Raises
-    ------
-    InputError
-        If a scene names something bad (a mesh file), the bundle lacks a scene, or `options`
-        name a solver that does not work here, or a parameter that it does not have. A solver
-        that only the cases want may be missing: its solves fail, with that reason. One that hangs,
-    dies or answers nonsense when it is asked fails on that case.
-    RunStoppedError
-        If a signal came.
-    """
-    asked: dict[str, list[Scene]] = {}
-    for scene in scenes:
-        for name in solvers_of(scene, options):
-            asked.setdefault(name, []).append(scene)
-    answers: Survey = {}
-    if bundle is not None and (judged := asked.pop(REFERENCE, [])):
-        levels = {scene.name: bundle.levels(scene) for scene in judged}
-        cases = {name: {"levels": n, "refusal": None} for name, n in levels.items()}
-        answers[REFERENCE] = {"error": None, "cases": cases}
-    with tempfile.TemporaryDirectory(prefix="verify-") as folder:
-        waiting = list(asked)
-        running: dict[str, Asking] = {}
-        try:
-            while waiting or running:
-                stop.check()
-                while waiting and len(running) < options.jobs:
-                    name = waiting.pop(0)
-                    running[name] = Asking(
-                        name,
-                        asked[name],
-                        parameters_of(name, options.parameters),
-                        Path(folder, str(len(asked) - len(waiting))),
-                        options.timeout,
-                        options.memory,
-                    )
-                for name, asking in list(running.items()):
-                    if (answer := asking.poll()) is not None:
-                        answers[name] = answer
-                        del running[name]
-                sleep(POLL_SECONDS)
-        finally:
-            for asking in running.values():
-                asking.kill()
-    for name, answer in answers.items():
-        if answer["error"] and name in options.solvers:
-            raise InputError(answer["error"], "--solver")
-        if bad := answer.get("bad_parameter"):
-            raise InputError(bad, "--solver" if " " in name else "--set")
-        for scene in asked.get(name, []):
-            bad = answer.get("cases", {}).get(scene.name, {}).get("bad_input")
-            if bad:
-                raise InputError(
-                    bad, "" if str(scene.file) in bad else str(scene.file or scene.name)
-                )
-    return answers
-
-
 def plan_case(
     scene: Scene,
     options: Options,
-    survey: Survey,
+    loaded: Mapping[str, Loaded],
     directory: RunDirectory,
     bundle: ReferenceBundle | None = None,
 ) -> CasePlan:
-    """Lay out the solves of `scene`, coarse to fine."""
-    plan = CasePlan(scene, solvers_of(scene, options))
+    """Lay out the solves of `scene` that are known before any has run."""
     physics = physics_digest(scene)
-    for name in plan.solvers:
-        answer = survey[name]
+
+    def job_of(name: str, level: int) -> Job:
         parameters = parameters_of(name, options.parameters)
-        code = [code_of_solver(name), answer.get("source", "")]
-        asked = answer.get("cases", {}).get(scene.name, {})
-        planned = asked.get("levels", 0)
-        most = planned
-        if name == REFERENCE and bundle is None and not scene.judged_by_exact:
-            most = max(planned, scene.reference.max_levels or 0)
-        jobs = [
-            Job(
-                case=scene.name,
-                solver=name,
-                level=level,
-                repetitions=options.repetitions,
-                key=bundle.key(scene, level)
-                if bundle is not None and name == REFERENCE
-                else digest_of([physics, name, level, options.repetitions, parameters, code]),
-                folder=directory.solve_folder(scene.name, name, level),
-                parameters=parameters,
-            )
-            for level in range(max(most, 1))
-        ]
-        if answer["error"]:
-            plan.refused.append((jobs[0], jobs[0].blank(Status.FAILED, answer["error"])))
-        elif failure := asked.get("failure"):
-            status = Status(asked.get("status", Status.FAILED))
-            plan.refused.append((jobs[0], jobs[0].blank(status, failure)))
-        elif asked["refusal"]:
-            plan.refused.append((jobs[0], jobs[0].blank(Status.REFUSED, asked["refusal"])))
-        else:
-            plan.jobs += jobs[:planned]
-            plan.spare += jobs[planned:most]
+        code = [code_of_solver(name), loaded[name].source]
+        given = [physics, name, level, options.repetitions, parameters, code]
+        from_bundle = bundle is not None and name == REFERENCE
+        return Job(
+            case=scene.name,
+            solver=name,
+            level=level,
+            repetitions=options.repetitions,
+            key=bundle.key(scene, level) if bundle and from_bundle else digest_of(given),
+            folder=directory.solve_folder(scene.name, name, level),
+            parameters=parameters,
+        )
+
+    plan = CasePlan(scene, solvers_of(scene, options), job_of)
+    for name in plan.solvers:
+        job = job_of(name, 0)
+        if error := loaded[name].error:
+            plan.refused.append((job, job.blank(Status.FAILED, error)))
+            continue
+        plan.jobs.append(job)
+        expected = scene.reference.levels if name == REFERENCE else scene.mesh.count
+        plan.awaited[name] = expected - 1
+    if bundle is None and not scene.judged_by_exact:
+        plan.most_levels = scene.reference.max_levels or 0
     if options.judged and bundle is None and scene.adequacy.models:
         # what only reads cases shall not wait for the comparison that this imports
         from verify.runner.models import model_jobs
 
         folder = directory.case_folder(scene.name)
         plan.models, plan.other_scenes = model_jobs(scene, folder)
+    others = [job for job in plan.jobs if job.solver != REFERENCE]
+    if others and not plan.refused and REFERENCE not in _named(scene, options):
+        plan.held = [*(job for job in plan.jobs if job.solver == REFERENCE), *plan.models]
     return plan
+
+
+def begun_after(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], tuple[Any, ...]]:
+    """Return the key by which the solves of a run are sorted as they are begun.
+
+    One after the other they keep the order of the plans. Side by side, the case that is expected
+    to take longest is begun first, and in each case level 0 of each solver, then the reference,
+    coarse to fine, which is most of it: what is short is left for the end, when it fills all
+    processes to the last.
+
+    A solve of a guest that was begun and left no record comes last: it may end the run once more.
+    """
+    one_by_one = options.jobs == 1 and not options.cluster
+
+    def spent(plan: CasePlan) -> float:
+        return sum(row.seconds for row in case_cost(plan.scene, plan.solvers, options.repetitions))
+
+    ordered = plans if one_by_one else sorted(plans, key=spent, reverse=True)
+    place = {p.scene.name: (i, [*p.solvers, REFERENCE]) for i, p in enumerate(ordered)}
+
+    def key(job: Job) -> tuple[Any, ...]:
+        begun = (job.folder / "job.json").exists() and not (job.folder / "record.json").exists()
+        case, solvers = place[job.case]
+        own = (bool(job.model), solvers.index(job.solver), job.level)
+        first = 0 if one_by_one else 1 if job.solver == REFERENCE else 2 if job.level else 0
+        return (begun and job.solver != REFERENCE, case, first, *own)
+
+    return key

@@ -15,8 +15,9 @@ from verify.runner.cluster import ClusterEngine
 from verify.runner.directory import claimed, folder_name, write_run
 from verify.runner.fingerprint import code_of_solver
 from verify.runner.interruption import listening
+from verify.runner.loading import load_solvers
 from verify.runner.options import Options
-from verify.runner.plan import check_judged, plan_case, solvers_of, survey_solvers
+from verify.runner.plan import check_judged, plan_case, solvers_of
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.work import Progress, Work
@@ -87,7 +88,10 @@ def run_cases(
         start_server()
         for name in names:  # asked below; the server is still loading
             code_of_solver(name)
-        survey = survey_solvers(scenes, options, stop, bundle)
+        if bundle is not None:
+            for scene in scenes:
+                bundle.levels(scene)  # or say now that there are none
+        loaded = load_solvers(names, options, stop)
         with claimed(out, identity) as directory:
             record: dict[str, Any] = {
                 **identity,
@@ -99,7 +103,7 @@ def run_cases(
                 "provenance": origin,
             }
             write_run(directory, record)
-            plans = [plan_case(scene, options, survey, directory, bundle) for scene in scenes]
+            plans = [plan_case(scene, options, loaded, directory, bundle) for scene in scenes]
             work = Work(plans, directory, options, origin, progress, bundle, cluster, drawings)
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})

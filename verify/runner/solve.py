@@ -1,8 +1,8 @@
 """One solve in a process of its own: ``python -m verify.runner.solve JOB.json``.
 
-Writes ``solution.json``/``.vtu`` and, last, ``outcome.json``; a process that dies without an
-outcome has failed, and its log says how. As one of several MPI ranks it solves its part; the
-first rank writes.
+Writes how many levels there are, if it is asked, then ``solution.json``/``.vtu`` and, last,
+``outcome.json``; a process that dies without an outcome has failed, and its log says how. As one of
+several MPI ranks it solves its part; the first rank writes.
 """
 
 import contextlib
@@ -18,8 +18,9 @@ from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
 from verify.processes import die_with_parent, peak_memory
 from verify.result import COMPILING, CRITICAL_STEP, Status
-from verify.runner.directory import emptied
+from verify.runner.directory import LEVELS, emptied
 from verify.runner.ranks import give_up, world
+from verify.whole_files import write_whole
 
 _WORTH_SAYING = 0.5  # seconds of compilation
 _LONGEST = 400  # characters of a reason
@@ -69,7 +70,7 @@ def solve_job(
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             return {"status": Status.FAILED, "reason": one_line(error, _LONGEST)}
         with contextlib.suppress(OSError):  # what it left is in the way of all others
-            emptied(folder, kept=("job.json", "log.txt"))
+            emptied(folder, kept=("job.json", "log.txt", LEVELS))
         return {"status": Status.FAILED, "reason": "the disk is full"}
     except BaseException as error:  # a solver may raise anything
         _leave_traceback()
@@ -87,7 +88,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
-    from verify.solvers.interface import checked_refusal
+    from verify.solvers.interface import checked_levels, checked_refusal
     from verify.solvers.named import solver_in
 
     if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
@@ -96,6 +97,8 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     solver = find_solver(solver_in(job["solver"]))
     if refusal := checked_refusal(solver.refuses(scene)):
         raise UnsupportedSceneError(refusal)
+    if store and job.get("tell_levels"):
+        write_whole(folder / LEVELS, str(checked_levels(solver.levels(scene))))
     with compile_times() as compiled:
         solution = handed_over(
             solver.solve(scene, job["level"], repetitions=job["repetitions"], **job["parameters"])

@@ -1,7 +1,8 @@
 """Work of a run: what waits, what runs, what is done; solves, comparisons and drawings."""
 
 import os
-from collections.abc import Sequence
+from bisect import insort
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import sleep
@@ -15,8 +16,8 @@ from verify.result_files import write_result
 from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
 from verify.runner.comparing import Comparison, comparison_label, stored_result
-from verify.runner.deepening import further_level, levels_in_vain, take_up_known_levels
-from verify.runner.directory import RunDirectory, emptied
+from verify.runner.deepening import further_level, levels_in_vain
+from verify.runner.directory import LEVELS, RunDirectory, emptied
 from verify.runner.drawing import Drawings
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.families import Families
@@ -24,9 +25,8 @@ from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.interruption import StopRequest
 from verify.runner.job import Job, load_record, store_record, stored_record
 from verify.runner.options import Options
-from verify.runner.order import order_of_solves
-from verify.runner.outcome import death, outcome_in
-from verify.runner.plan import CasePlan
+from verify.runner.outcome import death, levels_told, outcome_in
+from verify.runner.plan import CasePlan, begun_after
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
 from verify.scene import scene_content
@@ -37,7 +37,7 @@ class Progress(Protocol):
     """Who is told how the run goes."""
 
     def planned(self, solves: int, cases: int) -> None:
-        """Say how much there is to do."""
+        """Say how much there is to do, as far as it is known; said again when that changes."""
         ...
 
     def started(self, label: str) -> None:
@@ -71,18 +71,18 @@ class Work:
         self.directory, self.options, self.origin = directory, options, origin
         self.progress, self.reused = progress, 0
         self.plans = {plan.scene.name: plan for plan in plans}
-        for plan in plans:
-            take_up_known_levels(plan)
-        self.waiting = order_of_solves(plans, options)
-        self.open = {n: len(plan.jobs) + len(plan.models) for n, plan in self.plans.items()}
-        self.to_judge = [name for name, count in self.open.items() if not count]
+        self.begun_after = begun_after(plans, options)
+        self.waiting: list[Job] = []
         self.running: dict[Running, Job] = {}
+        for plan in plans:
+            self._wait(job for job in (*plan.jobs, *plan.models) if job not in plan.held)
+        self.to_judge = [name for name in self.plans if not self._is_open(name)]
         self.comparing: list[Comparison] = []
         self.results: dict[str, CaseResult] = {}
         self.families = Families((plan.scene for plan in plans), options.judge_only)
         self.records: dict[Path, bytes] = {}  # as they were written
         self.again: set[Path] = set()
-        side_by_side = max(1, min(options.jobs, len(self.waiting)))
+        side_by_side = max(1, min(options.jobs, sum(plan.count for plan in plans)))
         self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
         limits = options.timeout, self.memory
         self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
@@ -90,10 +90,7 @@ class Work:
 
     def until_done(self, stop: StopRequest) -> list[CaseResult]:
         """Run everything; kill what runs if that is interrupted or fails."""
-        self.progress.planned(
-            sum(self.open.values()) + sum(len(plan.refused) for plan in self.plans.values()),
-            len(self.plans),
-        )
+        self._say_plan()
         try:
             for plan in self.plans.values():
                 self._prepare(plan)
@@ -120,6 +117,18 @@ class Work:
             self.drawings.kill()
             self.engine.close()
         return [self.results[name] for name in self.plans]
+
+    def _say_plan(self) -> None:
+        self.progress.planned(sum(plan.count for plan in self.plans.values()), len(self.plans))
+
+    def _wait(self, jobs: Iterable[Job]) -> None:
+        """Have jobs wait for their turn."""
+        for job in jobs:
+            insort(self.waiting, job, key=self.begun_after)
+
+    def _is_open(self, case: str) -> bool:
+        """Whether a solve of a case is to come or to end."""
+        return any(job.case == case for job in (*self.waiting, *self.running.values()))
 
     def _unfinished(self) -> bool:
         todo = (self.waiting, self.to_judge, self.drawings.waiting)
@@ -170,6 +179,7 @@ class Work:
             "repetitions": job.repetitions,
             "parameters": job.parameters,
             "ranks": self._ranks(job),
+            "tell_levels": not (job.level or job.model),
         }
         write_json(content, job.folder / "job.json")
         self.running[self.engine.start(content, job.folder)] = job
@@ -184,9 +194,15 @@ class Work:
         scene = self.plans[job.case].scene_of(job)
         if job.solver != REFERENCE:
             return None
+        record = None
         if self.bundle is not None:
-            return self.bundle.take(scene, job)
-        return self.cache.take(scene, job) if self.cache is not None else None
+            record = self.bundle.take(scene, job)
+        elif self.cache is not None:
+            record = self.cache.take(scene, job)
+        if record is not None and not job.level:
+            levels = self.bundle.levels(scene) if self.bundle else scene.reference.levels
+            write_whole(job.folder / LEVELS, str(levels))
+        return record
 
     def _ended(self, job: Job, solve: Running, ending: Ending) -> None:
         record = self._record(job, solve, ending)
@@ -237,12 +253,15 @@ class Work:
 
     def _solve_done(self, job: Job, record: SolveRecord, reused: bool) -> None:
         self.progress.solved(job.label, record, reused)
-        self.open[job.case] -= 1
-        for other, without in levels_in_vain(self.plans[job.case], job, record, self.waiting):
+        plan = self.plans[job.case]
+        before = plan.count
+        self._wait(plan.following(job, record, levels_told(job)))
+        if plan.count != before:
+            self._say_plan()
+        for other, without in levels_in_vain(plan, job, record, self.waiting):
             self.waiting.remove(other)
-            self.open[job.case] -= 1
             self.progress.solved(other.label, self._kept(other, without), reused=False)
-        if not self.open[job.case]:
+        if not self._is_open(job.case):
             self.to_judge.append(job.case)
 
     def _restore(self, plan: CasePlan, jobs: Sequence[Job]) -> None:
@@ -268,12 +287,11 @@ class Work:
 
     def _judge(self, case: str) -> None:
         plan, folder = self.plans[case], self.directory.case_folder(case)
-        own = [*plan.jobs, *(job for job, _ in plan.refused)]
+        own = plan.ordered()
         jobs = [*own, *plan.models]
         self._restore(plan, jobs)
         if lost := self._lost(jobs):
-            self.waiting = [*lost, *self.waiting]
-            self.open[case] += len(lost)
+            self._wait(lost)
             return
         records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
         judge_only = self.options.judge_only
@@ -302,8 +320,8 @@ class Work:
 
     def _case_done(self, result: CaseResult) -> None:
         if (job := further_level(self.plans[result.case], result)) is not None:
-            self.waiting.insert(0, job)
-            self.open[result.case] += 1
+            self._wait([job])
+            self._say_plan()
             return
         for done in self.families.ready(result):
             folder = self.directory.case_folder(done.case)

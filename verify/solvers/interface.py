@@ -40,7 +40,7 @@ _GROUP = "verify.solvers"
 _PROGRAMS = Path(__file__).resolve().parents[1] / "foreign" / "programs"
 _FOREIGN = "verify.foreign.program:ForeignProgram"
 _ASKED = ("refuses", "levels", "solve")  # methods that every solver has
-_MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
+MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 
 
 class Solver(Protocol):
@@ -99,8 +99,8 @@ def checked_levels(answer: Any) -> int:
         If it is no number of mesh levels.
     """
     whole = isinstance(answer, int | np.integer) and not isinstance(answer, bool)
-    if not whole or not 1 <= answer <= _MOST_LEVELS:
-        wanted = f"a whole number from 1 to {_MOST_LEVELS}"
+    if not whole or not 1 <= answer <= MOST_LEVELS:
+        wanted = f"a whole number from 1 to {MOST_LEVELS}"
         raise InputError(f"levels() gave {shown(answer)}; expected {wanted}")
     return int(answer)
 
