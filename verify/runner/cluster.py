@@ -1,23 +1,28 @@
 """Solves on the workers of a Dask cluster: ``verify run --cluster ADDRESS``.
 
 The scheduler hands solves out, restarts those whose worker died, and waits for workers that are
-to come. Each worker must have the same code and versions; a solve comes back as bytes. The
-comparison stays on the machine of the run.
+to come. Each worker must have the same code and versions. No file system is shared: a worker solves
+in a folder of its own, in a child with the limits of the run, which dies if the run no longer wants
+its answer, and the files come back as bytes. The comparison stays on the machine of the run.
 """
 
 import logging
 import re
+import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.runner.child import Ending
+from verify.json_files import read_json, write_json
+from verify.provenance import provenance
+from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.engine import solving
 from verify.runner.fingerprint import code_of_solver
-from verify.runner.remote import solve_remotely
 from verify.scene import MeshFile, mesh_path, restore_scene
 from verify.whole_files import write_whole
 
-_CONNECT_SECONDS = 15.0
+_CONNECT_SECONDS, _LOOK_SECONDS = 15.0, 1.0
 
 
 class ClusterEngine:
@@ -99,15 +104,13 @@ class RemoteSolve:
             return None
         if self._future.status != "finished":
             return self._lost(self._future.exception())
-        answer = self._future.result()
-        if "refused" in answer:
-            return self._lost(answer["refused"])
-        files: dict[str, bytes] = answer["files"]
+        ending, files = self._future.result()
         # the outcome last: its presence means that the rest is there
         for name in sorted(files, key=lambda name: name == "outcome.json"):
             write_whole(self._folder / Path(name).name, files[name])
         self._future.release()
-        return Ending(**answer["ending"])
+        assert isinstance(ending, Ending)
+        return ending
 
     def kill(self) -> None:
         """Cancel it; its worker kills the child within a second or so."""
@@ -119,3 +122,85 @@ class RemoteSolve:
             text = "the workers that ran it died, several times over"
         self.log.write_text(f"{text}\n", encoding="utf-8")
         return Ending(1, 0.0, 0.0)
+
+
+def solve_remotely(
+    job: dict[str, Any], mesh: bytes | None, code: str, timeout: float, memory: float | None
+) -> tuple[Ending, dict[str, bytes]]:
+    """Solve `job` on this worker; return how that ended, and the content of its files by name.
+
+    Parameters
+    ----------
+    job : dict
+        Content of ``job.json``.
+    mesh : bytes or None
+        Content of the scene's mesh file, if it has one.
+    code : str
+        Hash of the code and the versions at the run; other code here is not used.
+    timeout, memory : float
+        Limits of the child, s and bytes; default of the latter: 80 % of the worker's machine,
+        shared by its threads.
+
+    Raises
+    ------
+    InputError
+        If the worker has other code.
+    """
+    if (here := code_of_solver(job["solver"])) != code:
+        reason = f"the worker has other code or other versions ({here}, the run has {code})"
+        raise InputError(f"{reason}: install the same on it")
+    from distributed import get_worker
+
+    worker = get_worker()
+    limit = memory or 0.8 * provenance()["memory"] / max(1, worker.state.nthreads)
+    with tempfile.TemporaryDirectory(prefix="verify-worker-") as place:
+        folder = Path(place)
+        if mesh is not None:
+            _take_along(job, mesh, folder)
+        write_json(job, folder / "job.json")
+        child = solving(job, folder, timeout, limit, forked=False)  # a worker has threads
+        try:
+            ending = _watched(child, worker)
+        finally:
+            child.kill()
+        _sign(folder / "outcome.json")
+        files = {
+            path.name: path.read_bytes()
+            for path in folder.iterdir()
+            if path.name != "job.json" and not path.name.startswith("geometry-")
+        }
+    return ending, files
+
+
+def _sign(outcome: Path) -> None:
+    """Note the worker's machine: its times are not those of the machine of the run."""
+    if outcome.exists():
+        content = read_json(outcome)
+        content.setdefault("notes", {})["worker"] = provenance()["cpu"]
+        write_json(content, outcome)
+
+
+def _take_along(job: dict[str, Any], mesh: bytes, folder: Path) -> None:
+    """Write the mesh file where the scene will look for it."""
+    scene = job["scene"]
+    name = f"geometry-{Path(scene['scene']['geometry']['file']).name}"
+    (folder / name).write_bytes(mesh)
+    scene["scene"]["geometry"]["file"] = name
+    scene["file"] = str(folder / "case.toml")
+
+
+def _watched(child: Child, worker: Any) -> Ending:
+    """Wait for the end; kill the child if its task is cancelled or its client gone."""
+    from distributed.worker import thread_state
+
+    key = getattr(thread_state, "key", None)
+    looked = time.monotonic()
+    while (ending := child.poll()) is None:
+        time.sleep(POLL_SECONDS)
+        if time.monotonic() - looked > _LOOK_SECONDS:
+            looked = time.monotonic()
+            task = worker.state.tasks.get(key)
+            if key is not None and (task is None or task.state != "executing"):
+                child.kill()
+                break
+    return ending or Ending(-9, 0.0, child.peak, "cancelled")

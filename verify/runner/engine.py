@@ -56,15 +56,16 @@ class LocalEngine:
 
     def start(self, job: dict[str, Any], folder: Path) -> Child:
         """Start a process."""
-        return Child(
-            "verify.runner.solve",
-            folder / "job.json",
-            folder / "log.txt",
-            self._timeout,
-            self._memory,
-            job.get("ranks", 1),
-            own=is_built_in(job["solver"]),
-        )
+        return solving(job, folder, self._timeout, self._memory)
 
     def close(self) -> None:
         """There is nothing to leave."""
+
+
+def solving(
+    job: dict[str, Any], folder: Path, timeout: float, memory: float, forked: bool = True
+) -> Child:
+    """Start the process that solves what ``job.json`` in `folder` says; `forked` if it may be."""
+    own = forked and is_built_in(job["solver"])
+    files, ranks = (folder / "job.json", folder / "log.txt"), job.get("ranks", 1)
+    return Child("verify.runner.solve", *files, timeout, memory, ranks, own=own)

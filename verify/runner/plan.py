@@ -137,11 +137,12 @@ def plan_case(
     bundle: ReferenceBundle | None = None,
 ) -> CasePlan:
     """Lay out the solves of `scene` that are known before any has run."""
-    physics = physics_digest(scene)
+    physics, solvers = physics_digest(scene), solvers_of(scene, options)
+    found = {name: loaded.get(name, Loaded()) for name in solvers}
 
     def job_of(name: str, level: int) -> Job:
         parameters = parameters_of(name, options.parameters)
-        code = [code_of_solver(name), loaded[name].source]
+        code = [code_of_solver(name), found[name].source]
         given = [physics, name, level, options.repetitions, parameters, code]
         from_bundle = bundle is not None and name == REFERENCE
         return Job(
@@ -154,10 +155,10 @@ def plan_case(
             parameters=parameters,
         )
 
-    plan = CasePlan(scene, solvers_of(scene, options), job_of)
+    plan = CasePlan(scene, solvers, job_of)
     for name in plan.solvers:
         job = job_of(name, 0)
-        if error := loaded[name].error:
+        if error := found[name].error:
             plan.refused.append((job, job.blank(Status.FAILED, error)))
             continue
         plan.jobs.append(job)

@@ -20,6 +20,7 @@ from verify.runner.options import Options
 from verify.runner.plan import check_judged, plan_case, solvers_of
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
+from verify.runner.reference_cache import REFERENCE
 from verify.runner.work import Progress, Work
 from verify.scene import Scene
 
@@ -90,8 +91,10 @@ def run_cases(
             code_of_solver(name)
         if bundle is not None:
             for scene in scenes:
-                bundle.levels(scene)  # or say now that there are none
-        loaded = load_solvers(names, options, stop)
+                if REFERENCE in solvers_of(scene, options):
+                    bundle.levels(scene)  # or say now that there are none
+        needed = [name for name in names if bundle is None or name != REFERENCE]
+        loaded = load_solvers(needed, options, stop)
         with claimed(out, identity) as directory:
             record: dict[str, Any] = {
                 **identity,
