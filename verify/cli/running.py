@@ -59,7 +59,7 @@ def execute(arguments: argparse.Namespace) -> int:
             progress.say(text)
             progress.doing(text)
 
-        progress.doing("loading the solvers")
+        progress.doing("checking cases and solvers")
         try:
             summary = run_cases(scenes, arguments.out, options, progress, command, drawings)
         except RunStoppedError as stop:

@@ -27,6 +27,7 @@ from pathlib import Path
 from types import ModuleType
 from uuid import uuid4
 
+import numpy as np
 import psutil
 
 from verify.processes import FORKED, PARENT_VARIABLE, die_with_parent, start_server
@@ -93,7 +94,7 @@ class Child:
         self._pid = self._process.pid or 0
         with contextlib.suppress(psutil.Error):  # it may have ended
             self._seen.add(psutil.Process(self._pid))
-        self._root = set(self._seen)
+        self._root = frozenset(self._seen)
 
     def poll(self) -> Ending | None:
         """Look once; kill it if it is over a limit; tell how it ended if it has."""
@@ -200,8 +201,7 @@ def _work(
     die_with_parent()
     os.chdir(folder)
     sys.argv = [module, str(argument)]
-    numpy_random = import_module("numpy.random")
-    numpy_random.seed()  # that of the server would be everyone's
+    np.random.seed()  # noqa: NPY002 - that of the server would be everyone's
     random.seed()
     try:
         import_module(module).main(argument)
