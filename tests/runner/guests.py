@@ -6,7 +6,9 @@ Each is asked, solves or answers in the way that its name says.
 import os
 import signal
 import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from fake_solvers import Instant
@@ -143,3 +145,30 @@ class Elsewhere(Guest):
 class Quitting(Guest):
     def solve(self, scene, level, repetitions=1, **parameters):
         os._exit(0)
+
+
+class Leaving(Guest):
+    """Leaves a process behind that has left its group and lost its parent."""
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        mark = Path(os.environ["LEFT_MARK"])
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                mark.write_text(str(os.getpid()))
+                time.sleep(600)
+            os._exit(0)
+        while not (mark.exists() and mark.read_text()):
+            time.sleep(0.01)
+        return super().solve(scene, level, repetitions)
+
+
+class Chatty(Guest):
+    """Says 80 MB, and waits until most of it is gone."""
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        for _ in range(80):
+            os.write(1, b"." * 2**20)
+        while os.fstat(1).st_size > 2**25:
+            time.sleep(0.01)
+        return super().solve(scene, level, repetitions)

@@ -158,3 +158,25 @@ def test_all_of_them_die_with_the_runner(prepared):
             return
         time.sleep(0.02)
     raise AssertionError(f"still running: {left}")
+
+
+SCRIPT = """
+import time
+from pathlib import Path
+from verify.runner.child import Child
+with open("begun", "a") as file:
+    file.write("begun ")
+child = Child("verify.runner.solve", Path("job.json"), Path("log.txt"), 60.0, 4e9, own=True)
+while child.poll() is None:
+    time.sleep(0.02)
+"""
+
+
+def test_a_script_that_starts_a_process_is_not_run_again_in_it(prepared):
+    """A script without ``if __name__ == "__main__"``, as people write them."""
+    folder = prepared("script")
+    (folder / "mine_script.py").write_text(SCRIPT)
+    done = subprocess.run([sys.executable, "mine_script.py"], cwd=folder, timeout=120, check=False)
+    assert done.returncode == 0
+    assert (folder / "begun").read_text() == "begun "
+    assert reason(folder).startswith("ValueError")

@@ -1,6 +1,7 @@
 """Misbehaviour of a guest is a row with its reason: nobody else loses a verdict, the run ends."""
 
 import errno
+from pathlib import Path
 
 import pytest
 
@@ -27,6 +28,8 @@ ASKED = {
 COMPARED = dict.fromkeys(("Large", "TinySize", "Twice", "FarAway", "Needle"), (Status.SOLVED, ""))
 PROCESSES = {
     "Elsewhere": (Status.SOLVED, ""),
+    "Leaving": (Status.SOLVED, ""),
+    "Chatty": (Status.SOLVED, ""),
     "Quitting": (Status.FAILED, "said nothing (exit code 0, without an answer)"),
 }
 
@@ -121,11 +124,17 @@ def assert_rows(rows, expected):
         assert (rows[name].status, rows[name].reason) == (status, reason), name
 
 
-def test_whatever_it_does_to_its_process_it_is_a_row(verify):
+def test_whatever_it_does_to_its_process_it_is_a_row(verify, tmp_path_factory):
+    mark = tmp_path_factory.mktemp("left") / "pid"
+    verify.environment["LEFT_MARK"] = str(mark)
     rows, done = run(verify, PROCESSES)
     assert_rows(rows, PROCESSES)
     assert done.returncode == 3
     assert sorted(path.name for path in verify.folder.iterdir()) == ["out", "square.toml"]
+    left = Path("/proc", mark.read_text(), "stat")  # ended with the solve that started it
+    assert not left.exists() or left.read_text().rpartition(")")[2].split()[0] == "Z"
+    log = (verify.folder / "out/cases/square/guests_Chatty-0/log.txt").read_bytes()
+    assert b"cut here by the runner" in log
 
 
 @pytest.mark.heavy
