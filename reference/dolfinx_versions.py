@@ -71,27 +71,6 @@ def create_simplex_mesh(
     return create(comm, cells, points, domain)
 
 
-def take_whole_steps(solver: Any) -> None:
-    """Have Newton's method go all the way it points, without a line search.
-
-    By PETSc's options: petsc4py knows the line search itself since 3.23 only.
-
-    Parameters
-    ----------
-    solver : petsc4py.PETSc.SNES
-        Of type ``newtonls``, nothing else set.
-    """
-    from petsc4py import PETSc
-
-    options: Any = PETSc.Options()
-    name = "whole_steps_snes_linesearch_type"
-    options.setValue(name, "basic")
-    solver.setOptionsPrefix("whole_steps_")
-    solver.setFromOptions()
-    solver.setOptionsPrefix("")
-    options.delValue(name)
-
-
 def _version() -> tuple[int, int]:
     parts = import_module("dolfinx").__version__.split(".")
     return int(parts[0]), int(parts[1])

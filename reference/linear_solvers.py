@@ -79,8 +79,8 @@ class IllConditionedError(RuntimeError):
         self.correction, self.size = correction, size
 
 
-def factorised(matrix: Any, kind: Kind = "definite") -> Any:
-    """Factorise a matrix by MUMPS; gives a PETSc KSP."""
+def factorised(matrix: Any, kind: Kind = "definite", controls: dict[int, int] | None = None) -> Any:
+    """Factorise a matrix by MUMPS, with `controls` (its ICNTL) if need be; gives a PETSc KSP."""
     from petsc4py import PETSc
 
     if kind != "general":
@@ -90,8 +90,13 @@ def factorised(matrix: Any, kind: Kind = "definite") -> Any:
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
     solver.setType("preonly")
-    solver.getPC().setType("lu" if kind == "general" else "cholesky")
-    solver.getPC().setFactorSolverType("mumps")
+    conditioner = solver.getPC()
+    conditioner.setType("lu" if kind == "general" else "cholesky")
+    conditioner.setFactorSolverType("mumps")
+    if controls:
+        conditioner.setFactorSetUpSolverType()
+        for number, value in controls.items():
+            conditioner.getFactorMatrix().setMumpsIcntl(number, value)
     solver.setUp()
     return solver
 
@@ -125,21 +130,9 @@ def modes_not_positive(matrix: Any) -> int:
 
     They are the negative and the vanishing pivots of MUMPS.
     """
-    from petsc4py import PETSc
-
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    conditioner = solver.getPC()
-    conditioner.setType("cholesky")
-    conditioner.setFactorSolverType("mumps")
-    conditioner.setFactorSetUpSolverType()
     # pivots of the last front are not counted otherwise, and vanishing ones are an error
-    for option in (13, 24):
-        conditioner.getFactorMatrix().setMumpsIcntl(option, 1)
-    solver.setUp()
-    negative, vanishing, _ = conditioner.getFactorMatrix().getInertia()
+    solver = factorised(matrix, "symmetric", {13: 1, 24: 1})
+    negative, vanishing, _ = solver.getPC().getFactorMatrix().getInertia()
     solver.destroy()
     return int(negative + vanishing)
 
@@ -270,6 +263,7 @@ def solve_saddle(
     solver.setType("minres")
     solver.setInitialGuessNonzero(True)
     split: Any = solver.getPC()
+    solver.setOptionsPrefix("mixed_")  # the blocks take it over when they are told
     split.setType("fieldsplit")
     split.setFieldSplitIS(("u", of_u), ("p", of_p))
     split.setFieldSplitSchurPreType(PETSc.PC.FieldSplitSchurPreType.USER, mass)
@@ -283,7 +277,7 @@ def solve_saddle(
 
     method = "MINRES with GAMG and pressures"
     try:
-        with _options(solver, "mixed_", _BLOCKS):
+        with options(solver, "mixed_", _BLOCKS):
             return iterate(solver, matrix, x, vector, tolerance, aim, method, persist=True)
     finally:
         for entry in (solver, near, block, mass, of_u, of_p):
@@ -357,25 +351,25 @@ def _round_off(matrix: Any, x: Any, work: Any) -> float:
 
 def set_multigrid(solver: Any) -> None:
     """Let a PETSc KSP be preconditioned by GAMG, its norm that of the true residual."""
-    with _options(solver, "reference_", _MULTIGRID):
+    with options(solver, "reference_", _MULTIGRID):
         pass
 
 
 @contextmanager
-def _options(solver: Any, prefix: str, given: dict[str, Any]) -> Iterator[None]:
-    """Set a PETSc KSP by options, which what it makes later may read until the end."""
+def options(solver: Any, prefix: str, given: dict[str, Any]) -> Iterator[None]:
+    """Set a PETSc KSP or SNES by options, which what it makes later may read until the end."""
     from petsc4py import PETSc
 
-    options: Any = PETSc.Options()
+    known: Any = PETSc.Options()
     solver.setOptionsPrefix(prefix)
     for name, value in given.items():
-        options[prefix + name] = value
+        known[prefix + name] = value
     solver.setFromOptions()
     try:
         yield
     finally:
         for name in given:
-            options.delValue(prefix + name)
+            known.delValue(prefix + name)
 
 
 def near_null_space(matrix: Any, space: ConformingSpace) -> Any:
@@ -383,10 +377,11 @@ def near_null_space(matrix: Any, space: ConformingSpace) -> Any:
     from petsc4py import PETSc
 
     mine = space.node_points[space.node_of_dof[: space.owned]]
-    modes = _orthonormal(matrix, rigid_motions(mine, space.node_points.mean(axis=0)))
-    found = PETSc.NullSpace().create(vectors=modes, comm=matrix.comm)
-    for mode in modes:
-        mode.destroy()
+    places = matrix.createVecRight()
+    places.setBlockSize(space.dimension)
+    places.array[:] = (mine - space.node_points.mean(axis=0)).ravel()
+    found = PETSc.NullSpace().createRigidBody(places)
+    places.destroy()
     return found
 
 
@@ -401,20 +396,6 @@ def rigid_motions(points: NDArray[np.float64], centre: NDArray[np.float64]) -> N
     for k, (i, j) in enumerate(pairs):
         motions[d + k, :, i], motions[d + k, :, j] = -centred[:, j], centred[:, i]
     return motions.reshape(len(motions), -1)
-
-
-def _orthonormal(matrix: Any, motions: NDArray[np.float64]) -> list[Any]:
-    """Vectors of the layout of the matrix, orthonormal (Gram–Schmidt, twice)."""
-    modes: list[Any] = []
-    for motion in motions:
-        vector = matrix.createVecRight()
-        vector.array[:] = motion
-        for _ in range(2):
-            for mode in modes:
-                vector.axpy(-vector.dot(mode), mode)
-        vector.normalize()
-        modes.append(vector)
-    return modes
 
 
 def mean_stiffness(matrix: Any) -> float:

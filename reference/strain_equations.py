@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.deformation import MembraneStretch
-from reference.dolfinx_versions import take_whole_steps
 from reference.inside_out import OrientationCheck, place_text
 from reference.law import Law, quadrature
 from reference.linear_solvers import (
     mean_stiffness,
     modes_not_positive,
     near_null_space,
+    options,
     set_multigrid,
     solve_directly,
 )
@@ -311,7 +311,9 @@ class StrainEquations:
         solver.setType("newtonls")
         # Turned by the linear response, a slender part is stretched by the square of the angle: the
         # residual rises by orders of magnitude before it falls, and a slack membrane is overshot.
-        take_whole_steps(solver)
+        # By options: petsc4py knows the line search itself since 3.23 only.
+        with options(solver, "whole_steps_", {"snes_linesearch_type": "basic"}):
+            solver.setOptionsPrefix("")
         solver.setTolerances(max_it=_MOST_ITERATIONS)
         solver.setConvergenceTest(self._judge)
         solver.setFunction(self._assemble_residual, self._vector.duplicate())
