@@ -8,7 +8,8 @@ import pytest
 
 from verify.cli import main
 from verify.errors import InputError
-from verify.runner.mesh_faults import check_overlaps, mesh_warning
+from verify.result import NoticeKind
+from verify.runner.mesh_faults import check_overlaps, mesh_notices, mesh_warning
 from verify.scene import read_mesh
 from verify.scene.loading import load_scene
 
@@ -198,6 +199,9 @@ def test_hanging_nodes_are_counted(tmp_path, kind, count):
             points[:, 2] = 0.2 * points[:, 1]
     text = found(tmp_path, kind, turned(kind, joined(coarse, fine), 7))
     assert f"is not joined where {count} nodes hang on facets" in text
+    # it stands beside the verdicts too
+    (notice,) = mesh_notices(load_scene(tmp_path / "case.toml"))
+    assert (notice.kind, notice.text) == (NoticeKind.WARNING, text)
 
 
 @pytest.mark.parametrize("kind, count", [("plane", 10), ("space", 50), ("membrane", 10)])

@@ -27,6 +27,7 @@ from verify.result_files import write_result
 from verify.runner.directory import JUDGING, folder_name
 from verify.runner.error_field import truth_of, write_error_field
 from verify.runner.job import check_files, load_record
+from verify.runner.mesh_faults import mesh_notices
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
@@ -62,7 +63,7 @@ def main(question_file: Path) -> None:
     (folder / JUDGING).unlink(missing_ok=True)
     result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
     notices = _adequacy(root, question["models"], scene, result)
-    result = replace(result, notices=[*result.notices, *notices])
+    result = replace(result, notices=[*result.notices, *notices, *mesh_notices(scene)])
     result = replace(result, provenance=question["provenance"])
     try:
         drawn = _error_pictures(result, scene, solutions, exact, folder)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.result import Notice, NoticeKind
 from verify.scene import MeshFile, Scene, read_mesh
 
 Array = NDArray[np.float64]
@@ -63,6 +64,12 @@ def mesh_warning(scene: Scene) -> str:
         f"'{scene.geometry.file}' is not joined where {'; '.join(said)}: the body is apart there; "
         "merge nodes or mesh it anew if it is not meant to be"
     )
+
+
+def mesh_notices(scene: Scene) -> list[Notice]:
+    """Return the warning of a mesh file, to stand beside the verdicts of its case."""
+    said = mesh_warning(scene)
+    return [Notice(NoticeKind.WARNING, "mesh file", None, said)] if said else []
 
 
 def _at(point: Array) -> str:
