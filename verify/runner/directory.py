@@ -6,7 +6,7 @@
     DIR/run.json                           command, options, cases, provenance
     DIR/cases/<case, / as __>/scene.json   the case as it was run
                               result.json  its `CaseResult`
-                              <solver>-<level>/solution.json|.vtu, record.json, log.txt
+                              <solver>-<level>/solution.json|.vtu, record.json, levels, log.txt
 """
 
 import errno

@@ -21,8 +21,8 @@ from verify.processes import die_with_parent
 from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.interruption import StopRequest
-from verify.runner.log import telling_line
 from verify.runner.options import Options
+from verify.runner.outcome import telling_line
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import parameters_of, solver_in
 

@@ -1,18 +1,23 @@
 """Outcome of a process in words: as it left it, or by its death."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json
-from verify.printable import memory_text
+from verify.printable import memory_text, one_line
 from verify.result import SolveRecord, Status
 from verify.result_files import checked
 from verify.runner.child import Ending
 from verify.runner.directory import LEVELS
 from verify.runner.job import Job
-from verify.runner.log import telling_line
 from verify.solvers.interface import MOST_LEVELS
+
+_FATAL = re.compile(r"^Fatal Python error: (.+)")  # faulthandler's headline of a crash
+_TELLING = re.compile(r"error|exception|abort|killed|fail|cannot|not found", re.IGNORECASE)
+_LONGEST = 300
+_READ = 2**18
 
 
 def outcome_in(folder: Path) -> dict[str, Any] | None:
@@ -58,3 +63,29 @@ def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Sta
     code = ending.returncode
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
     return Status.FAILED, f"{telling_line(log)} ({how}{'' if code else ', without an answer'})"
+
+
+def telling_line(log: Path) -> str:
+    """Return the line of `log` that says most about a death: a crash, an error, the last one."""
+    try:
+        text = _ends(log)
+    except OSError:
+        return "left no log"
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    if not lines:
+        return "said nothing"
+    for line in lines:
+        if match := _FATAL.match(line):
+            return one_line(match.group(1)[:_LONGEST])
+    tail = lines[-30:]
+    line = next((line for line in reversed(tail) if _TELLING.search(line)), lines[-1])
+    return one_line(line[:_LONGEST])
+
+
+def _ends(log: Path) -> str:
+    """Return the beginning and the end of a log that may be very long."""
+    with log.open("rb") as stream:
+        head = stream.read(_READ)
+        size = stream.seek(0, 2)
+        stream.seek(max(_READ, size - _READ))
+        return (head + b"\n" + stream.read()).decode("utf-8", errors="replace")
