@@ -7,7 +7,7 @@ from cut_bodies import rotation, shaken
 from test_sliver_policies import degenerate_cuts
 from xfem_bodies import boundary_nodes, relative_l2_error
 
-from verify.xfem.block_pattern import body_pattern
+from verify.xfem.block_pattern import body_pattern, find_places
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
@@ -195,6 +195,17 @@ def test_bodies_and_rigid_motions_stay_what_they_are(seed):
     values = np.linalg.eigvalsh(scale[:, None] * K * scale)
     parts = phantom.bodies.max() + 1
     assert (np.abs(values) < 1e-11).sum() == (3 if dim == 2 else 6) * parts
+
+
+def test_couplings_that_no_cell_has_enter_an_aggregated_matrix_both_ways():
+    mesh = rectangle_mesh((5, 5))
+    treated, report = treat_slivers(cut_mesh(mesh, [Plane([0.401, 0.5], [1.0, 0.0])]))
+    first, last = np.array([0]), np.array([len(mesh.points) - 1])
+    assert report.aggregated > 0
+    assert not find_places(body_pattern(treated), first, last)[1].any()
+    coupled = body_pattern(treated, np.stack([first, last], axis=1))
+    assert find_places(coupled, first, last)[1].all()
+    assert find_places(coupled, last, first)[1].all()
 
 
 def near_nodes(dim, size):
