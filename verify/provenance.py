@@ -18,7 +18,7 @@ import verify
 from verify.meaning import REVISION
 
 # what is reported -> the distributions that may carry it, the likelier first
-_DISTRIBUTIONS = {
+DISTRIBUTIONS = {
     "numpy": ["numpy"],
     "scipy": ["scipy"],
     "numba": ["numba"],
@@ -65,7 +65,7 @@ def versions() -> dict[str, str]:
     Of what is installed when it is asked first; what is installed later has not been imported.
     """
     found = {"verify": verify.__version__, "python": platform.python_version()}
-    for name, distributions in _DISTRIBUTIONS.items():
+    for name, distributions in DISTRIBUTIONS.items():
         for distribution in distributions:
             try:
                 found[name] = metadata.version(distribution)
@@ -79,7 +79,7 @@ def versions() -> dict[str, str]:
 
 def _bundled_petsc() -> str | None:
     """Read the version of the PETSc inside the DOLFINx wheel from its library's name."""
-    for distribution in _DISTRIBUTIONS["dolfinx"]:
+    for distribution in DISTRIBUTIONS["dolfinx"]:
         try:
             files = metadata.files(distribution) or []
         except metadata.PackageNotFoundError:

@@ -1,40 +1,149 @@
-"""Fingerprints of solvers: what an answer depends on makes it be solved again, and nothing else."""
+"""Fingerprints: what an answer or a verdict depends on is found again in the sources."""
 
-from pathlib import Path
+import ast
+import shutil
 
+import grimp
 import pytest
 import scenes
 
+from verify import source_digest
 from verify.runner import fingerprint
+from verify.runner.fingerprint import code_of_comparison, code_of_solver
+from verify.source_digest import ROOT, Sources, modules_in
+
+SOLVING = "verify.runner.solve"
+ROOTS = [
+    "verify.solvers.conforming", "verify.solvers.xfem", "verify.solvers.methods_adapter",
+    "verify.runner.assess", "verify.conformance.suite", "verify.report.drawing",
+    "verify.xfem.statics",
+]  # fmt: skip
 
 
-@pytest.fixture
-def read(monkeypatch):
-    """Return the files that went into the fingerprint of a solver."""
-
-    def files(name):
-        seen = []
-        own = fingerprint.file_digest
-        monkeypatch.setattr(fingerprint, "file_digest", lambda path: seen.append(path) or own(path))
-        fingerprint.code_of_solver.__wrapped__(name)
-        monkeypatch.undo()
-        package = Path(fingerprint.__file__).parents[1]
-        return {path.relative_to(package.parent).as_posix() for path in seen}
-
-    return files
+@pytest.fixture(scope="module")
+def sources():
+    return Sources()
 
 
-def test_a_program_that_changes_is_run_again(read):
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return tmp_path_factory.mktemp("store") / "sources.json"
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory, store):
+    """A copy of all sources, whose digests are remembered."""
+    root = tmp_path_factory.mktemp("copy")
+    for package in ("verify", "reference"):
+        shutil.copytree(
+            ROOT / package, root / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    Sources(root, store).digest(*modules_in("verify"), *modules_in("reference"))
+    return root
+
+
+def test_what_a_module_depends_on_is_what_another_program_finds(sources):
+    """Of grimp, the program behind the import contracts; and the packages on the way."""
+    graph = grimp.build_graph(
+        "verify", "reference", include_external_packages=False, cache_dir=None,
+        exclude_type_checking_imports=True,
+    )  # fmt: skip
+    for module in sorted(graph.modules):
+        if module.startswith("verify.foreign.programs"):
+            continue  # run by another Python, with other paths
+        own = {name for name in sources._imported(module) if name in graph.modules}
+        assert own == graph.find_modules_directly_imported_by(module), module
+    for module in ROOTS:
+        found = sources.closure(module) & graph.modules
+        above = {name for name in found if any(one.startswith(f"{name}.") for one in found)}
+        assert found - above <= graph.find_upstream_modules(module) | {module} <= found, module
+
+
+@pytest.mark.parametrize("module", modules_in("reference"))
+def test_a_statement_changes_a_digest_and_a_comment_or_docstring_does_not(module, sources):
+    text = sources.file(module).read_text("utf-8")
+    package = module if sources.file(module).name == "__init__.py" else module.rpartition(".")[0]
+    digest, imports = source_digest._parsed(text.encode(), package)
+    said = ast.get_docstring(ast.parse(text), clean=False)
+    other = text.replace(said, f"Another text. {said}", 1) + "\n\n# a comment\n"
+    assert source_digest._parsed(other.encode(), package) == (digest, imports)
+    assert source_digest._parsed(f"{text}\n_new = 1\n".encode(), package).digest != digest
+
+
+@pytest.mark.parametrize("module", [
+    "reference.law", "reference.exact.penny", "verify.applied_checks", "verify.xfem.clip",
+    "verify.scene.regions", "verify.compare.hooke",
+])  # fmt: skip
+def test_what_imports_a_changed_module_has_another_digest_and_nothing_else(
+    module, copied, store, sources
+):
+    roots = [*ROOTS, *modules_in("reference")]
+    same = Sources(copied, store)
+    before = {root: same.digest(root) for root in roots}
+    file = copied / sources.file(module).relative_to(ROOT)
+    text = file.read_text("utf-8")
+    try:
+        file.write_text(f"{text}\n# a comment\n")
+        said = Sources(copied, store)
+        assert {root: said.digest(root) for root in roots} == before
+        file.write_text(f"{text}\n_new = 1\n")
+        now = Sources(copied, store)
+        changed = {root for root in roots if now.digest(root) != before[root]}
+    finally:
+        file.write_text(text)
+    assert changed == {root for root in roots if module in sources.closure(root)}
+
+
+def test_a_verdict_depends_on_who_is_judged(sources):
+    """Shown once: `judged_by` judged nobody, and stored verdicts were still two PASS."""
+    assert "verify.applied_checks" in sources.closure("verify.runner.assess")
+    assert "verify.verdict" in sources.closure("verify.runner.assess")
+
+
+def test_a_reference_depends_on_no_method_and_no_comparison(sources):
+    """So no edit of these makes references be solved anew."""
+    found = sources.closure(SOLVING, "verify.solvers.conforming")
+    rooms = {".".join(name.split(".")[:2]) for name in found}
+    assert not rooms & {"verify.xfem", "verify.accelerated", "verify.methods", "verify.compare"}
+    assert not rooms & {"verify.report", "verify.study", "verify.cli", "verify.simulator"}
+    assert code_of_solver("reference") == code_of_solver("conforming tip=grading")
+    own = sources.closure(SOLVING, "verify.solvers.xfem")
+    assert {"verify.accelerated.cholesky", "verify.xfem.clip"} <= own
+    assert not {name for name in own if "foreign" in name or name.startswith("verify.compare")}
+
+
+def test_a_program_that_changes_is_run_again(sources):
     """A stored answer of Kratos is not that of another program, nor of other versions of it."""
-    folder = "verify/foreign/programs"
-    asked = {f"{folder}/kratos/{n}" for n in ("program.py", "solver.toml", "requirements.lock")}
-    assert asked | {f"{folder}/motion.py", "verify/exchange/export.py"} <= read("kratos")
-    assert not {path for path in read("xfem") if "foreign" in path}
+    folder = "verify.foreign.programs"
+    found = sources.closure(f"{folder}.kratos.program")
+    assert {f"{folder}.motion", f"{folder}.exchange_files"} <= found
+    data = {path.name for path in sources._data(found)}
+    assert {"solver.toml", "requirements.lock"} <= data
+    answers = {code_of_solver(name) for name in ("kratos", "akantu", "xfem", "mine:Solver")}
+    assert len(answers | {code_of_comparison()}) == 5
 
 
-def test_what_makes_a_solver_fast_can_change_its_answer(read):
-    assert "verify/accelerated/cholesky.py" in read("xfem")
-    assert "verify/accelerated/cholesky.py" not in read("conforming")
+def test_versions_and_data_files_are_part_of_a_digest(tmp_path, monkeypatch):
+    (tmp_path / "verify").mkdir()
+    (tmp_path / "verify/__init__.py").write_text("import numpy\n")
+    (tmp_path / "verify/other.py").write_text("")
+    digests = [Sources(tmp_path).digest("verify")]
+    (tmp_path / "verify/tables").mkdir()
+    (tmp_path / "verify/tables/weights.csv").write_text("1")
+    digests.append(Sources(tmp_path).digest("verify"))
+    monkeypatch.setattr(source_digest, "versions", lambda: {"python": "3", "numpy": "0.1"})
+    digests.append(Sources(tmp_path).digest("verify"))
+    assert len(set(digests)) == 3
+    with pytest.raises(KeyError, match=r"verify\.third"):
+        Sources(tmp_path).digest("verify.third")
+
+
+@pytest.mark.parametrize("damage", ["", "[1, 2]", '{"a": 1}', "{"])
+def test_a_damaged_store_is_read_past(damage, tmp_path):
+    (tmp_path / "sources.json").write_text(damage)
+    found = Sources(store=tmp_path / "sources.json").digest("verify.errors")
+    assert found == Sources().digest("verify.errors")
+    assert Sources(store=tmp_path / "sources.json" / "below").digest("verify.errors") == found
 
 
 def test_what_a_case_expects_of_a_cut_is_no_physics():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from verify.solvers.account import StagedAccount
+from verify.solvers.staged_account import StagedAccount
 from verify.xfem.energy_balance import BalanceRecorder
 
 

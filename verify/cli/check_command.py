@@ -14,8 +14,8 @@ from verify.runner.checking import check_scene
 from verify.runner.cost import LevelCost
 from verify.runner.mesh_faults import mesh_warning
 from verify.runner.options import Options
-from verify.runner.reference_cache import cache_folder
 from verify.scene import load_scenes
+from verify.source_digest import cache_folder
 
 
 def execute(arguments: argparse.Namespace) -> int:

@@ -19,6 +19,7 @@ from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
 from verify.solvers.named import solver_in
+from verify.source_digest import code_digest
 
 RANKING_FILE = "ranking.json"
 _SECONDS = 120.0  # for each small solve of the suite
@@ -102,9 +103,8 @@ def _source_of_guest(solver: str) -> str:
 
 
 def code_of_suite() -> str:
-    """Return the fingerprint of the suite's own code."""
-    folder = Path(__file__).resolve().parent.parent / "conformance"
-    return digest_of([[p.name, p.read_text("utf-8")] for p in sorted(folder.glob("*.py"))])
+    """Return the hash of all that the suite's findings depend on beside the solver."""
+    return code_digest("verify.conformance.suite", "verify.conformance.worker")
 
 
 def _stored(target: Path) -> dict[str, Any]:

@@ -2,33 +2,19 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
-from functools import cache
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import verify
-from verify.provenance import versions
 from verify.scene import MeshFile, Scene, mesh_path
-from verify.solvers.interface import is_built_in
-from verify.solvers.named import solver_in
+from verify.solvers.interface import module_of, program_of
+from verify.source_digest import code_digest, modules_in
 
-_PACKAGE = Path(verify.__file__).resolve().parent
-# what can change any solution, and those of solvers that are built on our own methods
-_SOLVING = (
-    "errors.py", "scene", "solution.py", "handed_over.py", "system.py", "solvers",
-    "runner/solve.py", "calibration.py",
-)  # fmt: skip
-_METHODS = ("xfem", "accelerated", "methods")
-# what programs are handed, and those that come with the project
-_PROGRAMS = ("exchange", "foreign")
-_KINDS = (".py", ".toml", ".lock")
-# the layers forbid them to import our methods, so that these do not make them solve again
-_INDEPENDENT = ("conforming", "reference")
-# what can change a verdict, given the solutions
-_COMPARING = ("result.py", "compare", "assess", "verdict.py", "runner/assess.py")
+# what solves in a process of its own, and what judges in one
+_SOLVING, _COMPARING = "verify.runner.solve", "verify.runner.assess"
+# what a solver of somebody else may be built on
+_OFFERED = ("solvers", "xfem", "accelerated", "methods", "exchange")
 
 
 def digest_of(content: Any) -> str:
@@ -83,28 +69,19 @@ def _registered_source(name: str) -> list[str]:
     return []
 
 
-@cache
 def code_of_solver(name: str) -> str:
-    """Return the hash of the sources and of the versions that a solver's answers depend on."""
-    parts = _SOLVING if solver_in(name) in _INDEPENDENT else (*_SOLVING, *_METHODS)
-    if not is_built_in(name):
-        parts = (*parts, *_PROGRAMS)
-    return digest_of([versions(), _sources(parts, _PACKAGE.parent / "reference")])
+    """Return the hash of all that a solver's answers depend on: its modules, data and versions.
+
+    Of a solver that does not come with the project, all that it may be built on.
+    """
+    own, program = module_of(name), program_of(name)
+    if own is None:
+        return code_digest(
+            _SOLVING, *(m for room in _OFFERED for m in modules_in(f"verify.{room}"))
+        )
+    return code_digest(_SOLVING, own, *([] if program is None else [program]))
 
 
-@cache
 def code_of_comparison() -> str:
-    """Return the hash of the sources that a verdict depends on, given the solutions."""
-    reference = _PACKAGE.parent / "reference"
-    folders = (reference / "exact", reference / "fracture")  # stress intensities are measured
-    return digest_of([versions(), _sources(_COMPARING, *folders)])
-
-
-def _sources(parts: Iterable[str], *folders: Path) -> list[tuple[str, str]]:
-    files: set[Path] = set()
-    for place in (*(_PACKAGE / part for part in parts), *folders):
-        found = (path for path in place.rglob("*") if path.suffix in _KINDS)
-        files |= {place} if place.is_file() else set(found)
-    return [
-        (path.relative_to(_PACKAGE.parent).as_posix(), file_digest(path)) for path in sorted(files)
-    ]
+    """Return the hash of all that a verdict depends on, given the solutions."""
+    return code_digest(_COMPARING)

@@ -23,7 +23,7 @@ from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.interruption import StopRequest
 from verify.runner.options import Options
 from verify.runner.outcome import telling_line
-from verify.solvers.interface import is_built_in
+from verify.solvers.interface import is_built_in, module_of
 from verify.solvers.named import parameters_of, solver_in
 
 _SECONDS = (60.0, 300.0)  # for importing a solver: at least, at most
@@ -125,7 +125,7 @@ def _loaded(name: str, parameters: Mapping[str, Any]) -> dict[str, str]:
         check_parameters(solver_in(name), solver, parameters)
     except InputError as error:
         return {"bad_parameter": str(error)}
-    return {"source": _source(solver)}
+    return {"source": "" if module_of(name) else _source(solver)}  # ours is known by its code
 
 
 def _source(solver: Any) -> str:

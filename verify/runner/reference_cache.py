@@ -95,14 +95,6 @@ class Entry:
         return None if found is None else one_line(found, 40)
 
 
-def cache_folder() -> Path:
-    """Return the folder of the cache: ``VERIFY_CACHE``, else below the user's cache folder."""
-    if named := os.environ.get("VERIFY_CACHE"):
-        return Path(named)
-    home = os.environ.get("XDG_CACHE_HOME")
-    return (Path(home) if home else Path.home() / ".cache") / "cutting-verification" / "references"
-
-
 def current_key(scene: Scene, level: int, parameters: dict[str, Any]) -> str:
     """Return the key under which today's code keeps the reference of `scene`."""
     return digest_of([physics_digest(scene), level, parameters, code_of_solver(REFERENCE)])

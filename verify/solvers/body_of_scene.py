@@ -1,5 +1,7 @@
 """Body of a scene as arrays: background mesh, elasticity, density."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,11 @@ from verify.scene import (
     Polygon,
     Rectangle,
     Scene,
-    crossed_by_interfaces,
     read_mesh,
 )
-from verify.solution import Regularisation
+from verify.solvers.cells_of_scene import grid_of
 from verify.xfem.elasticity import Material, State, isotropic
+from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
@@ -59,25 +61,6 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     return SimplexMesh(points, cells), size
 
 
-def grid_of(scene: Scene, level: int) -> tuple[list[int] | None, float]:
-    """Cells along each axis, None if unstructured, and element size h in m, of a level.
-
-    Of a mesh that the scene does not give itself, but its pattern and sizes or numbers of cells.
-    """
-    geometry, asked = scene.geometry, scene.mesh
-    if asked.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
-        assert asked.sizes is not None
-        return None, asked.sizes[level]
-    sides = np.subtract(geometry.upper, geometry.lower)
-    if asked.cells is not None:
-        counts = np.array(asked.cells[level])
-    else:
-        assert asked.sizes is not None
-        # a size that divides the side up to round-off is that size
-        counts = np.ceil(sides / asked.sizes[level] * (1 - 1e-9)).astype(int)
-    return counts.tolist(), float((sides / counts).max())
-
-
 def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
     """Return the elasticity of the scene; of a membrane times its thickness, in N/m.
 
@@ -115,17 +98,10 @@ def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
     return material.at(points)
 
 
-def across_interfaces(
-    scene: Scene, points: NDArray[np.float64], cells: NDArray[np.int64]
-) -> list[Regularisation]:
-    """State the cells (m, k + 1) that an interface crosses: of the material at their centroid."""
-    if scene.material.is_uniform:
-        return []
-    crossed = crossed_by_interfaces(scene.material, points, cells)
-    if not crossed.any():
-        return []
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    measures = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0.0))
-    share = float(measures[crossed].sum() / measures.sum())
-    kind = "cell across an interface, of the material at its centroid"
-    return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]
+@contextmanager
+def errors_of_scene(scene: Scene) -> Iterator[None]:
+    """Turn errors of the library into those of a scene: `InputError`."""
+    try:
+        yield
+    except XfemError as error:
+        raise InputError(str(error), str(scene.file or scene.name)) from None

@@ -17,7 +17,7 @@ from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import across_interfaces
+from verify.solvers.cells_of_scene import across_interfaces
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
 from verify.solvers.interface import check_choices
@@ -191,7 +191,7 @@ def _solve(
         return *_shared(comm, lambda: make_mesh(level)), level
 
     # a trial on the coarsest mesh compiles the forms
-    return repeated(scene, repetitions, lambda: made(level), run, lambda: made(0))
+    return repeated(repetitions, lambda: made(level), run, lambda: made(0))
 
 
 def _comm() -> Any:

@@ -110,6 +110,19 @@ def is_built_in(name: str) -> bool:
     return solver_in(name) in _BUILT_IN
 
 
+def module_of(name: str) -> str | None:
+    """Return the module that defines a solver of the project; None if another package does."""
+    if solver_in(name) in _foreign_names():
+        return _FOREIGN.partition(":")[0]
+    return _BUILT_IN.get(solver_in(name), "").partition(":")[0] or None
+
+
+def program_of(name: str) -> str | None:
+    """Return the module of the program of a foreign solver of the project; else None."""
+    own = solver_in(name)
+    return f"verify.foreign.programs.{own}.program" if own in _foreign_names() else None
+
+
 def _foreign_names() -> set[str]:
     return {path.parent.name for path in _PROGRAMS.glob("*/solver.toml")}
 

@@ -14,13 +14,18 @@ from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import background_mesh, density_of, material_of
+from verify.solvers.body_of_scene import (
+    background_mesh,
+    density_of,
+    errors_of_scene,
+    material_of,
+)
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.interface import check_choices
 from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
-from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
+from verify.solvers.runs import Record, check_steps, repeated
 from verify.solvers.timeline import timeline_of
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import solution_on, springs_left_out
@@ -114,7 +119,8 @@ class MethodSolver:
                 return self._moved(scene, *mesh, marching, parameters, trial)
             return self._at_rest(scene, *mesh, load_steps, parameters)
 
-        return repeated(scene, repetitions, lambda: background_mesh(scene, level), run)
+        with errors_of_scene(scene):
+            return repeated(repetitions, lambda: background_mesh(scene, level), run)
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.

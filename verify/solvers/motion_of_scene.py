@@ -16,10 +16,10 @@ from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, Tool
 from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open
 from verify.solution import Regularisation
-from verify.solvers.account import StagedAccount
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.loads_of_scene import forces_of, is_moving
 from verify.solvers.runs import Record
+from verify.solvers.staged_account import StagedAccount
 from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports
 from verify.solvers.timeline import Timeline, march, step_sizes
 from verify.solvers.xfem_steps import integrator_of, largest_step

@@ -1,4 +1,4 @@
-"""Runs of our solvers: what a run says of itself, repeated and timed, errors as the scene's."""
+"""Runs of our solvers: what a run says of itself, repeated and timed."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.xfem.errors import XfemError
 
 
 @dataclass
@@ -71,17 +69,7 @@ def check_steps(load_steps: int, step_factor: float) -> None:
         raise InputError(f"{text}; expected at least 0, and a positive number")
 
 
-@contextmanager
-def errors_of_scene(scene: Scene) -> Iterator[None]:
-    """Turn errors of the library into those of a scene: `InputError`."""
-    try:
-        yield
-    except XfemError as error:
-        raise InputError(str(error), str(scene.file or scene.name)) from None
-
-
 def repeated[Mesh](
-    scene: Scene,
     repetitions: int,
     make_mesh: Callable[[], Mesh],
     run: Callable[[Mesh, bool], Solution],
@@ -91,7 +79,6 @@ def repeated[Mesh](
 
     Parameters
     ----------
-    scene : Scene
     repetitions : int
         Without any nothing is timed.
     make_mesh : callable
@@ -106,14 +93,13 @@ def repeated[Mesh](
         Of the last run, with the timings of all.
     """
     timings: dict[str, list[float]] = {}
-    with errors_of_scene(scene):
-        if repetitions:
-            run((trial_mesh or make_mesh)(), True)
-        for _ in range(max(1, repetitions)):
-            start = perf_counter()
-            mesh = make_mesh()
-            meshing = perf_counter() - start
-            found = run(mesh, False)
-            for phase, seconds in {"meshing": [meshing], **found.timings}.items():
-                timings.setdefault(phase, []).extend(seconds)
+    if repetitions:
+        run((trial_mesh or make_mesh)(), True)
+    for _ in range(max(1, repetitions)):
+        start = perf_counter()
+        mesh = make_mesh()
+        meshing = perf_counter() - start
+        found = run(mesh, False)
+        for phase, seconds in {"meshing": [meshing], **found.timings}.items():
+            timings.setdefault(phase, []).extend(seconds)
     return replace(found, timings=timings if repetitions else {})

@@ -12,12 +12,12 @@ from verify.accelerated import FAST
 from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import background_mesh
+from verify.solvers.body_of_scene import background_mesh, errors_of_scene
 from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
-from verify.solvers.runs import Record, check_steps, errors_of_scene, repeated
+from verify.solvers.runs import Record, check_steps, repeated
 from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.timeline import timeline_of
 from verify.solvers.xfem_answer import joined, solution_on, treated
@@ -150,10 +150,11 @@ class XfemSolver:
         given, exact = _Parameters(**parameters), exact_of(scene)
         if given.slivers == "penalise":
             _check_penalty(scene, given.mass)
-        return repeated(
-            scene, repetitions, lambda: background_mesh(scene, level),
-            lambda mesh, trial: _run(scene, *mesh, exact, given, trial),
-        )  # fmt: skip
+        with errors_of_scene(scene):
+            return repeated(
+                repetitions, lambda: background_mesh(scene, level),
+                lambda mesh, trial: _run(scene, *mesh, exact, given, trial),
+            )  # fmt: skip
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.

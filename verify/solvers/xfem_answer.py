@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import across_interfaces
+from verify.solvers.cells_of_scene import across_interfaces
 from verify.solvers.runs import Record
 from verify.solvers.supports_of_scene import support_ends
 from verify.xfem.clip import ROUND_OFF_SHARE
