@@ -130,3 +130,14 @@ def test_steps_of_one_size_are_one_size_whatever_the_state_has_added_up():
     body = Noted(1e-4)
     assert list(march(timeline(outputs=1001), body).values()) == [10_000]
     assert body.time != 1.0
+
+
+def test_what_jumps_at_a_break_is_taken_up_once_and_after_an_output_then():
+    """An output at a jump is the state that came there; at an opening it is what goes on."""
+    body = Noted(0.25, events=[0.0, 0.75])
+    march(timeline(outputs=3, history=[[0.5, 1.0], [0.5, 0.5], [0.75, 0.5], [0.75, 0.0]]), body)
+    said = [name for name, _ in body.done]
+    assert said == [
+        "open", "begin", "output", "step", "step", "output", "begin", "step", "open", "begin",
+        "step", "output",
+    ]  # fmt: skip
