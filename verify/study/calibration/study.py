@@ -18,7 +18,7 @@ COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked
 WASTED = 10.0  # an error bar that is so many times the error judges little
 SIGNIFICANCE = 0.05  # of the binomial test that rejects a share
 FEWEST, FEWEST_SCENES = 60, 15  # triples and scenes of a family from which a share says something
-SEED = 27  # of the judged run; the rules were made with seed 0
+SEED = 28  # of the judged run; the rules were made with seed 0, and 27 was judged by the ones before
 
 
 @dataclass(frozen=True, kw_only=True)
