@@ -13,6 +13,7 @@ from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
 from verify.study.calibration.families import families
+from verify.study.calibration.kept import KeptTrials
 from verify.study.calibration.motion_scenes import released, stretched, wave
 from verify.study.calibration.series import series_families
 from verify.study.calibration.study import binomial_tail, calibration_findings
@@ -181,6 +182,30 @@ def test_half_widths_cover_series_of_mixed_orders():
     found = [one for family in series_families(quick=False) for one in family.trials(27)]
     findings = calibration_findings(found)
     assert [f.verdict for f in findings] == [Verdict.PASS] * (2 + 4)
+
+
+def test_a_calibration_that_was_broken_off_goes_on_with_the_trials_it_has(tmp_path, monkeypatch):
+    about = {"commit": "abc", "dirty": False, "versions": {"numpy": "2"}}
+    monkeypatch.setattr("verify.study.calibration.kept.provenance", lambda: about)
+    trial, asked = made([2.0])[0], []
+
+    def solve(ratio):
+        asked.append(ratio)
+        return made([ratio])
+
+    KeptTrials(tmp_path, 28).of("airy", 0, lambda: solve(2.0))
+    again = KeptTrials(tmp_path, 28)
+    assert again.of("airy", 0, lambda: solve(3.0)) == [trial]
+    again.of("airy", 1, lambda: solve(4.0))
+    assert asked == [2.0, 4.0]
+    for seed, change in ((29, {}), (28, {"commit": "abd"}), (28, {"dirty": True})):
+        monkeypatch.setattr(
+            "verify.study.calibration.kept.provenance", lambda now=about | change: now
+        )
+        assert not KeptTrials(tmp_path, seed).scenes, change
+    monkeypatch.setattr("verify.study.calibration.kept.provenance", lambda: about)
+    (tmp_path / "calibration.trials.json").write_text("{", encoding="utf-8")
+    assert not KeptTrials(tmp_path, 28).scenes
 
 
 @pytest.mark.parametrize("run", [0.3, 0.9, 1.7, 2.2, 3.5])

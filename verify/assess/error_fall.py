@@ -16,7 +16,7 @@ def counted_order(scene: Scene | None, solution: Solution) -> float:
 
     It is ½ where a blade goes on its way: its tip is everywhere once, and no mesh graded to it.
     """
-    return 0.5 if scene is not None and _cut_on_the_way(scene) else solution.order
+    return 0.5 if scene is not None and cut_on_the_way(scene) else solution.order
 
 
 def error_fall(
@@ -41,7 +41,7 @@ def error_fall(
     """
     ratio = sizes[-2] / sizes[-1]
     found = inf if scene.analysis.kind == "static" else ratio**2
-    if _cut_on_the_way(scene):
+    if cut_on_the_way(scene):
         found = ratio
     before, last = (cut_deviation(solution, body) for solution in solutions[-2:])
     if last > _ON_THE_CUT * body.size:
@@ -50,5 +50,6 @@ def error_fall(
     return found
 
 
-def _cut_on_the_way(scene: Scene) -> bool:
+def cut_on_the_way(scene: Scene) -> bool:
+    """Whether a blade cuts on its way in a scene."""
     return any(isinstance(cut, ToolPathCut) for cut in scene.cuts)

@@ -8,8 +8,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from verify.assess.error_fall import counted_order, error_fall
-from verify.assess.error_history import ERROR_NAMES, base_of, compared_times, error_history
+from verify.assess.error_fall import counted_order, cut_on_the_way, error_fall
+from verify.assess.error_history import (
+    ERROR_NAMES,
+    History,
+    base_of,
+    compared_times,
+    error_history,
+)
 from verify.assess.local_difference import local_difference
 from verify.assess.quantities import Measured, field_quantity
 from verify.assess.rates import ROUND_OFF
@@ -17,12 +23,14 @@ from verify.assess.richardson import (
     Extrapolation,
     extrapolate,
     field_uncertainty,
+    observed_order,
     place_uncertainty,
 )
 from verify.assess.stress_intensity import exact_intensity
 from verify.assess.time_to_accuracy import time_to_accuracy
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import body_rule
+from verify.compare.error_norm import ErrorNorm
 from verify.compare.errors import ERRORS, NEAR, Rules, near_radius
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field
@@ -226,8 +234,15 @@ def conforming_reference(
     measured = [Measured(solution, body, law, scene) for solution in solutions]
     order = counted_order(scene, solutions[-1])
     falls = error_fall(scene, solutions, sizes, body)
-    norms, entries = _field_norms(scene, measured, sizes, order, size, falls)
-    field_order = entries["energy_norm"]["order"] or 0.0
+    rules = Rules(body, size, count=1)
+    times = compared_times(scene, solutions[-1])
+    steps = [
+        error_history(one.motion, other.motion, times, rules, law)
+        for one, other in pairwise(measured)
+    ]
+    norms, entries = _field_norms([step.reported() for step in steps], sizes, order, falls)
+    # functionals of a Galerkin solution converge with twice the order of its field
+    doubled = 2 * (entries["energy_norm"]["order"] or 0.0)
     second = [Measured(s, body, law, scene) for _, s in sorted((others or {}).items())]
     metrics: dict[str, Any] = {}
     quantities: dict[str, tuple[float, float]] = {}
@@ -238,7 +253,9 @@ def conforming_reference(
             missing[asked.name] = why
             continue
         coarse = len(measured) - len(values)  # levels that do not have it
-        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:], field_order, falls)
+        at_tip = _order_at_the_tip(scene, asked, steps, sizes)
+        functional = doubled if at_tip is None else at_tip
+        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:], functional, falls)
         quantities[asked.name] = known.value, known.half_width
         entry = _entry([*[None] * coarse, *values], known)
         metrics[asked.name] = entry | _second_opinion(scene, asked, second, known)
@@ -276,7 +293,7 @@ def known_quantity(
     measured: Sequence[Measured],
     values: list[float],
     sizes: list[float],
-    field_order: float = inf,
+    functional: float = inf,
     falls: float = inf,
 ) -> Extrapolation:
     """Judge a quantity from its levels; a value at a place by what lies around it.
@@ -288,8 +305,8 @@ def known_quantity(
         Levels, coarse to fine.
     values, sizes : list of float
         The quantity on each of them, and their element sizes, m.
-    field_order : float
-        Observed order of the field in the energy norm; 0 if there is none.
+    functional : float
+        Order that the field lets a functional of it count on; 0 if it has none.
     falls : float
         See `verify.assess.richardson.extrapolate`.
     """
@@ -302,8 +319,26 @@ def known_quantity(
         return place_uncertainty(values[-1], around, sizes, order + 1, falls)
     if isinstance(asked, MaximumDisplacementQuantity):
         return extrapolate(values, sizes, order + 1, falls)
-    # functionals of a Galerkin solution converge with twice the order of its field
-    return extrapolate(values, sizes, 2 * min(max(field_order, _LEAST), order), falls)
+    return extrapolate(values, sizes, min(max(functional, 2 * _LEAST), 2 * order), falls)
+
+
+def _order_at_the_tip(
+    scene: Scene, asked: Quantity, steps: Sequence[History], sizes: Sequence[float]
+) -> float | None:
+    """Order of the field near tips at the time of a factor in motion; None of anything else.
+
+    Fronts of waves elsewhere, which lower the order of the whole field to ½ or less, have nothing
+    to do with a factor before they pass its tip. The difference of levels near the tip has that
+    of their factors in it: its order counts once, not twice as that of a Galerkin solution.
+    """
+    if not isinstance(asked, StressIntensityQuantity) or scene.analysis.kind == "static":
+        return None
+    if cut_on_the_way(scene) or "energy_norm_near" not in steps[-1].norms:
+        return None
+    times = np.array(steps[-1].times, dtype=float)
+    at = int(np.abs(times - (asked.time or times[-1])).argmin())
+    first, last = (step.norms["energy_norm_near"][at][0].absolute for step in steps[-2:])
+    return observed_order(first, last, sizes[-3:]) or 0.0
 
 
 def _round_off(asked: Quantity, measured: Measured) -> float:
@@ -335,20 +370,15 @@ def _on_finest(asked: Quantity, measured: Sequence[Measured]) -> tuple[list[floa
 
 
 def _field_norms(
-    scene: Scene,
-    measured: Sequence[Measured],
+    steps: Sequence[dict[str, list[ErrorNorm]]],
     sizes: Sequence[float],
     order: float,
-    size: float,
     falls: float,
 ) -> tuple[dict[str, float], dict[str, Any]]:
-    """Bounds of the error norms of the finest level, and what the record says of each."""
-    rules = Rules(measured[0].body, size, count=1)
-    times = compared_times(scene, measured[-1].solution)
-    steps = [
-        error_history(one.motion, other.motion, times, rules, one.law).reported()
-        for one, other in pairwise(measured)
-    ]
+    """Bounds of the error norms of the finest level, and what the record says of each.
+
+    From the differences of successive levels.
+    """
     norms, entries = {}, {}
     for name in steps[-1]:
         counted = order + ERRORS[base_of(name)].beyond

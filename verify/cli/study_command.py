@@ -41,7 +41,7 @@ def _study(arguments: argparse.Namespace) -> int:
     elif arguments.study == "calibration":
         from verify.study.calibration import calibration_study
 
-        study = calibration_study(arguments.quick, announce, arguments.seed)
+        study = calibration_study(arguments.quick, announce, arguments.seed, arguments.out)
     else:
         study = _over_scenes(arguments, announce)
     written = write_study(arguments.out, arguments.study, study, command)

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -10,6 +12,7 @@ from scipy.special import betainc
 
 from verify.result import Verdict
 from verify.study.calibration.families import families
+from verify.study.calibration.kept import KeptTrials
 from verify.study.calibration.series import series_families
 from verify.study.calibration.trial import NORMS, Trial, trials
 from verify.study.record import Finding, Study
@@ -18,7 +21,9 @@ COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked
 WASTED = 10.0  # an error bar that is so many times the error judges little
 SIGNIFICANCE = 0.05  # of the binomial test that rejects a share
 FEWEST, FEWEST_SCENES = 60, 15  # triples and scenes of a family from which a share says something
-SEED = 28  # of the judged run; the rules were made with seed 0, and 27 was judged by the ones before
+SEED = (
+    28  # of the judged run; the rules were made with seed 0, and 27 was judged by the ones before
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +51,7 @@ class CalibrationStudy(Study):
 
 
 def calibration_study(
-    quick: bool, announce: Callable[[str], None], seed: int = SEED
+    quick: bool, announce: Callable[[str], None], seed: int = SEED, directory: Path | None = None
 ) -> CalibrationStudy:
     """Have the reference state its uncertainty where its true error is known.
 
@@ -58,14 +63,16 @@ def calibration_study(
         Is told what is being solved.
     seed : int
         Of all random numbers.
+    directory : Path, optional
+        Where trials are kept scene by scene, so that a run that is broken off can be resumed.
     """
-    start = perf_counter()
+    start, kept = perf_counter(), KeptTrials(directory, seed)
     announce(f"seed {seed}")
     found = [one for family in series_families(quick) for one in family.trials(seed)]
     for family in families(quick):
         announce(f"{family.name}, {family.scenes} scenes of {family.levels} levels")
         for index in range(family.scenes):
-            found += trials(family, index, seed)
+            found += kept.of(family.name, index, partial(trials, family, index, seed))
     findings = calibration_findings(found, quick)
     return CalibrationStudy(
         findings=findings, seconds=perf_counter() - start, trials=found, quick=quick, seed=seed
