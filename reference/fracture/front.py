@@ -54,6 +54,10 @@ class Front(Protocol):
         """Give the coordinates of points (n, 3)."""
         ...
 
+    def places(self, along: Array) -> Array:
+        """Give the points (n, 3) of the front at arc lengths (n,), m."""
+        ...
+
 
 @dataclass(frozen=True)
 class CircularFront:
@@ -80,14 +84,7 @@ class CircularFront:
 
     def coordinates(self, points: Array) -> FrontCoordinates:
         """Give the coordinates of points (n, 3), which lie off the axis."""
-        normal = np.asarray(self.normal, dtype=float)
-        normal = normal / np.linalg.norm(normal)
-        first = np.eye(3)[np.argmin(np.abs(normal))]
-        if self.towards is not None:
-            first = np.asarray(self.towards, dtype=float)
-        first = first - (first @ normal) * normal
-        first /= np.linalg.norm(first)
-        second = np.cross(normal, first)
+        first, second, normal = self._axes()
         spokes = points - np.asarray(self.centre, dtype=float)
         across = spokes @ normal
         x, y = spokes @ first, spokes @ second
@@ -98,6 +95,24 @@ class CircularFront:
         return FrontCoordinates(
             np.hypot(x, y) - self.radius, across, np.mod(angle, 2 * np.pi) * self.radius, axes
         )
+
+    def places(self, along: Array) -> Array:
+        """Give the points (n, 3) of the front at arc lengths (n,), m."""
+        first, second, _ = self._axes()
+        angle = along / self.radius
+        spokes = np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
+        return np.asarray(self.centre, dtype=float) + self.radius * spokes
+
+    def _axes(self) -> Array:
+        """Give unit vectors (3, 3): to where the arc length starts, across that, the normal."""
+        normal = np.asarray(self.normal, dtype=float)
+        normal = normal / np.linalg.norm(normal)
+        first = np.eye(3)[np.argmin(np.abs(normal))]
+        if self.towards is not None:
+            first = np.asarray(self.towards, dtype=float)
+        first = first - (first @ normal) * normal
+        first /= np.linalg.norm(first)
+        return np.array([first, np.cross(normal, first), normal])
 
 
 @dataclass(frozen=True)
@@ -134,3 +149,7 @@ class StraightFront:
         local = (points - np.asarray(self.start, dtype=float)) @ np.stack([ahead, up, along]).T
         axes = np.broadcast_to(np.stack([ahead, up, along]), (len(points), 3, 3))
         return FrontCoordinates(local[:, 0], local[:, 1], local[:, 2], axes)
+
+    def places(self, along: Array) -> Array:
+        """Give the points (n, 3) of the front at arc lengths (n,), m."""
+        return np.asarray(self.start, dtype=float) + np.outer(along, self._along() / self.length)

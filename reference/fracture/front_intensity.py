@@ -17,6 +17,8 @@ from verify.solution import Solution
 
 Array = NDArray[np.float64]
 _CHUNK = 20_000  # cells at a time
+_ROUND_OFF = 1e-6  # of a cell
+_SAMPLES = 480  # places along a front, where weights are integrated
 
 
 @dataclass(frozen=True)
@@ -81,8 +83,8 @@ def front_intensity(
     step : int
         Which output time; default the last.
     fitted : bool
-        Whether cells of the mesh must touch the front. Where they need not, as in a mesh whose cut
-        ends beside the front, hats are integrated along the front itself.
+        Whether cells of the mesh must touch the front. They need not in a mesh whose cut ends
+        beside the front.
 
     Raises
     ------
@@ -99,7 +101,6 @@ def front_intensity(
     at = front.coordinates(solution.points[corners])
     away = np.hypot(at.ahead, at.across)
     centres, width = _stations(front, stations)
-    on = away <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
     along = at.along[place[solution.cells[:, :4]]]
     beside = np.ones(len(along), dtype=bool)
     if not front.closed:  # hats are zero beyond its ends
@@ -113,13 +114,11 @@ def front_intensity(
     hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
-    extents = np.array([_mean_length(front, at.along[on], hat[on]) for hat in hats])
-    if not fitted:
-        extents[:] = front.length if width is None else width
-    if not extents.all():
+    extents = _lengths(front, solution.points[corners], nodes, away, hats)
+    if extents.min() <= 1e-3 * front.length / stations:
         raise InputError(
-            f"{stations} stations along a front of {np.count_nonzero(on)} nodes: one of them has "
-            "no node of the mesh; ask for fewer, or refine"
+            f"{stations} stations along a front of {front.length:.4g} m: one of them has no node "
+            "of the mesh; ask for fewer, or refine"
         )
     scale = np.array([modulus, modulus, hooke(material).shear]) / extents[:, None]
     domains = np.array([(hats * fall) @ nodal * scale for fall in falls])
@@ -148,13 +147,33 @@ def _hat(front: Front, along: Array, centre: float, width: float | None) -> Arra
     return np.clip(1.0 - np.abs(apart) / width, 0.0, 1.0)
 
 
-def _mean_length(front: Front, along: Array, weight: Array) -> float:
-    """Integrate the weight, linear between the nodes on the front, along the front."""
-    order = np.argsort(along, kind="stable")
-    s, w = along[order], weight[order]
-    if front.closed:
-        s, w = np.append(s, s[0] + front.length), np.append(w, w[0])
-    return float(np.sum(0.5 * (w[1:] + w[:-1]) * np.diff(s)))
+def _lengths(
+    front: Front, points: Array, cells: NDArray[np.int64], away: Array, hats: Array
+) -> Array:
+    """Integrate weights (c, n) of nodes, linear in cells, along the front, m.
+
+    Cells may be longer than the hats, and nodes, `away` (n,) from the front, beside it: what
+    they make of a hat is what weighs K, be it beyond the ends of the front.
+    """
+    step = front.length / _SAMPLES
+    beyond = 0 if front.closed else _SAMPLES
+    along = (np.arange(-beyond, _SAMPLES + beyond) + 0.5) * step
+    longest = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+    cells = cells[away[cells].min(axis=1) <= longest]  # no other holds a place of the front
+    corners, size = points[cells], 1e-9 * float(np.ptp(points, axis=0).max())
+    low, high = corners.min(axis=1) - size, corners.max(axis=1) + size
+    total = np.zeros(len(hats))
+    for place in front.places(along):
+        near = np.flatnonzero(((low <= place) & (place <= high)).all(axis=1))
+        if not len(near):
+            continue
+        edges = (corners[near, 1:] - corners[near, :1]).swapaxes(1, 2)
+        share = np.linalg.solve(edges, (place - corners[near, 0])[:, :, None])[:, :, 0]
+        share = np.column_stack([1.0 - share.sum(axis=1), share])
+        inside = int(share.min(axis=1).argmax())
+        if share[inside].min() > -_ROUND_OFF:  # else beyond the surface of the body
+            total += hats[:, cells[near[inside]]] @ share[inside]
+    return total * step
 
 
 def _check_fit(solution: Solution, corner: Array, radius: float, fitted: bool) -> None:

@@ -10,6 +10,7 @@ from reference.exact import exact_solution
 from reference.fracture import CircularFront, StraightFront, front_intensity
 from reference.fracture.front_modes import mode_field
 from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
+from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
 from verify.solvers import find_solver
@@ -58,6 +59,21 @@ def test_the_three_modes_are_told_apart_in_the_exact_fields_of_a_prism(intensity
     # only, where the fields change sign
     assert found.modes == pytest.approx(np.tile(intensity, (2, 1)), abs=6e-3)
     assert found.spread.max() < 6e-3
+
+
+@pytest.mark.parametrize("part", [(0.125, 0.875), (0.21, 0.93)])
+def test_stations_closer_than_the_elements_along_a_front_have_its_factors(part):
+    """Hats of 0.19 m between nodes 0.25 m apart are those of the nodes, not of the arc length."""
+    field = prism((0.7, -0.4, 0.5), 16)
+    front = StraightFront([0.0, 0.0, part[0]], [0.0, 0.0, part[1]], [1.0, 0.0, 0.0])
+    found = front_intensity(field, SOLID, front, [0.4, 0.6, 0.8], stations=3, fitted=False)
+    assert found.modes == pytest.approx(np.tile([0.7, -0.4, 0.5], (3, 1)), abs=2e-2)
+
+
+def test_a_station_that_no_node_is_near_is_refused():
+    front = StraightFront([0.0, 0.0, 0.26], [0.0, 0.0, 0.49], [1.0, 0.0, 0.0])
+    with pytest.raises(InputError, match="no node of the mesh"):
+        front_intensity(prism((1, 0, 0), 16), SOLID, front, [0.6], stations=3, fitted=False)
 
 
 def test_the_intensity_does_not_depend_on_the_axes():

@@ -10,12 +10,13 @@ from reference.exact.hooke import Hooke, hooke
 from reference.exact.sudden_crack import sudden_intensity, sudden_slip
 from verify.assess.quantities import Measured
 from verify.assess.reference import known_quantity, size_of
+from verify.assess.richardson import extrapolate
 from verify.assess.ringing import ringing_factors
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.solvers.conforming import _RADIUS_OF_FACTORS
+from verify.solvers.conforming import _RADIUS_OF_JUMPS
 from verify.study.calibration.families import families
 from verify.study.calibration.trial import trials
 
@@ -103,15 +104,22 @@ def factor_after_steps(radius, count):
     return np.array(found) / np.sqrt(2 * np.pi * np.arange(1, count + 1)) - 1
 
 
-def test_factors_are_of_second_order_from_the_fourth_step_after_a_jump():
+def test_factors_are_of_second_order_from_the_second_step_after_a_jump():
     """With ½, what no step resolves dies out by 150 times where the order would give 16."""
-    errors = np.abs(factor_after_steps(_RADIUS_OF_FACTORS, 32))[[3, 7, 15, 31]]
-    assert (errors < [0.02, 2e-3, 5e-4, 1e-4]).all()
+    errors = np.abs(factor_after_steps(_RADIUS_OF_JUMPS, 32))[[1, 3, 7, 15, 31]]
     falls = errors[:-1] / errors[1:]
-    assert falls[1:] == pytest.approx([4.0, 4.0], rel=0.15)
-    assert 4.0 < falls[0] < 12.0
+    assert (falls[1:] > 4.0).all()
+    assert falls[2:] == pytest.approx([4.0, 4.0], rel=0.2)
     half = np.abs(factor_after_steps(0.5, 32))[[3, 7, 15]]
     assert half[0] / half[2] > 150.0
+
+
+@pytest.mark.parametrize("steps", [2, 3, 4, 5, 6, 8, 10])
+def test_half_widths_of_a_factor_after_so_many_steps_of_the_coarsest_level(steps):
+    """They cover its error and are at most five times it; with ½ they were 11 to 1350 times."""
+    errors = factor_after_steps(_RADIUS_OF_JUMPS, 4 * steps)[[steps - 1, 2 * steps - 1, -1]]
+    known = extrapolate((1.0 + errors).tolist(), [4.0, 2.0, 1.0], formal=2.0, falls=4.0)
+    assert 1.0 < known.half_width / abs(errors[-1]) < 5.0
 
 
 class TestOnTheReference:
@@ -131,14 +139,16 @@ class TestOnTheReference:
         assert not ringing_factors(rest, {0: many})
 
     def test_the_error_of_a_factor_is_that_of_its_steps_after_the_jump(self):
-        """1.7, 0.4 and 0.2 % at the fourth, sixth and eighth; elements leave less than 0.1 %."""
+        """1.8 and 0.7 % at the fourth and sixth; elements leave less.
+
+        Not at the last: a wave from the mouth is near, and steps smear it.
+        """
         scene = load_scene("dynamics/crack_pressed_suddenly")
         solution = find_solver("reference").solve(scene, 1, repetitions=0)
         measured = Measured(solution, body_of(scene), law_of(scene), scene)
-        expected = factor_after_steps(_RADIUS_OF_FACTORS, 8)[[3, 5, 7]]
-        for asked, error in zip(scene.quantities, expected, strict=True):
-            time = asked.time or scene.analysis.duration
-            exact = sudden_intensity("I", 1e-3, hooke(scene.material), time)
+        expected = factor_after_steps(_RADIUS_OF_JUMPS, 6)[[3, 5]]
+        for asked, error in zip(scene.quantities[:2], expected, strict=True):
+            exact = sudden_intensity("I", 1e-3, hooke(scene.material), asked.time)
             assert measured.quantity(asked) / exact - 1 == pytest.approx(error, abs=1e-3)
 
     @pytest.mark.heavy
@@ -148,7 +158,7 @@ class TestOnTheReference:
         found = trials(family, 3, seed=0)
         assert len(found) == 4
         for trial in found:
-            assert 1.0 <= trial.ratio < 20.0, trial
+            assert 1.0 <= trial.ratio < 10.0, trial
 
     @pytest.mark.heavy
     @pytest.mark.parametrize(
