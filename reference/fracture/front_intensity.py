@@ -157,7 +157,7 @@ def _lengths(
     """
     step = front.length / _SAMPLES
     beyond = 0 if front.closed else _SAMPLES
-    along = (np.arange(-beyond, _SAMPLES + beyond) + 0.5) * step
+    along = step * (np.arange(-beyond, _SAMPLES + beyond, dtype=np.float64) + 0.5)
     longest = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
     cells = cells[away[cells].min(axis=1) <= longest]  # no other holds a place of the front
     corners, size = points[cells], 1e-9 * float(np.ptp(points, axis=0).max())
