@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 from reference.large_strain import solve_large_strain
 from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
 from reference.meshing.imprint import imprint, structured_triangles
+from reference.nodal_algebra import nodal_forces
 from reference.space import conforming_space
 from verify.scene import Material
 
@@ -36,6 +37,13 @@ def solve(space, held, field, poisson=0.3, **parameters):
         lambda factor: field(factor)[held],
         **parameters,
     )
+
+
+def forces_of(space, load):
+    """Nodal forces of a load, which gives the work of a test function."""
+    import ufl
+
+    return nodal_forces(load(ufl.TestFunction(space.function_space)), space)
 
 
 def lame(poisson):

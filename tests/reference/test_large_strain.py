@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 import scenes
-from large_bodies import lame, on_ends, rolled, solve, space_of, turn
+from large_bodies import forces_of, lame, on_ends, rolled, solve, space_of, turn
 from reference_scenes import needs_fenicsx, polyline, square
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
@@ -227,7 +227,7 @@ def slender_block(**parameters):
     across = 6.0 * 0.03**2 / 12 * np.array([0.0, 0.8, 0.6])
     held = space.node_points[:, 0] < 1e-12
     still = np.zeros_like(space.node_points)
-    load = partial(end_load, across, 1.0)
+    load = forces_of(space, partial(end_load, across, 1.0))
     found = solve(space, held, lambda _: still, poisson=0.0, load=load, **parameters)
     end = space.node_points[:, 0] > 1 - 1e-12
     return found, found.displacement[end].mean(axis=0)

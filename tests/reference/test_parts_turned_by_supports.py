@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from large_bodies import forces_of
 from reference_scenes import needs_fenicsx, polyline, square
 from solid_scenes import cube, polygon
 
@@ -97,7 +98,8 @@ def solve(points, cells, fixed, prescribed, load=None, first_step=0.25):
         return prescribed(space.node_points[nodes], factor).ravel()
 
     material = Material(young=YOUNG, poisson=0.3, plane="strain")
-    return solve_large_strain(material, space, unknowns, path, load, first_step=first_step)
+    forces = None if load is None else forces_of(space, load)
+    return solve_large_strain(material, space, unknowns, path, forces, first_step=first_step)
 
 
 def test_ends_of_a_strip_that_turn_against_one_another_are_followed_the_way_they_turn() -> None:
