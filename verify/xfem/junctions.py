@@ -58,16 +58,18 @@ def junction_cuts(
     if not suspects.any():
         return meets
     divided = divide_all(np.flatnonzero(suspects), meets)
+    # facets outside the extent of every cut join their pieces to parts
     facets = _inner_facets(divided, suspects)
     inside = _inside_extent(divided, facets, cuts, sizes)
-    open_ = ~inside.any(axis=1)
-    part = connected(len(divided.parent), facets.first[open_], facets.second[open_])
+    joining = ~inside.any(axis=1)
+    part = connected(len(divided.parent), facets.first[joining], facets.second[joining])
     solid = divided.solid
     first = np.unique(part[solid], return_index=True)[1]
     parts = np.bincount(divided.parent[solid][first], minlength=len(sizes))
     more = parts > np.bincount(partition.parent[partition.solid], minlength=len(sizes))
     if known is not None:
         more |= known & suspects
+    # of the cuts those that keep two parts asunder
     through = np.zeros_like(meets)
     apart = part[facets.first] != part[facets.second]
     facet, cut = np.nonzero(inside & apart[:, None])
@@ -80,9 +82,11 @@ def pieces_of_one_part(
     partition: Partition, cuts: Sequence[Cut], sizes: Floats, cells: Bools
 ) -> Ints:
     """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
+    if not cells.any():
+        return np.empty((0, 2), dtype=np.int64)
     facets = _inner_facets(partition, cells)
-    open_ = ~_inside_extent(partition, facets, cuts, sizes).any(axis=1)
-    pairs = np.stack([facets.first[open_], facets.second[open_]], axis=1)
+    joining = ~_inside_extent(partition, facets, cuts, sizes).any(axis=1)
+    pairs = np.stack([facets.first[joining], facets.second[joining]], axis=1)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 

@@ -6,9 +6,9 @@ branch splits only the piece that it crosses. `verify.xfem.clip` then divides th
 points, numbered once for the mesh by `verify.xfem.zero_points`.
 
 |φ| below round-off is exactly zero, and zero counts as the plus side: the cut is in effect moved a
-little to its minus side, the same at every node. Pieces that have no volume then still take their
-place at the face in which they lie, so that nothing else is joined across it, and are left out
-afterwards.
+little to its minus side, the same at every node. A piece of no more than round-off of the volume of
+its cell is left to the other half of the division that made it. It still takes its place at the
+face in which it lies, so that nothing else is joined across it.
 """
 
 from collections.abc import Callable, Sequence
@@ -99,22 +99,22 @@ def split_cells(
 
     rules = _Rules(cuts, sizes, tip, separated, opened)
     partition, ends = divide(crossed, rules)
-    if tip != "inside" or len(cuts) < 2:
-        return partition.only_split().absorbed()
-    # a junction is one of all cuts, also when some of them are not open yet
-    free = rules._replace(separated=None, opened=None)
-    junctions = junction_cuts(
-        *((partition, ends) if opened is None else divide(crossed, free)),
-        lambda cells, through: divide(cells, free._replace(through=through))[0],
-        cuts,
-        sizes,
-        junction_cells,
-    )
-    cells = junctions.any(axis=1)
-    if not cells.any():
-        return partition.only_split().absorbed()
-    partition = divide(crossed, rules._replace(through=junctions))[0].only_split()
-    pairs = pieces_of_one_part(partition, cuts, sizes, cells)
+    at_junctions = np.zeros(len(mesh.cells), dtype=bool)
+    if tip == "inside" and len(cuts) > 1:
+        # a junction is one of all cuts, also when some of them are not open yet
+        free = rules._replace(separated=None, opened=None)
+        junctions = junction_cuts(
+            *((partition, ends) if opened is None else divide(crossed, free)),
+            lambda cells, through: divide(cells, free._replace(through=through))[0],
+            cuts,
+            sizes,
+            junction_cells,
+        )
+        at_junctions = junctions.any(axis=1)
+        if at_junctions.any():
+            partition = divide(crossed, rules._replace(through=junctions))[0]
+    partition = partition.only_split()
+    pairs = pieces_of_one_part(partition, cuts, sizes, at_junctions)
     return replace(partition, one_part=pairs).absorbed()
 
 

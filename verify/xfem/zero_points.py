@@ -101,10 +101,7 @@ class ZeroPoints:
         Bisecting edges in this order gives the diagonals by which `verify.xfem.clip` divides faces.
         """
         ends = self.ends[numbers]
-        # points that were put together elsewhere (by the simulator) were never used: there cuts
-        # have divided in the order of their numbers
-        turn = self.turn if len(self.turn) == len(self.cut) else self.cut
-        return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], turn[numbers]])]
+        return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], self.turn[numbers]])]
 
     def _append(self, cut: int, plus: Ints, minus: Ints) -> Ints:
         """Points on edges that had none."""

@@ -83,4 +83,5 @@ def _zero_points(
         values[len(nodes) + rows, cut[rows]] = 0.0
     points.positions = np.concatenate([nodes, positions])
     points.values, points.ends, points.cut = values, ends.copy(), cut.copy()
+    points.turn = points.cut  # cuts have divided in the order of their numbers
     return points
