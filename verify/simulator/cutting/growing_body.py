@@ -38,8 +38,8 @@ class Increment:
     cells : int array
         Cells that were split, or whose pieces were.
     touched : int array
-        Cells that share an edge with these and are not on one side of all cuts, or have new
-        unknowns: their surfaces may change.
+        Cells that share an edge with these and are not on one side of all cuts, have new unknowns,
+        or have pieces left out beside those that have: their surfaces may change.
     moved : int array
         Those of them that have new unknowns, or are split anew.
     nodes_before : int
@@ -206,8 +206,12 @@ class GrowingBody:
         above, below = (sign * level[patch.cells] > 0.0 for sign in (1, -1))
         beside = ~(above.all(axis=1) | below.all(axis=1)).all(axis=1)
         shares_edge = division.at_changed_cells[patch.cells].sum(axis=1) > 1
-        touched = patch.whole_cells[is_moved | (shares_edge & beside)]
-        return Increment(cells, touched, patch.whole_cells[is_moved], before, self._source)
+        moved = patch.whole_cells[is_moved]
+        # a piece that was left out has the unknowns of another: it does not move with its neighbour
+        around = self.mesh.neighbours[moved].ravel()
+        around = around[(around >= 0) & (self._dropped[around] > 0)]
+        touched = np.concatenate([patch.whole_cells[is_moved | (shares_edge & beside)], around])
+        return Increment(cells, distinct(touched), moved, before, self._source)
 
     def _held_in(self, patch: MeshPatch, numbers: Ints) -> Separated:
         """Make the rule that what a cut has separated it separates, whatever came later."""
