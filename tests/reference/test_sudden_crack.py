@@ -122,6 +122,22 @@ def test_half_widths_of_a_factor_after_so_many_steps_of_the_coarsest_level(steps
     assert 1.0 < known.half_width / abs(errors[-1]) < 5.0
 
 
+@pytest.mark.parametrize("name", ["pressed", "sheared", "torn"])
+def test_cases_state_the_numbers_of_the_closed_forms(name):
+    scene = load_scene(f"dynamics/crack_{name}_suddenly")
+    law, asked = hooke(scene.material), {one.name: one for one in scene.quantities}
+    checks = [check for check in scene.acceptance if check.check == "value"]
+    assert len(checks) >= len(asked)
+    for check in checks:
+        one = asked[check.metric]
+        time = one.time or scene.analysis.duration
+        if one.kind == "opening":
+            expected = sudden_slip(1e-3, law, -one.point[0], time)  # the front is x = 0
+        else:
+            expected = sudden_intensity(one.mode, 1e-3, law, time)
+        assert check.equals == pytest.approx(expected, rel=1e-5), check.metric
+
+
 class TestOnTheReference:
     pytestmark = needs_fenicsx
 
