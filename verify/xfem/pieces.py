@@ -199,7 +199,7 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
         absorbed_by=np.concatenate([partition.absorbed_by, below[active]]),
     )
     # of two halves the larger takes one of round-off size, which keeps its place at the cut only;
-    # what has been taken before is taken with both halves
+    # what has been taken before is taken with both halves, by that half on whose side it lies
     above = np.flatnonzero(active)
     share, solid = parted.fraction, partition.solid[above]
     halves = np.stack([above, below[active]])
@@ -207,6 +207,13 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
     halves[:, swapped] = halves[::-1, swapped]
     small = ~solid | (share[halves[1]] <= ROUND_OFF_SHARE)
     parted.absorbed_by[halves[1, small]] = halves[0, small]
+    taken = np.flatnonzero(~partition.solid & active[partition.absorbed_by])
+    if len(taken):
+        sub = partition.simplices
+        level = partition.points.values[sub.points, index].sum(axis=1)
+        under = active[taken] | (np.bincount(sub.piece, level, len(active))[taken] < 0.0)
+        lower = np.where(active[taken], below[taken], taken)[under]
+        parted.absorbed_by[lower] = below[partition.absorbed_by[taken[under]]]
     return parted
 
 
