@@ -70,8 +70,8 @@ def cut_one_body(dim: int, seed: int) -> int:
 # edge within a face that no cut follows (9125); points on a line ordered along the difference of
 # two that are 1e-28 apart, and the surface 1/288 off (3107); a piece
 # that had no volume, and was left out, had 3e-44 of its cell when it was divided further (20428);
-# a cell with a piece left out beside one that got new unknowns (103); a piece left to the half of its
-# neighbour that a later cut has separated from it (2D: 196)
+# a cell with a piece left out beside one that got new unknowns (103); a piece left to the half of
+# its neighbour that a later cut had separated from it (in the plane: 196)
 FAILED_IN_SPACE = (103, 308, 394, 497, 2013, 2236, 3107, 5136, 9125, 20073, 20428, 20869, 21414)
 FAILED_ONCE = [(2, 147), (2, 196), (2, 1823)] + [(3, seed) for seed in FAILED_IN_SPACE]
 
