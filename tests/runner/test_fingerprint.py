@@ -70,14 +70,11 @@ def test_a_statement_changes_a_digest_and_a_comment_or_docstring_does_not(module
     assert source_digest._parsed(f"{text}\n_new = 1\n".encode(), package).digest != digest
 
 
-@pytest.mark.parametrize("module", [
-    "reference.law", "reference.exact.penny", "verify.applied_checks", "verify.xfem.clip",
-    "verify.scene.regions", "verify.compare.hooke",
-])  # fmt: skip
+@pytest.mark.parametrize("module", ["reference.law", "verify.applied_checks", "verify.xfem.clip"])
 def test_what_imports_a_changed_module_has_another_digest_and_nothing_else(
     module, copied, store, sources
 ):
-    roots = [*ROOTS, *modules_in("reference")]
+    roots = [*ROOTS, *modules_in("reference")[::3]]
     same = Sources(copied, store)
     before = {root: same.digest(root) for root in roots}
     file = copied / sources.file(module).relative_to(ROOT)
