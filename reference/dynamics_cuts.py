@@ -1,25 +1,13 @@
 """When the facets of a mesh open that conforms to all cuts of a scene; meshes before and after."""
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing import ConformingMesh, open_cut
 from reference.space import ConformingSpace
 from verify.errors import InputError
-from verify.scene import (
-    ArcCut,
-    CylinderCut,
-    DiscCut,
-    PolygonCut,
-    PolylineCut,
-    Scene,
-    SphereCut,
-    SweptCut,
-    ToolPathCut,
-)
-from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
+from verify.geometry.nearest import distance_to_pieces
+from verify.scene import Scene, ToolPathCut
 
 Array = NDArray[np.float64]
 
@@ -42,7 +30,10 @@ def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Arr
     corners = mesh.realised_cut
     places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
     points = places.reshape(-1, mesh.dimension)
-    off = [_distance(cut, points).reshape(places.shape[:2]).max(axis=1) for cut in scene.final_cuts]
+    off = [
+        distance_to_pieces(points, cut.pieces()).reshape(places.shape[:2]).max(axis=1)
+        for cut in scene.final_cuts
+    ]
     times = np.zeros(len(corners))
     for i, cut in enumerate(scene.cuts):
         mine = np.argmin(off, axis=0) == i
@@ -92,57 +83,3 @@ def inherit(closed: ConformingSpace, opened: ConformingSpace, field: Array) -> A
     values = np.empty((len(opened.node_points), field.shape[1]))
     values[opened.cell_nodes] = field[closed.cell_nodes]
     return values
-
-
-def _distance(cut: object, points: Array) -> Array:
-    """Distance (n,) of points to a cut, m; beside a disc or a sector only about it."""
-    match cut:
-        case PolylineCut():
-            return distance_to_polyline(points, cut.vertices())
-        case ArcCut():
-            x, y = (points - np.asarray(cut.centre)).T
-            return _from_arc(x, y, cut.radius, cut.start, cut.sweep)
-        case PolygonCut():
-            return _from_polygon(points, np.array(cut.points, dtype=float))
-        case SweptCut():
-            along = np.array(cut.along, dtype=float)
-            quads = [
-                np.stack([a, b, b + along, a + along])
-                for a, b in pairwise(np.array(cut.points, dtype=float))
-            ]
-            return np.asarray(
-                np.min([_from_polygon(points, quad) for quad in quads], axis=0), dtype=float
-            )
-        case DiscCut():
-            *plane, height = cut.axes() @ (points - np.array(cut.centre)).T
-            share = np.hypot(*(plane / np.array(cut.semi_axes)[:, None]))
-            beyond = np.hypot(*plane) * (1.0 - 1.0 / np.maximum(share, 1.0))
-            return np.asarray(np.hypot(height, beyond))
-        case SphereCut():
-            first, second, along = cut.axes() @ (points - np.array(cut.centre)).T
-            across = np.hypot(first, second)
-            return _from_arc(along, across, cut.radius, 0.0, cut.opening)
-    assert isinstance(cut, CylinderCut)
-    x, y, z = cut.axes() @ (points - np.array(cut.base)).T
-    beyond = np.maximum(np.maximum(-z, z - cut.height), 0.0)
-    return np.asarray(np.hypot(_from_arc(x, y, cut.radius, cut.start, cut.sweep), beyond))
-
-
-def _from_arc(x: Array, y: Array, radius: float, start: float, sweep: float) -> Array:
-    """Distance of points to an arc about the origin; angles in degrees."""
-    angle = np.mod(np.rad2deg(np.arctan2(y, x)) - start, 360.0)
-    beyond = np.maximum(angle - sweep, 0.0)
-    beyond = np.deg2rad(np.minimum(beyond, 360.0 - angle)) * radius
-    off: Array = np.hypot(np.hypot(x, y) - radius, np.where(angle > sweep, beyond, 0.0))
-    return off
-
-
-def _from_polygon(points: Array, corners: Array) -> Array:
-    """Distance of points to a plane polygon (k, 3) in space."""
-    origin = corners.mean(axis=0)
-    axes = np.linalg.svd(corners - origin)[2]
-    outline = (corners - origin) @ axes[:2].T
-    *plane, height = axes @ (points - origin).T
-    place = np.column_stack(plane)
-    beyond = np.where(inside_polygon(place, outline), 0.0, distance_to_outline(place, outline))
-    return np.asarray(np.hypot(height, beyond))

@@ -8,8 +8,8 @@ from reference.exact.energy import outline_of
 from reference.exact.hooke import Hooke
 from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
+from verify.geometry.planar import inner_parts
 from verify.scene import Scene
-from verify.scene.planar import inner_parts
 
 
 class Griffith(ComplexCrack):

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from reference.meshing.features import plane_features
 from reference.meshing.grading import singular_points
 from reference.meshing.interfaces import plane_interfaces
+from verify.geometry.nearest import distance_to_outline
+from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
-from verify.scene.planar import distance_to_outline, inside_polygon
 
 Array = NDArray[np.float64]
 End = Literal["start", "end"]

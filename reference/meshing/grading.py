@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from reference.meshing.features import Feature, crossing_points, plane_features
 from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.outline import divided_outline, load_jumps, supported_edges
+from verify.geometry.nearest import distance_to_outline
+from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.cuts import Cut
-from verify.scene.planar import distance_to_outline, inside_polygon
 
 Array = NDArray[np.float64]
 # of the body's longest side, which gmsh meshes as 1: below it runs out of digits, and loses facets

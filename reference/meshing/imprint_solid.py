@@ -13,7 +13,8 @@ from reference.meshing.edge_splitting import barycentric, loosen_front, mesh_edg
 from reference.meshing.opening import cell_facets, inner_facets
 from reference.meshing.session import oriented
 from verify.errors import InputError
-from verify.scene.planar import distance_to_outline, inside_polygon
+from verify.geometry.nearest import distance_to_outline
+from verify.geometry.planar import inside_polygon
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]

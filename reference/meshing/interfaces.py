@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.features import Feature
+from verify.geometry.nearest import distance_to_outline
+from verify.geometry.planar import inside_polygon
 from verify.scene import Box, Polygon, Rectangle, Scene
-from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.scene.regions import Side, comparisons
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from verify.compare.body import AnyBody, body_of
+from verify.geometry.spatial import frame
 from verify.scene import Scene
-from verify.scene.spatial import frame
 from verify.solution import Solution
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.mesh import SimplexMesh

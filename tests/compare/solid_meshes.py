@@ -9,7 +9,6 @@ import numpy as np
 import scenes
 from numpy.typing import NDArray
 
-from verify.compare.patches import patches_of
 from verify.compare.solid import SolidBody, solid_of
 from verify.scene import Scene
 from verify.scene.spatial_cuts import PolygonCut
@@ -40,7 +39,7 @@ def sliver_body(gap: float) -> SolidBody:
     """The cube with the inclined cut twice, `gap` apart in height: nearer than scenes allow."""
     body = solid_of(solid_scene([inclined()]))
     other = PolygonCut.model_validate(inclined(gap, "b"))
-    return replace(body, cuts={**body.cuts, "b": patches_of(other)})
+    return replace(body, cuts={**body.cuts, "b": other.pieces()})
 
 
 def cube_grid(nx: int, ny: int, nz: int, flip: bool = False) -> tuple[Array, NDArray[np.int64]]:

@@ -15,10 +15,10 @@ from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.compare.integration import spread_of
 from verify.compare.motion import ExactMotion
+from verify.geometry.planar import inside_polygon
 from verify.reference_record import ReferenceRecord
 from verify.report.tables import cuts_table
 from verify.result import CUT, CaseResult, SolveRecord, Status
-from verify.scene.planar import inside_polygon
 from verify.solvers.interface import find_solver
 
 LIFT = 0.1

@@ -5,10 +5,10 @@ import pytest
 from cut_meshes import STRAIGHT, scene
 
 from verify.compare.body import _inner_parts, body_of
-from verify.compare.curves import Segment
 from verify.compare.cut_line import cut_rule, place_on_cut
 from verify.compare.slabs import area_rule, slab_angles
-from verify.scene.planar import inside_polygon
+from verify.geometry.curves import Segment
+from verify.geometry.planar import inside_polygon
 
 
 def level(y, name="cut", x=(-0.1, 1.1)):

@@ -6,7 +6,6 @@ from reference_scenes import needs_fenicsx
 from solid_scenes import EXACT, cube
 
 from reference.exact import exact_solution
-from verify.compare.patches import patches_of
 from verify.scene import SphereCut
 from verify.solvers import find_solver
 
@@ -35,7 +34,7 @@ def test_the_nearest_points_of_a_cap_are_those_of_its_fine_triangulation():
     cap = SphereCut(
         kind="sphere", centre=(0.1, 0.2, 0.3), radius=0.4, towards=(1.0, -1.0, 2.0), opening=65.0
     )
-    (patch,) = patches_of(cap)
+    (patch,) = cap.pieces()
     vertices = cap.surface(0.004)[0]
     points = np.random.default_rng(4).uniform(-0.5, 0.9, (300, 3))
     foot, rim = patch.nearest(points)

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.errors import InputError
+from verify.geometry.nearest import distance_to_triangles
+from verify.geometry.spatial import area_inside, ear_clipping, overlap_area
 from verify.scene import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut, load_scene
-from verify.scene.spatial import area_inside, distance_to_triangles, ear_clipping, overlap_area
 
 CUBE = body_text("A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[2, 2, 2]]) + support_text(
     "boundary", [0, 0, 0]

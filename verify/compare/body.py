@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.curves import Piece, closed_pieces, cut_pieces, meeting_parameters
 from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.membrane_body import MembraneBody, membrane_of
 from verify.compare.solid import SolidBody, solid_of
 from verify.errors import UnsupportedSceneError
+from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
+from verify.geometry.nearest import distance_to_outline
+from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
-from verify.scene.planar import distance_to_outline, inside_polygon
 
 Array = NDArray[np.float64]
 
@@ -141,7 +142,7 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
     for cut in scene.final_cuts:
         if not isinstance(cut, PolylineCut | ArcCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
-        cuts[cut.name] = cut_pieces(cut)
+        cuts[cut.name] = cut.pieces()
     parts = [part for name in cuts for part in _inner_parts(name, cuts, loops)]
     extra = np.zeros((0, 2)) if singular is None else np.asarray(singular, float).reshape(-1, 2)
     size = float(np.linalg.norm(np.ptp(np.concatenate(loops), axis=0)))

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import morton_order
-from verify.compare.patches import Patch
 from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import ROUND_OFF, Rule
 from verify.compare.splitting import bisect, heights, split_at_level
+from verify.geometry.patches import Patch
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.curves import Arc
 from verify.compare.cut_line import CutRule
 from verify.compare.facet_kernels import distance_to_segments, nearest_segments
 from verify.compare.integration import cut_rules
@@ -28,6 +27,7 @@ from verify.compare.simplices import simplices, triangle_frames
 from verify.compare.solid import SolidBody
 from verify.compare.splitting import heights
 from verify.cut_record import CutRecord
+from verify.geometry.curves import Arc
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

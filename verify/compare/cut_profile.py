@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from verify.compare.body import AnyBody, Body
 from verify.compare.cut_line import AWAY, CutRule
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.patches import (
+from verify.compare.solid import SolidBody
+from verify.geometry.patches import (
     CylinderPatch,
     DiscPatch,
     Patch,
     PlanePatch,
     SpherePatch,
 )
-from verify.compare.solid import SolidBody
 
 Array = NDArray[np.float64]
 

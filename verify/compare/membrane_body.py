@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.membrane_cuts import SHORT, SurfaceLines, nearest_on_lines, surface_lines
 from verify.compare.membrane_kernels import nearest_triangles
-from verify.compare.patches import PlanePatch, patches_of
 from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplices import simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
+from verify.geometry.nearest import feet
+from verify.geometry.patches import PlanePatch
+from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import Cut
 from verify.scene.mesh_file import read_mesh
-from verify.scene.spatial import rim_edges
 from verify.scene.spatial_cuts import PolygonCut, SweptCut
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def cut_membrane(points: Array, cells: NDArray[np.int64], asked: Sequence[Cut]) 
                 f"a cut of kind '{cut.kind}' through a membrane cannot be compared on yet; "
                 "polygons and swept polylines can"
             )
-        patches = [patch for patch in patches_of(cut) if isinstance(patch, PlanePatch)]
+        patches = [patch for patch in cut.pieces() if isinstance(patch, PlanePatch)]
         found = surface_lines(points, cells, patches, cut.name)
         if not len(found.ends):
             raise UnsupportedSceneError(f"cut '{cut.name}' does not cross the membrane")
@@ -97,11 +98,9 @@ def _tips(lines: Sequence[Array], rim: Array) -> Array:
     """Find the ends (t, 3) of lines (s, 2, 3) that are neither on the rim nor met by another."""
     everything = np.concatenate([rim, *lines])
     size = float(np.linalg.norm(np.ptp(everything.reshape(-1, 3), axis=0)))
-    start, along = everything[:, 0], everything[:, 1] - everything[:, 0]
     tips = []
     for end in everything[len(rim) :].reshape(-1, 3):
-        share = np.clip(np.sum((end - start) * along, 1) / np.sum(along**2, 1), 0.0, 1.0)
-        away = np.linalg.norm(start + share[:, None] * along - end, axis=1)
+        away = np.linalg.norm(feet(end, everything[:, 0], everything[:, 1]) - end, axis=1)
         if np.sum(away <= _SAME * size) == 1:  # its own piece, and no other
             tips.append(end)
     return np.array(tips).reshape(-1, 3)

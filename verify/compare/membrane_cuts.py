@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.patches import PlanePatch
 from verify.errors import UnsupportedSceneError
+from verify.geometry.nearest import feet
+from verify.geometry.patches import PlanePatch
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
@@ -83,8 +84,7 @@ def nearest_on_lines(points: Array, ends: Array) -> tuple[Array, NDArray[np.int6
     best, which = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
     foot = np.array(points, copy=True)
     for k, (a, b) in enumerate(ends):
-        share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-        candidate = a + share[:, None] * (b - a)
+        candidate = feet(points, a, b)
         distance = np.linalg.norm(points - candidate, axis=1)
         closer = distance < best
         foot[closer], best[closer], which[closer] = candidate[closer], distance[closer], k

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
-from verify.compare.curves import Piece
-from verify.compare.patches import Patch
+from verify.geometry.curves import Piece
+from verify.geometry.patches import Patch
 
 Array = NDArray[np.float64]
 Sides = NDArray[np.int8]

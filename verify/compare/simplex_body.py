@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.facet_kernels import distance_to_segments
-from verify.compare.patches import Patch
 from verify.compare.splitting import measures
+from verify.geometry.patches import Patch
 
 Array = NDArray[np.float64]
 

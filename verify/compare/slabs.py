@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
-from verify.compare.curves import Arc, Piece, Segment
 from verify.compare.locate import Field
 from verify.compare.simplices import in_frames
+from verify.geometry.curves import Arc, Piece, Segment
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate_kernels import find_cells
-from verify.compare.patches import patches_of
 from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplices import simplices
 from verify.errors import UnsupportedSceneError
+from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
 from verify.scene.geometry import Box, MeshFile
 from verify.scene.mesh_file import read_mesh
-from verify.scene.spatial import rim_edges
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 
 Array = NDArray[np.float64]
@@ -67,7 +66,7 @@ def solid_of(scene: Scene) -> SolidBody:
     for cut in scene.final_cuts:
         if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
-        cuts[cut.name] = patches_of(cut)
+        cuts[cut.name] = cut.pieces()
         fronts.append(_trimmed(rim_edges(cut.surface(size / _RIM)), inside, size))
     front = np.concatenate(fronts)
     return SolidBody(corners=corners, cuts=cuts, front=front, box=box, inside=inside)

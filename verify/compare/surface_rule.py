@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from verify.compare.cell_tree import morton_order
 from verify.compare.cut_line import AWAY, CutRule
-from verify.compare.patches import Patch
 from verify.compare.simplex_rule import points_in
 from verify.compare.solid import SolidBody
 from verify.compare.splitting import divide, measures, split_at_level
+from verify.geometry.patches import Patch
 
 Array = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.planar import overlap_length
+from verify.geometry.spatial import rim_edges
 from verify.runner.exact_samples import holds
 from verify.scene import Box, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.cut_placement import check_points
-from verify.scene.planar import overlap_length
-from verify.scene.spatial import rim_edges
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh

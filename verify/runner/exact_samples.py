@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from verify.geometry.nearest import distance_to_polyline, distance_to_triangles
+from verify.geometry.spatial import rim_edges
 from verify.scene import ArcCut, CylinderCut, DiscCut, SphereCut
-from verify.scene.planar import distance_to_polyline
-from verify.scene.spatial import distance_to_triangles, rim_edges
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.mesh import SimplexMesh
 

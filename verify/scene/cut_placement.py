@@ -8,24 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.nearest import distance_to_outline, distance_to_polyline, distance_to_triangles
+from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
+from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, PartQuantity
 from verify.scene.cuts import ArcCut, whole_cut
 from verify.scene.geometry import Box, Polygon, Rectangle
-from verify.scene.planar import (
-    distance_to_outline,
-    distance_to_polyline,
-    inner_parts,
-    inside_polygon,
-    overlap_length,
-    point_along,
-)
-from verify.scene.spatial import (
-    area_inside,
-    distance_to_triangles,
-    length_inside,
-    overlap_area,
-    rim_edges,
-)
 from verify.scene.spatial_cuts import SpatialCut
 from verify.scene.tables import SceneTables
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from verify.scene.planar import polygon_defect
+from verify.geometry.planar import polygon_defect
 from verify.scene.skin import Skin
 from verify.scene.strict import Point2, Point3, Strict
 

@@ -12,6 +12,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.nearest import nearest_parts
 from verify.regularisation import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.part_pieces import pieces_on_part, size_of
@@ -105,12 +106,7 @@ def _reach(corners: Array, pieces: Array) -> float:
     """How far the farthest corner of simplices (s, k, d) is from pieces (p, k, d) of them, m."""
     points, apart = corners.reshape(-1, corners.shape[2]), []
     for i, j in _pairs(corners.shape[1]):
-        start, along = pieces[:, i], pieces[:, j] - pieces[:, i]
-        square = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
-        away = points[:, None] - start
-        share = np.clip(np.sum(away * along, axis=2) / square, 0.0, 1.0)
-        distance = np.linalg.norm(away - share[:, :, None] * along, axis=2)
-        apart.append(distance.min(axis=1))
+        apart.append(nearest_parts(points, pieces[:, [i, j]])[0])
     return float(np.min(apart, axis=0).max())
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.planar import inside_polygon
 from verify.scene.geometry import Box, Polygon, Rectangle
-from verify.scene.planar import inside_polygon
 from verify.scene.regions import parse_region
 from verify.scene.tables import SceneTables
 

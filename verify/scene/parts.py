@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.nearest import feet
 from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
 from verify.scene.regions import parse_region
 
@@ -68,8 +69,6 @@ def _on_named(
     found = np.zeros(len(points), dtype=bool)
     for edge, name in enumerate(geometry.parts()):  # a name may be given to several edges
         if name == where:
-            start = outline[edge]
-            along = outline[(edge + 1) % len(outline)] - start
-            share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-            found |= np.linalg.norm(points - start - share[:, None] * along, axis=1) <= tolerance
+            foot = feet(points, outline[edge], outline[(edge + 1) % len(outline)])
+            found |= np.linalg.norm(points - foot, axis=1) <= tolerance
     return found

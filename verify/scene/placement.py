@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.nearest import feet
 from verify.scene.acceptance import (
     METRICS,
     OF_CUTS,
@@ -248,9 +249,8 @@ def _check_front(cut: Any, point: NDArray[np.float64], place: str) -> None:
         off = float(np.hypot(np.linalg.norm(spoke - height * cut.axes()[2]) - size, height))
     elif isinstance(cut, PolygonCut):
         start, end = cut.edge_of(point)
-        way, size = end - start, float(np.linalg.norm(end - start))
-        share = np.clip((point - start) @ way / size**2, 0.0, 1.0)
-        off = float(np.linalg.norm(point - start - share * way))
+        size = float(np.linalg.norm(end - start))
+        off = float(np.linalg.norm(point - feet(point, start, end)))
     else:
         raise ValueError(
             f"{place}.cut: factors in 3D are known along the fronts of round discs and of polygons"

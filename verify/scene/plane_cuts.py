@@ -1,12 +1,14 @@
 """Cuts of plane scenes in the material frame: polylines and circular arcs."""
 
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from verify.scene.planar import polyline_defect
+from verify.geometry.curves import Arc, Piece, Segment
+from verify.geometry.planar import polyline_defect
 from verify.scene.strict import Finite, Line, NonNegative, Point2, Positive, Strict
 
 
@@ -37,6 +39,10 @@ class PolylineCut(Strict):
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Vertices (n, 2) of the polyline; `spacing` does not matter to straight segments."""
         return np.array(self.points, dtype=float)
+
+    def pieces(self) -> list[Piece]:
+        """Return its segments, in order."""
+        return [Segment(a, b) for a, b in pairwise(self.vertices())]
 
 
 class ArcCut(Strict):
@@ -70,6 +76,11 @@ class ArcCut(Strict):
         if self.sweep == 360.0:
             ring[-1] = ring[0]
         return ring
+
+    def pieces(self) -> list[Piece]:
+        """Return the arc itself, which is not cut into facets."""
+        centre = np.array(self.centre, dtype=float)
+        return [Arc(centre, self.radius, np.deg2rad(self.start), np.deg2rad(self.sweep))]
 
 
 PlaneCut = PolylineCut | ArcCut

@@ -5,6 +5,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.nearest import feet
+
 Array = NDArray[np.float64]
 
 _STRIP = 1e-5  # of the body: a narrower strip beside an edge belongs to what is next to it
@@ -33,7 +35,8 @@ def off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
         return points
     edges = _ridges(boundary)
     for row in narrow:
-        away = simplices[row][:, None] - _feet(simplices[row], edges)
+        own = simplices[row][:, None]
+        away = own - feet(own, edges[:, 0], edges[:, -1])
         beside = (np.linalg.norm(away, axis=2) <= _STRIP * size).all(axis=0)
         if not beside.any():
             continue
@@ -69,14 +72,3 @@ def _ridges(boundary: Array) -> Array:
     turn = 1.0 - np.abs(np.sum(directions[facet] * directions[facet[first[place.ravel()]]], axis=1))
     edges: Array = ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
     return edges
-
-
-def _feet(points: Array, edges: Array) -> Array:
-    """Nearest points (k, e, d) to points (k, d) of edges (e, 1 or 2, d)."""
-    start = edges[:, 0]
-    if edges.shape[1] == 1:
-        return np.broadcast_to(start, (len(points), *start.shape))
-    along = edges[:, 1] - start
-    share = np.einsum("ked,ed->ke", points[:, None] - start, along) / np.sum(along**2, axis=1)
-    feet: Array = start + np.clip(share, 0.0, 1.0)[:, :, None] * along
-    return feet

@@ -1,13 +1,17 @@
 """Cuts in space: plane polygons, discs, parts of cylinders and spheres, swept polylines."""
 
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from verify.scene.planar import polygon_defect, polyline_defect
-from verify.scene.spatial import ear_clipping, frame
+from verify.geometry.curves import Arc
+from verify.geometry.nearest import feet
+from verify.geometry.patches import CylinderPatch, DiscPatch, Patch, PlanePatch, SpherePatch
+from verify.geometry.planar import polygon_defect, polyline_defect
+from verify.geometry.spatial import ear_clipping, frame
 from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict
 
 Array = NDArray[np.float64]
@@ -47,6 +51,10 @@ class _SpatialCut(Strict):
         """
         raise NotImplementedError
 
+    def pieces(self) -> list[Patch]:
+        """Return its parts as they are, not cut into facets; normals into the positive side."""
+        raise NotImplementedError
+
 
 class PolygonCut(_SpatialCut):
     """A plane polygon in space; its normal follows the right-hand rule."""
@@ -72,6 +80,11 @@ class PolygonCut(_SpatialCut):
         corners = np.array(self.points, dtype=float)
         return corners, ear_clipping(corners)
 
+    def pieces(self) -> list[Patch]:
+        """Return it as one piece of a plane."""
+        corners, triangles = self.surface()
+        return [PlanePatch.of(corners[triangles], self.normal)]
+
     @property
     def normal(self) -> Array:
         """Unit normal (3,), to the positive side: that from which the corners run anticlockwise."""
@@ -82,11 +95,9 @@ class PolygonCut(_SpatialCut):
     def edge_of(self, point: Array) -> tuple[Array, Array]:
         """Start and end (3,) of the edge nearest to a point (3,)."""
         corners = np.array(self.points, dtype=float)
-        ways = np.roll(corners, -1, axis=0) - corners
-        shares = np.sum((point - corners) * ways, axis=1) / np.sum(ways**2, axis=1)
-        feet = corners + np.clip(shares, 0.0, 1.0)[:, None] * ways
-        nearest = int(np.argmin(np.linalg.norm(point - feet, axis=1)))
-        return corners[nearest], corners[nearest] + ways[nearest]
+        ends = np.roll(corners, -1, axis=0)
+        nearest = int(np.argmin(np.linalg.norm(point - feet(point, corners, ends), axis=1)))
+        return corners[nearest], ends[nearest]
 
 
 class DiscCut(_SpatialCut):
@@ -135,6 +146,10 @@ class DiscCut(_SpatialCut):
         i = np.arange(count)
         return points, np.column_stack([0 * i, 1 + i, 1 + (i + 1) % count])
 
+    def pieces(self) -> list[Patch]:
+        """Return the disc itself."""
+        return [DiscPatch(np.array(self.centre, dtype=float), self.axes(), self.semi_axes)]
+
 
 class CylinderCut(_SpatialCut):
     """A part of a cylinder's mantle; its axis is on the positive side."""
@@ -178,6 +193,12 @@ class CylinderCut(_SpatialCut):
         ) + np.array(self.base)
         # the axis is on the positive side: seen from there, the mantle is passed clockwise
         return _strips(ring, self.height * axis, closed, inward=True)
+
+    def pieces(self) -> list[Patch]:
+        """Return the part of the mantle itself."""
+        start, sweep = np.deg2rad(self.start), np.deg2rad(self.sweep)
+        arc = Arc(np.zeros(2), self.radius, float(start), float(sweep))
+        return [CylinderPatch(np.array(self.base, dtype=float), self.axes(), arc, self.height)]
 
 
 class SphereCut(_SpatialCut):
@@ -236,6 +257,11 @@ class SphereCut(_SpatialCut):
             triangles += [np.column_stack([last + i, last + j, np.full(around, len(points) - 1)])]
         return np.array(self.centre) + self.radius * points, np.concatenate(triangles)
 
+    def pieces(self) -> list[Patch]:
+        """Return the cap itself."""
+        centre, opening = np.array(self.centre, dtype=float), float(np.deg2rad(self.opening))
+        return [SpherePatch(centre, self.axes(), self.radius, opening)]
+
 
 class SweptCut(_SpatialCut):
     """A polyline in space, swept along a vector; its positive side is that of points × along."""
@@ -271,6 +297,16 @@ class SweptCut(_SpatialCut):
         points = np.array(self.points, dtype=float)
         line = points[:-1] if self.closed else points
         return _strips(line, np.array(self.along), self.closed, inward=False)
+
+    def pieces(self) -> list[Patch]:
+        """Return a parallelogram per segment."""
+        along = np.array(self.along, dtype=float)
+        return [
+            PlanePatch.of(
+                np.array([[a, b, b + along], [a, b + along, a + along]]), np.cross(b - a, along)
+            )
+            for a, b in pairwise(np.array(self.points, dtype=float))
+        ]
 
 
 SpatialCut = PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut

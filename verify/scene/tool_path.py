@@ -5,6 +5,7 @@ that begins after the blade has passed all of it. What it passed before the time
 the start.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
 from verify.errors import InputError
-from verify.scene.planar import polyline_defect
+from verify.geometry.curves import Piece
+from verify.geometry.patches import Patch
+from verify.geometry.planar import polyline_defect
 from verify.scene.plane_cuts import PolylineCut
 from verify.scene.spatial_cuts import PolygonCut, SweptCut
 from verify.scene.strict import Finite, Line, Point3, Positive, Strict, Vector
@@ -137,6 +140,10 @@ class ToolPathCut(Strict):
         whole = self.whole()
         assert not isinstance(whole, PolylineCut)
         return whole.surface(spacing)
+
+    def pieces(self) -> Sequence[Piece | Patch]:
+        """Return the pieces of what the blade sweeps."""
+        return self.whole().pieces()
 
     def whole(self) -> PolylineCut | SweptCut | PolygonCut:
         """Return the final cut, all that the blade sweeps, on the same side.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from verify.assess.realised_cut import polylines_of
 from verify.compare.body import Body
+from verify.geometry.nearest import feet
 
 Array = NDArray[np.float64]
 
@@ -102,9 +103,7 @@ def _outwards(body: Body, tip: Array) -> Array:
 
 def _closed(points: Array, edges: NDArray[np.int64], end: Array, size: float) -> Array:
     """Nodes (1 or 2, 2) at which a cut with this end does not open."""
-    start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
-    share = np.einsum("ed,ed->e", end - start, along) / np.einsum("ed,ed->e", along, along)
-    foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
+    foot = feet(end, points[edges[:, 0]], points[edges[:, 1]])
     both: Array = points[edges[np.linalg.norm(foot - end, axis=1).argmin()]]
     at = np.linalg.norm(both - end, axis=1) <= _ON * size
     return both[at] if at.any() else both

@@ -1,15 +1,14 @@
 """Plane pieces of curves, segments and arcs, and where they meet.
 
-Cuts are taken as asked: an arc stays an arc, it is not cut into facets.
+As parts of a cut they are what was asked for: an arc stays an arc, it is not cut into facets.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import ArcCut, PolylineCut
+from verify.geometry.nearest import shares
 
 Array = NDArray[np.float64]
 
@@ -41,9 +40,7 @@ class Segment:
 
     def nearest(self, points: Array) -> Array:
         """Parameters (n,) of the nearest points to `points` (n, 2)."""
-        edge = self.end - self.start
-        t: Array = np.clip((points - self.start) @ edge / (edge @ edge), 0.0, 1.0)
-        return t
+        return shares(points, self.start, self.end)
 
     def foot(self, points: Array) -> Array:
         """Nearest points (n, 2) to `points` (n, 2)."""
@@ -74,6 +71,11 @@ class Arc:
         """Length, m."""
         return self.radius * self.sweep
 
+    @property
+    def closed(self) -> bool:
+        """Whether it has no ends."""
+        return self.sweep >= 2 * np.pi
+
     def point(self, t: Array) -> Array:
         """Points (n, 2) at parameters `t` (n,) in [0, 1]."""
         angle = self.start_angle + self.sweep * np.asarray(t, dtype=float)
@@ -101,6 +103,13 @@ class Arc:
         """Distance (n,) from the whole circle, m, positive on the side of the centre."""
         return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
 
+    def depth(self, points: Array) -> Array:
+        """Distance (n,) to the nearer end along the arc, m, negative beyond it."""
+        x, y = (points - self.centre).T
+        half = self.sweep / 2.0
+        turn = np.angle(np.exp(1j * (np.arctan2(y, x) - self.start_angle - half)))
+        return np.asarray(self.radius * (half - np.abs(turn)))
+
     def rotated(self, turn: Array) -> "Arc":
         """Rotate by the matrix `turn` (2, 2)."""
         angle = float(np.arctan2(turn[1, 0], turn[0, 0]))
@@ -108,14 +117,6 @@ class Arc:
 
 
 Piece = Segment | Arc
-
-
-def cut_pieces(cut: PolylineCut | ArcCut) -> list[Piece]:
-    """Pieces of a cut as asked, in its direction; the positive side is on the left."""
-    if isinstance(cut, ArcCut):
-        centre = np.array(cut.centre, dtype=float)
-        return [Arc(centre, cut.radius, np.deg2rad(cut.start), np.deg2rad(cut.sweep))]
-    return [Segment(a, b) for a, b in pairwise(cut.vertices())]
 
 
 def closed_pieces(corners: Array) -> list[Piece]:

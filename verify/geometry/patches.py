@@ -1,24 +1,59 @@
-"""Pieces of cuts in space as asked: plane polygons, discs, parts of cylinders and spheres.
+"""Pieces of cuts in space: plane polygons, discs, parts of cylinders and spheres.
 
 Each is a chart: parameters (n, 2) to points (n, 3), with normals into the positive side. A
 cylinder stays a cylinder and a disc a disc; they are not cut into facets.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.curves import Arc
-from verify.scene.spatial import ear_clipping, frame
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SphereCut
+from verify.geometry.curves import Arc
+from verify.geometry.nearest import feet
+from verify.geometry.spatial import frame
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class PlanePatch:
+class _Surface:
+    """A surface about an origin (3,), with the rows of `axes` (3, 3) as its directions."""
+
+    origin: Array
+    axes: Array
+
+    def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3), and whether they lie on the rim (n,)."""
+        raise NotImplementedError
+
+    def foot(self, x: Array) -> Array:
+        """Nearest points (n, 3)."""
+        return self.nearest(x)[0]
+
+    def depth(self, x: Array) -> Array:
+        """Distance (n,) to the rim along the surface, m, negative beyond it."""
+        raise NotImplementedError
+
+
+class _Flat(_Surface):
+    """A part of a plane, whose normal is the third direction."""
+
+    curvature = 0.0
+    closed = False
+
+    def normal(self, uv: Array) -> Array:
+        """Return unit normals (n, 3)."""
+        return np.tile(self.axes[2], (len(uv), 1))
+
+    def level(self, x: Array) -> Array:
+        """Distance (n,) from the plane, positive on the positive side."""
+        height: Array = (x - self.origin) @ self.axes[2]
+        return height
+
+
+@dataclass(frozen=True)
+class PlanePatch(_Flat):
     """Triangles in a plane.
 
     Parameters
@@ -30,11 +65,8 @@ class PlanePatch:
         Corners of the triangles in the two directions, relative to the origin.
     """
 
-    origin: Array
-    axes: Array
     cells: Array
     plane = True
-    curvature = 0.0
 
     @classmethod
     def of(cls, triangles: Array, normal: Array) -> "PlanePatch":
@@ -47,18 +79,9 @@ class PlanePatch:
         """Points (n, 3)."""
         return self.origin + uv @ self.axes[:2]
 
-    def normal(self, uv: Array) -> Array:
-        """Return unit normals (n, 3)."""
-        return np.tile(self.axes[2], (len(uv), 1))
-
     def stretch(self, uv: Array) -> Array:
         """Area (n,) per area of parameters."""
         return np.ones(len(uv))
-
-    def level(self, x: Array) -> Array:
-        """Distance (n,) from the plane, positive on the positive side."""
-        height: Array = (x - self.origin) @ self.axes[2]
-        return height
 
     def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3), and whether they lie on the rim (n,)."""
@@ -71,17 +94,12 @@ class PlanePatch:
             for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
                 edge, off = b - a, uv - a
                 inside &= turn * (edge[0] * off[:, 1] - edge[1] * off[:, 0]) >= 0.0
-                t = np.clip(off @ edge / (edge @ edge), 0.0, 1.0)
-                candidate = a + t[:, None] * edge
+                candidate = feet(uv, a, b)
                 away = np.linalg.norm(uv - candidate, axis=1)
                 closer = away < best
                 foot[closer], best[closer] = candidate[closer], away[closer]
             foot[inside], best[inside], rim[inside] = uv[inside], 0.0, False
         return self.point(foot), rim
-
-    def foot(self, x: Array) -> Array:
-        """Nearest points (n, 3)."""
-        return self.nearest(x)[0]
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
@@ -90,7 +108,7 @@ class PlanePatch:
 
 
 @dataclass(frozen=True)
-class DiscPatch:
+class DiscPatch(_Flat):
     """An elliptical disc; parameters are the share of the radius and the angle.
 
     Parameters
@@ -102,11 +120,8 @@ class DiscPatch:
     semi_axes : (float, float)
     """
 
-    origin: Array
-    axes: Array
     semi_axes: tuple[float, float]
     plane = False  # in its parameters: what is straight in space is not straight there
-    curvature = 0.0
 
     @property
     def cells(self) -> Array:
@@ -120,18 +135,9 @@ class DiscPatch:
         flat = np.column_stack([a * share * np.cos(angle), b * share * np.sin(angle)])
         return self.origin + flat @ self.axes[:2]
 
-    def normal(self, uv: Array) -> Array:
-        """Return unit normals (n, 3)."""
-        return np.tile(self.axes[2], (len(uv), 1))
-
     def stretch(self, uv: Array) -> Array:
         """Area (n,) per area of parameters."""
         return self.semi_axes[0] * self.semi_axes[1] * np.abs(uv[:, 0])
-
-    def level(self, x: Array) -> Array:
-        """Distance (n,) from the plane, positive on the positive side."""
-        height: Array = (x - self.origin) @ self.axes[2]
-        return height
 
     def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3), and whether they lie on the rim (n,)."""
@@ -149,9 +155,14 @@ class DiscPatch:
         foot = np.where(outside[:, None], on_rim, flat)
         return self.origin + foot @ self.axes[:2], outside
 
-    def foot(self, x: Array) -> Array:
-        """Nearest points (n, 3)."""
-        return self.nearest(x)[0]
+    def depth(self, x: Array) -> Array:
+        """Distance (n,) to the rim in the plane: exact for a circle, else of first order in it."""
+        flat = (x - self.origin) @ self.axes[:2].T
+        share = np.linalg.norm(flat / self.semi_axes, axis=1)
+        steepness = np.linalg.norm(flat / np.square(self.semi_axes), axis=1)
+        inner = share > 1e-12
+        off = np.divide((1.0 - share) * share, steepness, where=inner, out=np.zeros_like(share))
+        return np.where(inner, off, min(self.semi_axes))
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
@@ -160,7 +171,7 @@ class DiscPatch:
 
 
 @dataclass(frozen=True)
-class CylinderPatch:
+class CylinderPatch(_Surface):
     """A part of a cylinder's mantle; its axis is on the positive side.
 
     Parameters
@@ -174,11 +185,10 @@ class CylinderPatch:
     height : float
     """
 
-    origin: Array
-    axes: Array
     arc: Arc
     height: float
     plane = False
+    closed = False
 
     @property
     def curvature(self) -> float:
@@ -214,13 +224,15 @@ class CylinderPatch:
         local = (x - self.origin) @ self.axes.T
         share, along = self.arc.nearest(local[:, :2]), np.clip(local[:, 2], 0.0, self.height)
         rim = along != local[:, 2]
-        if self.arc.sweep < 2 * np.pi:
+        if not self.arc.closed:
             rim |= (share == 0.0) | (share == 1.0)
         return self.point(np.column_stack([share, along])), rim
 
-    def foot(self, x: Array) -> Array:
-        """Nearest points (n, 3)."""
-        return self.nearest(x)[0]
+    def depth(self, x: Array) -> Array:
+        """Distance (n,) to the rim along the mantle: the nearer of its ends and of its sides."""
+        flat, along = (x - self.origin) @ self.axes[:2].T, (x - self.origin) @ self.axes[2]
+        depth: Array = np.minimum(along, self.height - along)
+        return depth if self.arc.closed else np.minimum(depth, self.arc.depth(flat))
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of a box around it."""
@@ -230,7 +242,7 @@ class CylinderPatch:
 
 
 @dataclass(frozen=True)
-class SpherePatch:
+class SpherePatch(_Surface):
     """A cap of a sphere, or all of it; its centre is on the positive side.
 
     Parameters
@@ -245,11 +257,14 @@ class SpherePatch:
         Angle between the pole and the rim, radians; π for the whole sphere.
     """
 
-    origin: Array
-    axes: Array
     radius: float
     opening: float
     plane = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has no rim."""
+        return self.opening >= np.pi
 
     @property
     def curvature(self) -> float:
@@ -287,13 +302,14 @@ class SpherePatch:
         """Nearest points (n, 3), and whether they lie on the rim (n,)."""
         first, second, along = self.axes @ (x - self.origin).T
         polar = np.arctan2(np.hypot(first, second), along)
-        rim = polar >= self.opening if self.opening < np.pi else np.zeros(len(x), dtype=bool)
+        rim = (polar >= self.opening) & (not self.closed)
         uv = np.column_stack([np.minimum(polar, self.opening), np.arctan2(second, first)])
         return self.point(uv), rim
 
-    def foot(self, x: Array) -> Array:
-        """Nearest points (n, 3)."""
-        return self.nearest(x)[0]
+    def depth(self, x: Array) -> Array:
+        """Distance (n,) to the rim along the sphere."""
+        first, second, along = self.axes @ (x - self.origin).T
+        return np.asarray(self.radius * (self.opening - np.arctan2(np.hypot(first, second), along)))
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
@@ -304,31 +320,6 @@ class SpherePatch:
 
 
 Patch = PlanePatch | DiscPatch | CylinderPatch | SpherePatch
-
-
-def patches_of(cut: SpatialCut) -> list[Patch]:
-    """Patches of a cut as asked; their normals point into its positive side."""
-    if isinstance(cut, DiscCut):
-        return [DiscPatch(np.array(cut.centre, dtype=float), cut.axes(), cut.semi_axes)]
-    if isinstance(cut, CylinderCut):
-        start, sweep = np.deg2rad(cut.start), np.deg2rad(cut.sweep)
-        arc = Arc(np.zeros(2), cut.radius, float(start), float(sweep))
-        return [CylinderPatch(np.array(cut.base, dtype=float), cut.axes(), arc, cut.height)]
-    if isinstance(cut, SphereCut):
-        centre, opening = np.array(cut.centre, dtype=float), float(np.deg2rad(cut.opening))
-        return [SpherePatch(centre, cut.axes(), cut.radius, opening)]
-    points = np.array(cut.points, dtype=float)
-    if isinstance(cut, PolygonCut):
-        triangles = points[ear_clipping(points)]
-        spokes = points - points[0]
-        return [PlanePatch.of(triangles, np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))]
-    along = np.array(cut.along, dtype=float)
-    return [
-        PlanePatch.of(
-            np.array([[a, b, b + along], [a, b + along, a + along]]), np.cross(b - a, along)
-        )
-        for a, b in pairwise(points)
-    ]
 
 
 def _rectangle(width: float, low: float, high: float, strips: int) -> Array:

@@ -1,9 +1,11 @@
-"""Planar predicates that validation needs: simple polygons, polylines, points inside."""
+"""Planar predicates: simple polygons, polylines, points inside."""
 
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+
+from verify.geometry.nearest import distance_to_outline
 
 Array = NDArray[np.float64]
 
@@ -40,16 +42,6 @@ def inside_polygon(points: Array, corners: Array) -> NDArray[np.bool_]:
         ~above_a & above_b & (left < 0), axis=1
     )
     return winding != 0
-
-
-def distance_to_outline(points: Array, corners: Array) -> Array:
-    """Distance (n,) of each of `points` (n, 2) to the closed outline `corners` (k, 2)."""
-    return _distance(points, corners, np.roll(corners, -1, axis=0))
-
-
-def distance_to_polyline(points: Array, vertices: Array) -> Array:
-    """Distance (n,) of each of `points` (n, 2) to the polyline `vertices` (k, 2)."""
-    return _distance(points, vertices[:-1], vertices[1:])
 
 
 def point_along(vertices: Array, fraction: float) -> Array:
@@ -116,15 +108,6 @@ def overlap_length(p: Array, q: Array) -> float:
 def _cross(u: Array, v: Array) -> Array:
     cross: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     return cross
-
-
-def _distance(points: Array, starts: Array, ends: Array) -> Array:
-    """Distance (n,) of points (n, 2) to the nearest of the segments (k, 2)–(k, 2)."""
-    edge = (ends - starts)[None]
-    p = points[:, None, :] - starts[None]
-    t = np.clip(np.sum(p * edge, axis=2) / np.sum(edge * edge, axis=2), 0.0, 1.0)
-    nearest: Array = np.linalg.norm(p - t[..., None] * edge, axis=2).min(axis=1)
-    return nearest
 
 
 def _segments_defect(points: Array, closed: bool) -> str | None:

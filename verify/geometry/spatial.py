@@ -1,4 +1,4 @@
-"""Predicates in space that validation needs: triangulated cuts against a box, and each other."""
+"""Frames, and predicates in space: triangulated cuts against a box, and each other."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -7,7 +7,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _TOLERANCE = 1e-9  # of the body's size
-_AT_ONCE = 100_000  # pairs of a point and a triangle: 20 MB
 
 
 def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
@@ -101,29 +100,6 @@ def rim_edges(surface: tuple[Array, Ints]) -> Array:
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     distinct, count = np.unique(edges, axis=0, return_counts=True)
     return points[distinct[count == 1]]
-
-
-def distance_to_triangles(points: Array, surface: tuple[Array, Ints]) -> Array:
-    """Distance (n,) of points (n, 3) to a triangulated surface, m."""
-    corners = surface[0][surface[1]]
-    size = max(1, _AT_ONCE // len(corners))
-    blocks = [points[i : i + size] for i in range(0, len(points), size)]
-    return np.concatenate([np.zeros(0), *(_to_triangles(block, corners) for block in blocks)])
-
-
-def _to_triangles(points: Array, corners: Array) -> Array:
-    """Distance (n,) of points (n, 3) to the nearest of triangles (m, 3, 3)."""
-    away = points[:, None, None] - corners
-    along = np.roll(corners, -1, axis=1) - corners
-    share = np.einsum("nmkc,mkc->nmk", away, along) / (along**2).sum(axis=2)
-    off = away - np.clip(share, 0.0, 1.0)[..., None] * along
-    best: Array = np.linalg.norm(off, axis=3).min(axis=(1, 2))
-    normals = np.cross(along[:, 0], along[:, 1])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    inwards = np.cross(normals[:, None], along)
-    inside = (np.einsum("nmkc,mkc->nmk", away, inwards) >= 0.0).all(axis=2)
-    height = np.abs(np.einsum("nmc,mc->nm", away[:, :, 0], normals))
-    return np.minimum(best, np.where(inside, height, np.inf).min(axis=1))
 
 
 def overlap_area(one: tuple[Array, Ints], other: tuple[Array, Ints]) -> float:
