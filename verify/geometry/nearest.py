@@ -72,7 +72,8 @@ class HasFeet(Protocol):
 
 def distance_to_pieces(points: Array, pieces: Sequence[HasFeet]) -> Array:
     """Distance (n,) of points (n, d) to the nearest of pieces of a cut, not cut into facets, m."""
-    return np.min([np.linalg.norm(points - one.foot(points), axis=1) for one in pieces], axis=0)
+    away = [np.linalg.norm(points - one.foot(points), axis=1) for one in pieces]
+    return np.asarray(np.min(away, axis=0), dtype=float)
 
 
 def _distances(points: Array, parts: Array) -> Array:
