@@ -81,7 +81,9 @@ def _distances(points: Array, parts: Array) -> Array:
     edges = [(0, 1)] if parts.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]
     away = np.full((len(points), len(parts)), np.inf)
     for i, j in edges:
-        off = np.linalg.norm(points - feet(points, parts[:, i], parts[:, j]), axis=2)
+        start, end = parts[:, i], parts[:, j]
+        share = shares(points, start, end)[..., None]
+        off = np.linalg.norm(points - start - share * (end - start), axis=2)
         away = np.minimum(away, off)
     if len(edges) == 3:
         normal = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
