@@ -158,9 +158,14 @@ class Session:
             state.displacement = increment.inherit(state.displacement)
             state.velocity = increment.inherit(state.velocity)
             self._start = {hook: increment.inherit(at) for hook, at in self._start.items()}
+            dragged, self._tool_load = self._tool_load is not None, None
             self._assemble()
         with self._timed("cutting"):
             self.surfaces.update(increment)
+        if dragged:  # on the facets and unknowns that there are now
+            with self._timed("collision"):
+                self.surfaces.move(self.displacement)
+                self._collide()
         self._begin_account()
 
     def _begin_account(self) -> None:
@@ -198,7 +203,7 @@ class Session:
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
         """Move with another body from now on."""
         self.body, self._grips, self.phantom = body, grips, body.force.phantom
-        self._tool_load, self._solver = None, solver
+        self._solver = solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
 
     def _load(self, time: float) -> Floats:
