@@ -32,7 +32,7 @@ def play_random_strokes(stage: Stage, seed: int) -> Session:
         record = session.step()
         found = quality_of(session)
         assert found.volume_error < _ROUND_OFF, (seed, record.step)
-        if not stage.is_membrane:
+        if not stage.mesh.is_membrane:
             assert found.enclosed_error < _ROUND_OFF, (seed, record.step)
             assert found.loose_edges == 0, (seed, record.step)
         assert np.isfinite(session.state.displacement).all(), (seed, record.step)

@@ -59,7 +59,7 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         write_film,
         write_picture,
     )
-    from verify.simulator.timings import timings_of
+    from verify.simulator.step_record import timings_of
 
     session = Session(stage)
     every = max(1, round(stage.steps / (arguments.frames - 1)))

@@ -183,16 +183,19 @@ def _draw(frames: Sequence[Frame], view: View) -> list[NDArray[np.uint8]]:
                 feature_angle=_SHARP, specular=0.15, reset_camera=False, render=False,
                 line_width=4.0,
             )  # fmt: skip
-        plotter.camera.parallel_projection = True
-        plotter.camera.focal_point = view.centre
-        plotter.camera.position = view.centre + 2.0 * view.width * view.towards
-        plotter.camera.up = view.up
-        plotter.camera.parallel_scale = 0.5 * view.width
+        look(plotter.camera, view)
         plotter.reset_camera_clipping_range()
         plotter.render()
         images.append(_labelled(np.array(plotter.screenshot(return_img=True)), frame, view))
     plotter.close()
     return images
+
+
+def look(camera: Any, view: View) -> None:
+    """Let a camera of PyVista look from where a view does."""
+    camera.focal_point, camera.up = view.centre, view.up
+    camera.position = view.centre + 2.0 * view.width * view.towards
+    camera.parallel_projection, camera.parallel_scale = True, 0.5 * view.width
 
 
 def meshes_of(frame: Frame) -> list[tuple[Any, str, bool]]:

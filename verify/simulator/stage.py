@@ -126,8 +126,3 @@ class Stage:
     def steps(self) -> int:
         """Number of steps; the last one may end a little later than the duration."""
         return int(np.ceil(self.duration / self.time_step * (1.0 - 1e-12)))
-
-    @property
-    def is_membrane(self) -> bool:
-        """Whether the body is a membrane."""
-        return self.mesh.is_membrane

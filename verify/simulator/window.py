@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from verify.simulator.animation import Frame, beside, meshes_of, view_of
+from verify.simulator.animation import Frame, beside, look, meshes_of, view_of
 from verify.simulator.live_scalpel import LiveScalpel, place_in_sight, write_stroke
 from verify.simulator.session import Session
 from verify.simulator.stage import Stage
@@ -62,10 +62,7 @@ class PlayWindow:
         self.plotter.background_color = pyvista.Color("white")
         self._stroke_file, self._down = stroke_file, False
         self._take_the_mouse()
-        camera = self.plotter.camera
-        camera.focal_point, camera.up = view.centre, view.up
-        camera.position = view.centre + 2.0 * view.width * view.towards
-        camera.parallel_projection, camera.parallel_scale = True, 0.5 * view.width
+        look(self.plotter.camera, view)
         self._draw(frame)
 
     def tick(self) -> None:

@@ -1,8 +1,11 @@
-"""Triangles of nearly equal size in a plane domain with holes: what a patch of skin is made from.
+"""A patch of skin over a plane, of triangles of nearly equal size.
 
 The border is resampled at the element size and kept; inner points start on a hexagonal lattice
 and are moved to the mean of their neighbours, Delaunay's triangles being made anew each time.
 """
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
@@ -14,6 +17,39 @@ _SWEEPS = 12  # of smoothing; angles change by less than a degree after that
 _CLEARANCE = 0.62  # of an element size, between the border and the first inner points
 _ATTEMPTS, _FINER = 12, 0.97
 _FLAT = 0.05  # least shape of a triangle, 1 is equilateral
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Skin as a height over a plane.
+
+    Attributes
+    ----------
+    outline : (k, 2) float array
+        Outer border, m.
+    height : callable
+        z (n,) at points (n, 2), m.
+    holes : list of (k, 2) float arrays
+        Borders of openings, m.
+    """
+
+    outline: Floats
+    height: Callable[[Floats], Floats]
+    holes: list[Floats] = field(default_factory=list)
+
+    def triangulate(self, triangles: int) -> tuple[Floats, Ints, int]:
+        """Mesh the patch with about so many triangles.
+
+        Returns
+        -------
+        points : (n, 3) float array
+        triangles : (m, 3) int array
+            Anticlockwise seen from outside the body.
+        rim : int
+            Number of points on the outer border, which are the first.
+        """
+        plane, cells, rim = mesh_of_about(self.outline, self.holes, triangles)
+        return np.column_stack([plane, self.height(plane)]), cells, rim
 
 
 def plane_mesh(outline: Floats, holes: list[Floats], size: float) -> tuple[Floats, Ints, int]:

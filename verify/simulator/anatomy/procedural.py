@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from verify.simulator.anatomy.patch import Patch
+from verify.simulator.anatomy.plane_mesh import Patch
 from verify.xfem.arrays import Floats
 
 _MM = 1e-3

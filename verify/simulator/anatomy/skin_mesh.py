@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from verify.scene import Skin
-from verify.simulator.anatomy.patch import Patch
+from verify.simulator.anatomy.plane_mesh import Patch
 from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
 from verify.simulator.anatomy.surface_file import outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken

@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from verify.simulator.arrays import GrowingArray, distinct, ranges
-from verify.simulator.cutting.division import Division
+from verify.simulator.cutting.division import Division, Slots, number_groups, slots_before
 from verify.simulator.cutting.patch import MeshPatch, PatchCutter
 from verify.simulator.cutting.point_numbers import PointNumbers
-from verify.simulator.cutting.renumbering import Slots, number_groups, slots_before
-from verify.simulator.cutting.stored_pieces import StoredPieces
-from verify.simulator.cutting.tied_parts import TiedParts
+from verify.simulator.cutting.stored_pieces import StoredPieces, TiedParts
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
 from verify.xfem.cuts import Cut

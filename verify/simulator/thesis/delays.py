@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.simulator import Stage
 from verify.simulator.cutting.semi_progressive import Crossings, SemiProgressiveCutter
@@ -14,7 +13,6 @@ from verify.simulator.thesis.strokes import hand, stroke_along
 SPEEDS = ("slow", "normal", "fast")
 _PLACES = (-0.021, 0.003, 0.025)  # m
 _FRAME = 1.0 / 60.0  # s
-_Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

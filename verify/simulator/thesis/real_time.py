@@ -7,10 +7,10 @@ import numpy as np
 
 from verify.calibration import kernel_seconds
 from verify.simulator import PHASES, Session, Stage, quality_of
+from verify.simulator.step_record import LIMITS
 from verify.simulator.thesis.strokes import hand, stroke_along
 from verify.xfem.arrays import Floats
 
-LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}
 _TETRAHEDRA = 1000
 _STROKES = ((-0.022, 1.8), (0.024, 3.0))  # m, s: after the incision, while it is pulled open
 _STROKE, _DURATION = 1.1, 4.6  # s
