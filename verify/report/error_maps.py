@@ -9,6 +9,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.nearest import distance_to_polyline
 from verify.report.bodies import Body, View, common_view, error_body, zoomed
 from verify.report.figures.sketch import cut_lines
 from verify.report.notation import ROUND_OFF, number, solver_title
@@ -147,7 +148,4 @@ def plane_tips(scene: Mapping[str, Any]) -> list[tuple[Points, float]]:
 
 def _distance(point: Points, line: Points) -> float:
     """Return the distance of a point from a line of straight pieces."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-    share = np.clip(np.einsum("ij,ij->i", point - start, along) / square, 0.0, 1.0)
-    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())
+    return float(distance_to_polyline(point[None], line)[0])

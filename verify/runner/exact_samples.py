@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from verify.geometry.nearest import distance_to_polyline, distance_to_triangles
+from verify.geometry.nearest import distance_to_pieces
 from verify.geometry.spatial import rim_edges
 from verify.scene import ArcCut, CylinderCut, DiscCut, SphereCut
 from verify.solvers.boundary_of_scene import Boundary
@@ -136,28 +136,9 @@ def end_points(cut: Any) -> tuple[Array, Array, Array]:
 
 
 def distances(cuts: Sequence[Any], points: Array) -> Array:
-    """Distance (n,) to the nearest cut; of curved ones at most that."""
-    best = np.full(len(points), np.inf)
-    for cut in cuts:
-        best = np.minimum(best, _distance(cut, points))
-    return best
-
-
-def _distance(cut: Any, points: Array) -> Array:
-    match cut:
-        case DiscCut():
-            away = (points - np.asarray(cut.centre)) @ cut.axes().T
-            over = np.linalg.norm(away[:, :2], axis=1) - max(cut.semi_axes)
-            return np.asarray(np.hypot(np.maximum(over, 0.0), away[:, 2]))
-        case ArcCut() | SphereCut():
-            away = np.linalg.norm(points - np.asarray(cut.centre), axis=1)
-            return np.asarray(np.abs(away - cut.radius))
-        case CylinderCut():
-            away = np.linalg.norm((points - np.asarray(cut.base)) @ cut.axes()[:2].T, axis=1)
-            return np.asarray(np.abs(away - cut.radius))
-        case _ if cut.dimension == 2:
-            return distance_to_polyline(points, cut.vertices())
-    return distance_to_triangles(points, cut.surface())
+    """Distance (n,) to the nearest cut."""
+    pieces = [piece for cut in cuts for piece in cut.pieces()]
+    return distance_to_pieces(points, pieces) if pieces else np.full(len(points), np.inf)
 
 
 def _faces(cut: Any, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.nearest import feet
 from verify.result import Notice, NoticeKind
 from verify.scene import MeshFile, Scene, read_mesh
 
@@ -204,10 +205,12 @@ class _Skin:
 def _feet(points: Array, facets: Array, bounded: bool = True) -> Array:
     """Nearest points (n, d) on segments or triangles (n, k, d), or on their line or plane."""
     if facets.shape[1] == 2:
-        along = facets[:, 1] - facets[:, 0]
-        share = np.sum((points - facets[:, 0]) * along, axis=1) / np.sum(along**2, axis=1)
-        share = np.clip(share, 0.0, 1.0) if bounded else share
-        return np.asarray(facets[:, 0] + share[:, None] * along)
+        start, end = facets[:, 0], facets[:, 1]
+        if bounded:
+            return feet(points, start, end)
+        along = end - start
+        share = np.sum((points - start) * along, axis=1) / np.sum(along**2, axis=1)
+        return np.asarray(start + share[:, None] * along)
     normal = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     height = np.sum((points - facets[:, 0]) * normal, axis=1)
@@ -219,7 +222,7 @@ def _feet(points: Array, facets: Array, bounded: bool = True) -> Array:
     for k in range(3):
         start, end = facets[:, k], facets[:, (k + 1) % 3]
         outside |= np.sum(np.cross(end - start, foot - start) * normal, axis=1) < 0.0
-        on_edge = _feet(points, np.stack([start, end], axis=1))
+        on_edge = feet(points, start, end)
         away = np.linalg.norm(points - on_edge, axis=1)
         nearer = away < least
         best[nearer], least[nearer] = on_edge[nearer], away[nearer]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline, distance_to_polyline, distance_to_triangles
+from verify.geometry.nearest import distance_to_outline, distance_to_pieces
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, PartQuantity
@@ -16,6 +16,7 @@ from verify.scene.cuts import ArcCut, whole_cut
 from verify.scene.geometry import Box, Polygon, Rectangle
 from verify.scene.spatial_cuts import SpatialCut
 from verify.scene.tables import SceneTables
+from verify.scene.tool_path import ToolPathCut
 
 Array = NDArray[np.float64]
 
@@ -165,14 +166,11 @@ def _holds(scene: SceneTables, point: Array, tolerance: float) -> bool:
 
 def _cut_distances(scene: SceneTables, point: Array) -> dict[str, float]:
     """Distance of a point to every cut whose shape is known, by the name of the cut."""
-    found = {}
-    for cut in _known(scene):
-        if isinstance(cut, SpatialCut):
-            found[cut.name] = float(distance_to_triangles(point[None], cut.surface())[0])
-        elif cut.dimension == 2:
-            plane: Any = cut
-            found[cut.name] = float(distance_to_polyline(point[None], plane.vertices())[0])
-    return found
+    return {
+        cut.name: float(distance_to_pieces(point[None], cut.pieces())[0])
+        for cut in _known(scene)
+        if not isinstance(cut, ToolPathCut) or cut.dimension == 2
+    }
 
 
 def _inside(points: Array, outline: Array) -> NDArray[np.bool_]:
