@@ -66,13 +66,10 @@ class ArcCut(Strict):
 
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Points (n, 2) on the arc, at most `spacing` apart (default: a 256th of a turn)."""
-        length = np.deg2rad(self.sweep) * self.radius
+        (arc,) = self.pieces()
         step = spacing or 2 * np.pi * self.radius / 256
-        n = max(4, int(np.ceil(length / step)))
-        angle = np.deg2rad(self.start) + np.deg2rad(self.sweep) * np.arange(n + 1) / n
-        ring = np.asarray(self.centre) + self.radius * np.column_stack(
-            [np.cos(angle), np.sin(angle)]
-        )
+        n = max(4, int(np.ceil(arc.length / step)))
+        ring = arc.point(np.arange(n + 1) / n)
         if self.sweep == 360.0:
             ring[-1] = ring[0]
         return ring

@@ -138,13 +138,10 @@ class DiscCut(_SpatialCut):
     def surface(self, spacing: float | None = None) -> Surface:
         """Triangulate the disc as a fan about its centre."""
         count = _points_per_turn(max(self.semi_axes), spacing)
-        angle = 2.0 * np.pi * np.arange(count) / count
-        first, second, _ = self.axes()
-        a, b = self.semi_axes
-        rim = a * np.cos(angle)[:, None] * first + b * np.sin(angle)[:, None] * second
-        points = np.vstack([np.zeros(3), rim]) + np.array(self.centre)
         i = np.arange(count)
-        return points, np.column_stack([0 * i, 1 + i, 1 + (i + 1) % count])
+        (disc,) = self.pieces()
+        rim = disc.point(np.column_stack([np.ones(count), 2.0 * np.pi * i / count]))
+        return np.vstack([self.centre, rim]), np.column_stack([0 * i, 1 + i, 1 + (i + 1) % count])
 
     def pieces(self) -> list[Patch]:
         """Return the disc itself."""
@@ -186,13 +183,10 @@ class CylinderCut(_SpatialCut):
         closed = self.sweep == 360.0
         count = max(2, int(np.ceil(_points_per_turn(self.radius, spacing) * self.sweep / 360.0)))
         steps = np.arange(count if closed else count + 1)
-        angle = np.deg2rad(self.start + self.sweep * steps / count)
-        first, second, axis = self.axes()
-        ring = self.radius * (
-            np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
-        ) + np.array(self.base)
+        (mantle,) = self.pieces()
+        ring = mantle.point(np.column_stack([steps / count, 0.0 * steps]))
         # the axis is on the positive side: seen from there, the mantle is passed clockwise
-        return _strips(ring, self.height * axis, closed, inward=True)
+        return _strips(ring, self.height * self.axes()[2], closed, inward=True)
 
     def pieces(self) -> list[Patch]:
         """Return the part of the mantle itself."""
@@ -236,16 +230,15 @@ class SphereCut(_SpatialCut):
     def surface(self, spacing: float | None = None) -> Surface:
         """Triangulate the cap in rings about its pole."""
         around = _points_per_turn(self.radius, spacing)
-        rings = max(2, int(np.ceil(around * self.opening / 360.0)))
-        polar = np.deg2rad(self.opening) * np.arange(1, rings + (not self.closed)) / rings
+        steps = max(2, int(np.ceil(around * self.opening / 360.0)))
+        polar = np.deg2rad(self.opening) * np.arange(1, steps + (not self.closed)) / steps
         turn = 2.0 * np.pi * np.arange(around) / around
-        first, second, pole = self.axes()
-        out = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
-        ring = np.sin(polar)[:, None, None] * out + np.cos(polar)[:, None, None] * pole
-        poles = [pole[None], -pole[None]] if self.closed else [pole[None]]
-        points = np.concatenate([ring.reshape(-1, 3), *poles])
+        (cap,) = self.pieces()
+        rings = [cap.point(np.column_stack([np.full(around, p), turn])) for p in polar]
+        poles = cap.point(np.array([[0.0, 0.0], [np.pi, 0.0]] if self.closed else [[0.0, 0.0]]))
+        points = np.concatenate([*rings, poles])
         # seen from the centre the rings are passed clockwise
-        i, count = np.arange(around), len(ring)
+        i, count = np.arange(around), len(polar)
         j = (i + 1) % around
         triangles = [np.column_stack([j, i, np.full(around, count * around)])]
         for k in range(count - 1):
@@ -255,7 +248,7 @@ class SphereCut(_SpatialCut):
         if self.closed:
             last = (count - 1) * around
             triangles += [np.column_stack([last + i, last + j, np.full(around, len(points) - 1)])]
-        return np.array(self.centre) + self.radius * points, np.concatenate(triangles)
+        return points, np.concatenate(triangles)
 
     def pieces(self) -> list[Patch]:
         """Return the cap itself."""
