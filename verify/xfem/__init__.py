@@ -2,7 +2,8 @@
 
 It knows no scene, no file format and no other solver, and needs numpy, scipy and numba only.
 Alternatives of other authors are in `verify.methods`. Numbers in brackets such as (2.48) are
-equations of the thesis that ``docs/theory/xfem.md`` cites; the page derives what the code does.
+equations of the thesis that ``docs/theory/xfem.md`` cites. The page derives the space; equations of
+division, force, Newton's method and schemes are in the docstrings of their modules.
 
 What a user calls, each with an example in its docstring, is in this package itself:
 
@@ -36,28 +37,40 @@ True
 Words that docstrings take for granted:
 
 cell, element
-    a simplex of the uncut mesh; a *facet* is a side of one: a segment (2D) or triangle (3D)
-level set, depth
-    of a cut: signed distance from it, and distance inward from its ends (docstring of `cuts`)
+    a simplex of the uncut mesh
+face, facet
+    a *face* is a side that two cells share: a segment (2D) or triangle (3D). A *facet* is any side,
+    as on the boundary or of a sub-simplex, or one of the segments or triangles of a cut
+level set, depth, extent
+    of a cut: signed distance from it; distance inward from its ends; where that is positive
+    (docstring of `cuts`). But ``mesh.extent`` is the size of the mesh
 realised cut
     the zero set of the level set as the mesh interpolates it, as far as it splits cells
 zero point
     where the level set of a cut, linear on an edge, is zero
-piece, cut-cell part
+piece
     what the cuts leave of a cell on one side; a cell that no cut splits is one piece. Its *label*
-    tells the side of each cut (±1), 0 where the cut does not split it. Pieces that no cut keeps
-    apart (cuts that end on one another leave some) share all dof nodes and are one *part*
+    tells the side of each cut (±1), 0 where the cut does not split it. The label is geometry; what
+    is apart is told by dof nodes alone
+part
+    the pieces of a cell that share all dof nodes: cuts that end on one another leave such pieces,
+    and so does a cut through a single cell
+solid
+    of pieces: more than round-off of their cell (of bodies and materials: not a membrane)
 dof node, unknown
     one displacement vector. A node of the mesh has one for each piece of material around it that
     the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes. These are
     the *side-wise* unknowns, against those of an enrichment, u and a
 free body
     pieces that hang together by shared dof nodes; a cut through the whole makes two of one
+share, fraction
+    without further words, of the volume of a cell
 sliver
     a piece with a small share in the volume of its cell
 corner
     a node of a piece. It is a dof node, unless slivers are aggregated: then some corners *follow*
-    the linear field of a *root*, a piece that is no sliver, and have no unknown of their own
+    the linear field of a *root*, a piece that is no sliver, and have no unknown of their own. On a
+    first reading take ``corners``, ``extend``, ``restrict``, ``unfold`` and ``fold`` for identities
 membrane
     triangles in space, without bending stiffness
 
@@ -79,7 +92,7 @@ on what the two after it define, and is easier read first):
 `zero_points`, `clip`, `crossing`, `junctions`, `pieces`
     exact division of cells at zero points of level sets; through which cells a cut goes, and which
     cells cuts part that end on one another. Begin with the docstring of `pieces`, which says what
-    the others are for
+    the others are for; leave `junctions` out at first
 `join`, `sides`, `phantom`
     which pieces share dof nodes (by contact across faces); on which side of the cuts pieces and dof
     nodes lie; the result: standard finite elements with weights
@@ -96,7 +109,10 @@ on what the two after it define, and is easier read first):
 `body`, `explicit`, `implicit`
     a body in motion, and its schemes
 
-Extensions, which none of the modules above needs (a contract of the imports holds that):
+Extensions, to be skipped at first: none of the modules above needs them (a contract of the imports
+holds that). Of what a user calls, two need a word. ``static_equilibrium`` is ``LoadPath.follow``:
+for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.step`` is that of
+``NewtonIntegrator`` in `implicit`, with another force and matrix.
 
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them

@@ -120,7 +120,7 @@ class Simplices:
     Attributes
     ----------
     piece : (q,) int array
-        Cut-cell part, or whatever else a simplex hands on to its parts.
+        Piece, or whatever else a simplex hands on to what it is divided into.
     points : (q, c) int array
         Numbers of the vertices.
     barycentric : (q, c, c) float array

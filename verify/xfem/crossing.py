@@ -1,7 +1,8 @@
 """Crossing of pieces by one cut: it divides those that it goes through.
 
 That is read off the zero points on the edges of a piece: are they inside the extent of the cut?
-Cuts that end on one another inside an element are the matter of `verify.xfem.junctions`.
+A branch on a stem that goes through is decided here, too: it splits what the stem leaves. Cuts
+that part a cell only together are the matter of `verify.xfem.junctions`.
 """
 
 from collections.abc import Callable
@@ -84,7 +85,8 @@ def crossed_through(
         return _mostly_crossed(cut, positions, crossing), np.zeros(pieces, dtype=bool)
     wanted, at = np.unique(zero, return_inverse=True)
     level, depth = level_and_depth(cut, positions[wanted])
-    # an end on an edge has gone through the element before it, and not into the one behind it
+    # an end on an edge is inside by the rule `inside`: it has gone through the element before it;
+    # by `through` it is not: it has not gone into the one behind it
     margin = 1.0 if tip == "through" else -1.0
     inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
     if reached is not None:

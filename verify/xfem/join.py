@@ -5,6 +5,11 @@ a face with that node, touch across the face, in an area (2D: a length). What to
 or an edge only is apart, as pieces that turn about a hinge are no body, and a piece without volume
 joins nothing. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along
 faces all follow from this one rule.
+
+A tip closes so: the face between the last divided cell and the whole one ahead has two regions, one
+on either side of the cut. The whole cell has one piece, label 0, that touches across both. Hence
+both sides share the dof nodes of that face, and the jump is zero on it. So a cut through a single
+cell inside the mesh makes two pieces and no unknown.
 """
 
 from dataclasses import dataclass
@@ -98,6 +103,8 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
         Cuts that divide a cell beside the face.
     points : ZeroPoints
     """
+    # cuts come in the order of their numbers, which need not be that of the division: then points
+    # may be new here, and are added. Only sides leave this function; points tell empty regions.
     face, side = np.arange(len(nodes)), np.zeros(dividing.shape, dtype=np.int8)
     stairs = staircase(nodes.shape[1])
     for cut in range(dividing.shape[1]):
@@ -125,7 +132,12 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
 
 
 def _fitting(piece_cell: Ints, label: Sides, cells: Ints, side: Sides) -> Ints:
-    """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
+    """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts).
+
+    It is one: a side of every cut leads down the divisions of a cell to exactly one piece. Hence
+    pieces of round-off size keep their rows, and those of one part stay several: their union is
+    in general no intersection of sides, so that no label would fit.
+    """
     order = np.argsort(piece_cell, kind="stable")
     ends = np.cumsum(np.bincount(piece_cell))
     first, end = np.concatenate([[0], ends])[cells], ends[cells]
@@ -143,7 +155,8 @@ def number_nodes(
 ) -> tuple[Ints, Ints]:
     """Mesh node (N,) of each dof node, and the dof node of each class; −1 for one without volume.
 
-    The first dof nodes are the nodes of the mesh, each with the material in which it lies.
+    The first dof nodes are the nodes of the mesh, each with the material in which it lies; if that
+    has no volume, with other material around it.
 
     Parameters
     ----------

@@ -147,6 +147,16 @@ def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, siz
     A cut that is bent inside an element is realised a little beside where it was given. A branch
     that ends on the given one goes on to the realised one, over the points between the two.
 
+    ::
+
+        branch ──────────┤     ×     ┆
+                 its end, on   point  realised stem
+              the given stem
+
+    So a point × counts if the stem as given and as realised lie on its two sides, the end is on the
+    given stem, and what is just inside of the end lies beyond the given stem, seen from ×.
+    Plain branches need this as well as junctions.
+
     Parameters
     ----------
     cuts : sequence of Cut
@@ -181,7 +191,8 @@ def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, siz
 def _end(cut: Cut, points: Floats, size: Floats) -> tuple[Floats, Floats]:
     """Nearest end (q, space) of a cut to points past it, and the unit vectors that lead inwards.
 
-    The depth is a distance from the end: its slope is that direction.
+    The depth t is a distance from the end, negative here: its slope is that direction, and the end
+    x − t ∇t/‖∇t‖. Where two ends are equally near, the difference quotient is a mean of both.
     """
     step = _ASIDE * size
     slope = np.empty_like(points)

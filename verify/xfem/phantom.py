@@ -1,4 +1,4 @@
-"""The cut body as a mesh of cut-cell parts: standard finite elements with a weight.
+"""The cut body as a mesh of pieces of cells: standard finite elements with a weight.
 
 Every piece of a cell becomes a whole cell of its own (phantom nodes; Hansbo & Hansbo 2004) whose
 stiffness, mass and load count by the piece's share of the volume. The space is that of the shifted
@@ -87,15 +87,15 @@ class PhantomMesh:
 
     With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no
     unknown of their own but follow others: `cells` counts corners, and everything else here that
-    has N rows is of the dof nodes. `extend` and `restrict` lead from one to the other.
+    has N rows is of the dof nodes. `extend` and `restrict` lead from one to the other: arrays of N
+    rows must not be indexed by `cells`, or only by those of `corners`, the mesh before aggregation.
 
     Attributes
     ----------
     mesh : SimplexMesh
         The mesh before the cut.
     cells : (p, d + 1) int array
-        Corners of each piece (cut-cell part), ordered by parent: dof nodes if nothing is
-        aggregated.
+        Corners of each piece, ordered by parent: dof nodes if nothing is aggregated.
     parent : (p,) int array
         Cell of the uncut mesh.
     fraction : (p,) float array
@@ -104,7 +104,8 @@ class PhantomMesh:
         Side of each cut that splits the parent; 0 where the cut does not split it.
     node_parent : (N,) int array
         Node of the uncut mesh. The first n dof nodes are the nodes of the mesh, each with the
-        material in which it lies; further ones are phantom nodes.
+        material in which it lies (if that is of round-off size, with other material around it);
+        further ones are phantom nodes.
     level_sets : (n, cuts) float array
         Nodal level set of each cut as used: snapped to zero within round-off, in metres.
     sub_cells : SubCells
@@ -177,7 +178,8 @@ class PhantomMesh:
     def part(self) -> Ints:
         """(p,) first of the pieces of a cell that have all unknowns in common: together one part.
 
-        Where cuts end on one another they leave pieces that none keeps apart.
+        Where cuts end on one another they leave pieces that none keeps apart. So does a cut that
+        goes through one cell only: its sides are joined all around.
         """
         part = np.arange(len(self.cells))
         rows = np.flatnonzero(self.split)
@@ -320,7 +322,9 @@ def cut_mesh(
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
-    # the pieces that are there, and the cells around the patch, in the order of the cells
+    # three numberings of pieces: `joined` has those of the partition, then the whole cells of the
+    # patch; `parent`, `label`, `share` those, then the rest of the cells; the result (`order`, and
+    # `number` back) those of them that are solid, by cell
     rest = np.setdiff1d(np.arange(len(mesh.cells)), joined.cells, assume_unique=True)
     parent = np.concatenate([joined.cells[joined.piece_cell], rest])
     cells = np.concatenate([numbering[joined.group], mesh.cells[rest]])

@@ -9,6 +9,22 @@ points, numbered once for the mesh by `verify.xfem.zero_points`.
 little to its minus side, the same at every node. A piece of no more than round-off of the volume of
 its cell is left to the other half of the division that made it. It still takes its place at the
 face in which it lies, so that nothing else is joined across it.
+
+Where cuts end, or meet, inside a cell:
+
+===================  ========================  =======================  ==========================
+what is there        who decides               labels                   who joins
+===================  ========================  =======================  ==========================
+the tip of a cut     `crossing`: not through   0: one piece             `join`: this whole cell is
+                                                                        joined to both sides of
+                                                                        the cell behind
+a branch that ends   `crossing`: the branch    ±1 of the stem, and of   `join`, across faces
+on a stem that goes  goes through the pieces   the branch on one side
+through              on its side of the stem   of the stem only
+cuts that together   `junctions`: those cuts   ±1 of each, also past    `one_part`, inside the
+part what none goes  divide all that they      its end                  cell; `join`, across faces
+through by itself    meet in this cell
+===================  ========================  =======================  ==========================
 """
 
 from collections.abc import Callable, Sequence
@@ -54,7 +70,16 @@ def split_cells(
 ) -> Partition:
     """Split every cell that a cut goes through, or that several part at a junction.
 
-    The others do not appear in the result.
+    The others do not appear in the result. Crossed cells are divided up to four times, each time
+    from the start and with zero points and piece numbers of their own, which do not compare:
+
+    1. by the rules given: cells in pieces of which a cut ends are noted;
+    2. if not all cells are opened, the same as if they were, for step 3;
+    3. cells in which a cut ends and another is, whatever the ends: which cuts make a junction;
+    4. if some do, by the rules given once more, those cuts going through the cells of junctions.
+
+    On a first reading leave out `separated`, `opened` and `junction_cells`: they serve cuts that
+    grow (`verify.simulator`).
 
     Parameters
     ----------
@@ -186,7 +211,11 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
 
 
 def _divide(partition: Partition, index: int, active: Bools) -> Partition:
-    """Replace each active piece by its part above (same place) and below (appended)."""
+    """Replace each active piece by its half above (same place) and below (appended).
+
+    A piece of round-off size names another of its cell in `absorbed_by`, which may name a further
+    one. The chain ends at a solid piece: a solid piece that is divided has a solid half.
+    """
     below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
     label = np.concatenate([partition.label, partition.label[active]])
     label[: len(active)][active, index] = 1
@@ -198,8 +227,8 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
         simplices=divided(partition.simplices, partition.points, index, below),
         absorbed_by=np.concatenate([partition.absorbed_by, below[active]]),
     )
-    # of two halves the larger takes one of round-off size, which keeps its place at the cut only;
-    # what has been taken before is taken with both halves, by that half on whose side it lies
+    # halves: the one that may take, the one that it takes. The larger half of a solid piece takes
+    # the other if that is of round-off size; of a piece that is not solid, above takes below.
     above = np.flatnonzero(active)
     share, solid = parted.fraction, partition.solid[above]
     halves = np.stack([above, below[active]])
@@ -207,6 +236,8 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
     halves[:, swapped] = halves[::-1, swapped]
     small = ~solid | (share[halves[1]] <= ROUND_OFF_SHARE)
     parted.absorbed_by[halves[1, small]] = halves[0, small]
+    # what was taken before by a piece that is divided now goes to the half on whose side it lies,
+    # by the sign of its mean level set; if it is divided as well, its half below to that below
     taken = np.flatnonzero(~partition.solid & active[partition.absorbed_by])
     if len(taken):
         sub = partition.simplices
@@ -218,7 +249,10 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
 
 
 def _bisect_beside(partition: Partition, index: int) -> Partition:
-    """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges."""
+    """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges.
+
+    That changes sub-simplices, and no piece.
+    """
     zero, simplices = partition.points, partition.simplices
     if len(partition.crossed_edges(index)[0]) == 0:
         return partition

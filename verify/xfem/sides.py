@@ -38,9 +38,13 @@ def node_sides(
 ) -> Sides:
     """Sides (N, cuts) of the cuts on which the material of each dof node lies.
 
-    It is that of its labelled pieces if they agree. Where no cut has split them, or they lie
-    around the end of it, it is that of the node for the dof node of the node's own material. A dof
-    node beyond another cut lies where its pieces do, not where its node is.
+    For each cut, the first of these that applies:
+
+    1. all labelled pieces of the dof node are on one side: that;
+    2. it is of the node's own material, and the node is not on the cut: the side of the node;
+    3. its pieces in split cells lie on one side by the larger share: that. So a dof node beyond
+       another cut lies where its pieces do, not where its node is;
+    4. else the side of the node, plus on the cut.
 
     Parameters
     ----------
