@@ -15,7 +15,7 @@ from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
 from verify.cli.verdict_text import verdict_lines
-from verify.report import load_run, render, render_markdown
+from verify.report import load_run, render
 from verify.report.exports import COLUMNS
 from verify.result import SolveRecord, Status, Verdict
 from verify.result_files import read_result, write_result
@@ -106,7 +106,7 @@ def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_besid
     said = "reference: 0.49 of the error"
     page = render(root).read_text(encoding="utf-8")
     assert page.count(said) == 2  # beside the check, and beside the verdict of the case
-    assert render_markdown(root).read_text(encoding="utf-8").count(said) == 2
+    assert render(root, "markdown").read_text(encoding="utf-8").count(said) == 2
     junit = ElementTree.parse(root / "junit.xml").getroot()
     assert [one.text for one in junit.findall(".//testcase/system-out")] == [said]
     rows = csv.DictReader(io.StringIO((root / "results.csv").read_text()))
@@ -153,7 +153,7 @@ def test_meshing_is_no_part_of_the_time_that_is_compared(plain_run):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     root = make_run(tmp_path_factory.mktemp("markdown") / "run")
-    return root, render_markdown(root).read_text(encoding="utf-8")
+    return root, render(root, "markdown").read_text(encoding="utf-8")
 
 
 def test_every_table_has_rows_of_one_width_and_holds_the_numbers_of_the_page(written):

@@ -42,7 +42,7 @@ def test_every_judged_case_is_drawn_by_a_process_beside_and_the_page_is_the_same
         raise AssertionError("a case that is drawn was drawn again")
 
     monkeypatch.setattr(rendering, "drawn_case", not_again)
-    assert render(run, drawings).read_bytes() == alone
+    assert render(run, drawings=drawings).read_bytes() == alone
 
 
 def test_what_was_not_drawn_to_its_end_is_drawn_by_the_report(drawn, tmp_path):
@@ -50,7 +50,7 @@ def test_what_was_not_drawn_to_its_end_is_drawn_by_the_report(drawn, tmp_path):
     alone = render(run).read_bytes()
     half = (drawings / "one.pickle").read_bytes()
     (tmp_path / "one.pickle").write_bytes(half[: len(half) // 2])
-    assert render(run, tmp_path).read_bytes() == alone
+    assert render(run, drawings=tmp_path).read_bytes() == alone
 
 
 def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypatch):

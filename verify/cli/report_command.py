@@ -9,15 +9,13 @@ from verify.errors import InputError
 
 def execute(arguments: argparse.Namespace) -> int:
     """Render the report of a run, or the pages of the studies in a directory."""
-    from verify.report import render, render_markdown, render_pdf, render_summary
+    from verify.report import render
     from verify.report.study_page import render_study, studies_in
 
     directory = arguments.directory
     if (directory / "run.json").is_file():
-        made = {"html": render, "markdown": render_markdown, "pdf": render_pdf,
-                "summary": render_summary}  # fmt: skip
         with said_to_wait(sys.stderr, f"the report of {directory}"):
-            page = made[arguments.format](directory)
+            page = render(directory, arguments.format)
         print(f"report: {page}")
         return 0
     if not (kinds := studies_in(directory)):

@@ -136,4 +136,4 @@ def _load_report() -> None:
 def _rendered(directory: Path, drawings: Path | None) -> str:
     from verify.report import render
 
-    return str(render(directory, drawings))
+    return str(render(directory, drawings=drawings))

@@ -4,16 +4,7 @@ Reads results only (``run.json``, ``result.json``, stored solutions for the pict
 computes no error of its own. Needs neither FEniCSx nor gmsh.
 """
 
-from verify.report.rendering import load, render, render_markdown, render_pdf, render_summary
+from verify.report.rendering import load, render
 from verify.report.run_directory import CaseEntry, Run, load_run
 
-__all__ = [
-    "CaseEntry",
-    "Run",
-    "load",
-    "load_run",
-    "render",
-    "render_markdown",
-    "render_pdf",
-    "render_summary",
-]
+__all__ = ["CaseEntry", "Run", "load", "load_run", "render"]

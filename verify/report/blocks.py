@@ -41,18 +41,22 @@ class Cell:
     span: int = 1
 
 
-@dataclass(frozen=True)
+@dataclass
 class Table:
     """A table; `kind` is ``prose`` if its cells hold sentences, ``map`` if they are tinted.
 
-    The first cell of a row is its head if `named`.
+    The first cell of a row is its head if `named`. Cells may be given as text, or as a number that
+    `number` writes; they are kept as `Cell`.
     """
 
     caption: str
-    head: list[Cell]
-    rows: list[list[Cell]]
+    head: Sequence[Any]
+    rows: Sequence[Sequence[Any]]
     kind: str = ""
     named: bool = False
+
+    def __post_init__(self) -> None:
+        self.head, self.rows = _cells(self.head), [_cells(row) for row in self.rows]
 
 
 @dataclass(frozen=True)
@@ -74,17 +78,6 @@ class Figure:
 
     panels: list[Drawing] = field(default_factory=list)
     caption: str = ""
-
-
-def plain_table(
-    caption: str,
-    head: Sequence[Any],
-    rows: Sequence[Sequence[Any]],
-    kind: str = "",
-    named: bool = False,
-) -> Table:
-    """Return a table of which cells may be given as text, or as a number that `number` writes."""
-    return Table(caption, _cells(head), [_cells(row) for row in rows], kind, named)
 
 
 def _cells(row: Sequence[Any]) -> list[Cell]:

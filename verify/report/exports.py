@@ -1,7 +1,6 @@
 """The report for programs: results as JSON, as CSV rows, and as JUnit test cases."""
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from statistics import median
@@ -24,22 +23,18 @@ COLUMNS = (
 _OF_A_SOLVE = ("level", "status", "size", "unknowns", "wall", "peak_memory")
 
 
-def json_document(run: Run) -> str:
-    """Return all results of a run as one JSON document of schema version `EXPORT_SCHEMA`.
-
-    Numbers that are not finite, for which JSON has no word, become null.
-    """
+def all_results(run: Run) -> dict[str, Any]:
+    """Return all results of a run as one JSON document of schema version `EXPORT_SCHEMA`."""
     cases = [
         {"case": entry.name, "defect": entry.defect,
          "result": entry.result.content() if entry.result else None,
          "unjudged": [asdict(solve) for solve in entry.unjudged]}
         for entry in run.entries
     ]  # fmt: skip
-    document = {
+    return {
         "schema": EXPORT_SCHEMA, "kind": "verification results", "run": run.record,
         "defects": run.defects, "ranking": run.ranking, "cases": cases,
     }  # fmt: skip
-    return json.dumps(_finite(document), indent=1, allow_nan=False) + "\n"
 
 
 def csv_rows(run: Run) -> str:
@@ -154,11 +149,3 @@ def _count(element: ElementTree.Element) -> None:
     element.set("tests", str(len(element.findall(".//testcase"))))
     for kind, name in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(kind, str(len(element.findall(f".//{name}"))))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from verify.report.blocks import Cell, Drawing, Table, plain_table
+from verify.report.blocks import Cell, Drawing, Table
 from verify.report.figures.profiles import profile_panel
 from verify.report.figures.style import Palette
 from verify.report.notation import error_text, metric_title, number, solver_title
@@ -135,7 +135,7 @@ def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | 
         rows.append(row)
     head = ["solver", "level", *(metric_title(name) for name in names)]
     caption = "Drifts of energy and momenta, with the verdicts of the case"
-    return plain_table(caption, head, rows, "prose")
+    return Table(caption, head, rows, "prose")
 
 
 _PARTS = {
@@ -160,7 +160,7 @@ def released_table(solves: Sequence[SolveRecord]) -> Table | None:
             rows.append([solver_title(solve.solver), released, *parts])
     head = ["solver", "released", *(_PARTS[name] for name in shown)]
     caption = "Energy released per unit advance of the blade, J/m², and what became of it"
-    return plain_table(caption, head, rows, "prose") if rows else None
+    return Table(caption, head, rows, "prose") if rows else None
 
 
 def _cell(solve: SolveRecord, name: str) -> Cell | None:

@@ -166,7 +166,7 @@ def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
         marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
         rows.append(marks)
     kind = "matrix many" if len(names) > MANY else "matrix"
-    return Table("Verdicts", [Cell("case"), Cell("whole"), *map(Cell, names)], rows, kind, True)
+    return Table("Verdicts", ["case", "whole", *names], rows, kind, True)
 
 
 def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:

@@ -12,8 +12,8 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 _SECONDS = 180.0
 
 
-def print_page(page: Path, target: Path) -> None:
-    """Print the HTML file `page` to the PDF file `target`.
+def print_page(page: Path) -> Path:
+    """Print the HTML file `page` to the PDF file beside it.
 
     Raises
     ------
@@ -40,5 +40,6 @@ def print_page(page: Path, target: Path) -> None:
             raise InputError(f"{browser} did not print within {_SECONDS:g} s", str(page)) from None
         if not printed.is_file():
             raise InputError(f"{browser} did not print", str(page))
-        with whole_file(target) as partial:
+        with whole_file(page.with_suffix(".pdf")) as partial:
             shutil.copyfile(printed, partial)
+    return page.with_suffix(".pdf")

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from verify.report.blocks import Cell, Figure, Table, plain_table
+from verify.report.blocks import Cell, Figure, Table
 from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import metric_title, solver_title, with_interval
 
@@ -16,12 +16,12 @@ def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Tabl
     if shown:
         first = [s["solver"] for s in shown[0]["standings"]]
         order = first + [solver for solver in ranking["solvers"] if solver not in first]
-        rows = [[Cell(solver_title(s)), *(_standing(one, s) for one in shown)] for s in order]
-        head = [Cell("solver"), *(_column(one) for one in shown)]
+        rows = [[solver_title(s), *(_standing(one, s) for one in shown)] for s in order]
+        head = ["solver", *(_column(one) for one in shown)]
         tables.append(Table(f"{title}: rank, number [interval]", head, rows))
     if rest := _grouped(comparisons):
-        head_ = ["case", "solver", "metric", "not in the numbers because"]
-        tables.append(plain_table(f"{title}: left out", head_, rest, "prose"))
+        head = ["case", "solver", "metric", "not in the numbers because"]
+        tables.append(Table(f"{title}: left out", head, rest, "prose"))
     return tables
 
 

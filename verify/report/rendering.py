@@ -6,9 +6,10 @@ from typing import Any
 
 from PIL import Image
 
+from verify.json_files import write_json
 from verify.report.case_view import case_view, show_pictures
 from verify.report.drawing import drawn_before, drawn_case, run_palette
-from verify.report.exports import csv_rows, json_document, junit_document
+from verify.report.exports import all_results, csv_rows, junit_document
 from verify.report.page import page_view
 from verify.report.picture import CasePictures
 from verify.report.printing import print_page
@@ -31,7 +32,7 @@ def load() -> None:
     load_templates("html", "report.j2")
 
 
-def render(directory: Path, drawings: Path | None = None) -> Path:
+def render(directory: Path, form: str = "html", drawings: Path | None = None) -> Path:
     """Write the report of the run in `directory`, finished or not, into it.
 
     Each file is replaced in one step. The same directory gives the same bytes again, pictures
@@ -40,6 +41,10 @@ def render(directory: Path, drawings: Path | None = None) -> Path:
     Parameters
     ----------
     directory : Path
+    form : {"html", "markdown", "pdf", "summary"}
+        Markdown has its pictures beside it. The page and the files for programs are written with
+        it and with PDF. A summary is Markdown without the cases: the verdicts, the rankings, where
+        they come from; with it comes the CSV file alone.
     drawings : Path, optional
         Folder in which `verify.report.drawing` has left cases of this run. What is read there is
         trusted: it is one that the caller has made for it.
@@ -47,21 +52,26 @@ def render(directory: Path, drawings: Path | None = None) -> Path:
     Returns
     -------
     Path
-        The HTML page.
+        What `form` names.
 
     Raises
     ------
     InputError
-        If `directory` holds no run.
+        If `directory` holds no run; if PDF is asked for and no browser prints.
     OSError
         If the files cannot be written.
     """
-    return _written(load_run(directory), directory, drawings)[0]
+    run = load_run(directory)
+    if form == "summary":
+        return _summary(run, directory)
+    page, view = _written(run, directory, drawings)
+    if form == "markdown":
+        page = directory / "report.md"
+        write_whole(page, as_markdown("report.j2", directory, **view))
+    return print_page(page) if form == "pdf" else page
 
 
-def _written(
-    run: Run, directory: Path, drawings: Path | None = None
-) -> tuple[Path, dict[str, Any]]:
+def _written(run: Run, directory: Path, drawings: Path | None) -> tuple[Path, dict[str, Any]]:
     """Write the page and the exports; return the page and what it shows."""
     palette, cases = run_palette(run.record), []
     for index, entry in enumerate(run.entries):
@@ -78,7 +88,7 @@ def _written(
             show_pictures(case)
         view = page_view(run, cases, palette, notes)
         text = as_html("report.j2", **view, turnable=_turnable(pictures))
-    write_whole(directory / "results.json", json_document(run))
+    write_json(all_results(run), directory / "results.json")
     write_whole(directory / "results.csv", csv_rows(run))
     write_whole(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
@@ -90,29 +100,7 @@ def _turnable(pictures: list[CasePictures]) -> bool:
     return any(picture.turned for shown in pictures for picture in shown.all)
 
 
-def render_markdown(directory: Path) -> Path:
-    """Write ``report.md`` with its pictures beside it, and all that `render` writes.
-
-    Raises
-    ------
-    InputError, OSError
-        As `render`.
-    """
-    _, view = _written(load_run(directory), directory)
-    target = directory / "report.md"
-    write_whole(target, as_markdown("report.j2", directory, **view))
-    return target
-
-
-def render_summary(directory: Path) -> Path:
-    """Write ``summary.md``: the verdicts, the rankings, where it comes from; no page per case.
-
-    Raises
-    ------
-    InputError, OSError
-        As `render`.
-    """
-    run = load_run(directory)
+def _summary(run: Run, directory: Path) -> Path:
     palette, none = run_palette(run.record), CasePictures()
     cases = [case_view(i, entry, none, palette) for i, entry in enumerate(run.entries)]
     view = page_view(run, cases, palette, [], short=True)
@@ -120,19 +108,6 @@ def render_summary(directory: Path) -> Path:
     target = directory / "summary.md"
     write_whole(target, as_markdown("report.j2", directory, **view))
     write_whole(directory / "results.csv", csv_rows(run))
-    return target
-
-
-def render_pdf(directory: Path) -> Path:
-    """Write ``report.pdf``, and all that `render` writes.
-
-    Raises
-    ------
-    InputError, OSError
-        As `render`; also if there is no browser that prints.
-    """
-    target = directory / "report.pdf"
-    print_page(render(directory), target)
     return target
 
 

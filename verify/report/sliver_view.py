@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from verify.report.blocks import Cell, Drawing, Table, plain_table
+from verify.report.blocks import Cell, Drawing, Table
 from verify.report.figures.studies import Series, loglog
 from verify.report.figures.style import Palette
 from verify.report.notation import error_title, is_error, number, solver_title
@@ -116,7 +116,7 @@ def _worst(measured: Records) -> list[tuple[Table, str]]:
              "largest energy-norm error over conforming", "lowest frequency off conforming",
              "largest scaled condition number"]  # fmt: skip
     legend = "errors are of the static field; a mass leaves them as they are and moves frequencies"
-    return [(plain_table("Worst over ε", heads, rows, named=True), legend)] if rows else []
+    return [(Table("Worst over ε", heads, rows, named=True), legend)] if rows else []
 
 
 def _written(value: float | None) -> Cell:
@@ -130,7 +130,7 @@ def _map(title: str, found: Sequence[tuple[Mapping[str, Any], Cell]]) -> Table:
     for solver in dict.fromkeys(record["solver"] for record, _ in found):
         own = {r["size"]: cell for r, cell in found if r["solver"] == solver}
         rows.append([solver_title(solver), *(own.get(size, _NOTHING) for size in sizes)])
-    return plain_table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, "map", named=True)
+    return Table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, "map", named=True)
 
 
 def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing | None]:

@@ -60,10 +60,7 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         return target
     page = directory / f"{kind}.html"
     write_whole(page, as_html("study.j2", **view))
-    if form == "pdf":
-        print_page(page, page.with_suffix(".pdf"))
-        return page.with_suffix(".pdf")
-    return page
+    return print_page(page) if form == "pdf" else page
 
 
 _NORMS = ("displacement_l2", "energy_norm", "jump_l2")

@@ -6,7 +6,7 @@ from typing import Any
 
 from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
-from verify.report.blocks import Cell, Table, plain_table
+from verify.report.blocks import Cell, Table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (
     bytes_text,
@@ -45,16 +45,16 @@ def check_text(record: VerdictRecord, named: bool = True) -> str:
     )
 
 
-def check_row(record: VerdictRecord) -> list[Cell]:
+def check_row(record: VerdictRecord) -> list[Any]:
     """Return the row of one check."""
     observed = _observed(record)
     if record.check == "value":  # as many digits as the limit has beside it
         observed = number(record.observed, 10)
     known = f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
     return [
-        Cell(check_text(record)),
-        Cell(observed),
-        Cell(record.limit),
+        check_text(record),
+        observed,
+        record.limit,
         Cell(record.badge, known, verdict=str(record.verdict)),
     ]
 
@@ -75,7 +75,7 @@ def checks_table(result: CaseResult) -> Table | None:
     if len(solvers) <= MANY:
         head = ["check", "observed [interval]", "limit", "verdict"]
         rows = [check_row(record) for record in result.verdicts]
-        return plain_table("Verdicts", head, rows, "verdicts")
+        return Table("Verdicts", head, rows, "verdicts")
     checks: dict[tuple[str, str], dict[str | None, Cell]] = {}
     for record in result.verdicts:
         observed = _observed(record)
@@ -87,7 +87,7 @@ def checks_table(result: CaseResult) -> Table | None:
     across = [[Cell(what, limit), *(own.get(solver, "–") for solver in solvers)]
               for (what, limit), own in checks.items()]  # fmt: skip
     names = [solver_title(solver or "nobody") for solver in solvers]
-    return plain_table("Verdicts", ["check, limit", *names], across, "many", named=True)
+    return Table("Verdicts", ["check, limit", *names], across, "many", named=True)
 
 
 def reasons_table(result: CaseResult) -> Table | None:
@@ -95,7 +95,7 @@ def reasons_table(result: CaseResult) -> Table | None:
     few = len({record.solver for record in result.verdicts}) <= MANY
     rows = [check_row(r) for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
     head = ["check", "observed [interval]", "limit", "verdict"]
-    return plain_table("Not passed", head, rows, "verdicts") if rows else None
+    return Table("Not passed", head, rows, "verdicts") if rows else None
 
 
 def numbers_table(result: CaseResult) -> Table | None:
@@ -104,13 +104,13 @@ def numbers_table(result: CaseResult) -> Table | None:
     if not result.solves:
         return None
     titles = [Cell(metric_title(name), _common_reference(result, name)) for name in names]
-    head = [*map(Cell, ("solver", "level", "h (m)", "unknowns")), *titles]
-    rows: list[list[Cell]] = [
+    head = ["solver", "level", "h (m)", "unknowns", *titles]
+    rows: list[list[Any]] = [
         [
-            Cell(solver_title(solve.solver)),
-            Cell(str(solve.level)),
-            Cell(number(solve.size)),
-            Cell(number(solve.unknowns)),
+            solver_title(solve.solver),
+            str(solve.level),
+            number(solve.size),
+            number(solve.unknowns),
             *(_measured(solve, name, result) for name in names),
         ]
         for solve in _ordered(result)
@@ -119,7 +119,7 @@ def numbers_table(result: CaseResult) -> Table | None:
         if notice.kind is NoticeKind.UNAVAILABLE:
             whose = solver_title(notice.solver) if notice.solver else "every solver"
             said = f"{metric_title(notice.about)} is not available: {notice.text}"
-            rows.append([Cell(whose), Cell("", said, span=len(head) - 1)])
+            rows.append([whose, Cell("", said, span=len(head) - 1)])
     return Table("Numbers: value ± uncertainty", head, rows)
 
 
@@ -151,7 +151,7 @@ def times_table(result: CaseResult) -> Table | None:
                 *([solve.notes.get(CRITICAL_STEP, "–")] if stepping else []),
             ]
         )
-    return plain_table("Wall times: median (smallest to largest repetition)", head, rows)
+    return Table("Wall times: median (smallest to largest repetition)", head, rows)
 
 
 def regularisations_table(result: CaseResult) -> Table | None:
@@ -167,7 +167,7 @@ def regularisations_table(result: CaseResult) -> Table | None:
         largest = f"{number(max(sizes), 2)} {found[0][1].unit}" if sizes else "–"
         rows.append([solver_title(solver), kind, counts, largest])
     head = ["solver", "what was done", "how often", "largest contribution"]
-    return plain_table("Regularisations", head, rows, "prose") if rows else None
+    return Table("Regularisations", head, rows, "prose") if rows else None
 
 
 def cuts_table(result: CaseResult) -> Table | None:
@@ -198,7 +198,7 @@ def cuts_table(result: CaseResult) -> Table | None:
         "solver", "level", "beside it: as asked", "as realised", "missing", "too much", "swept",
         "judged", "L² error that is not",
     ]  # fmt: skip
-    return plain_table("Cuts that are not where they were asked", head, rows) if rows else None
+    return Table("Cuts that are not where they were asked", head, rows) if rows else None
 
 
 def _in_elements(length: float, solve: SolveRecord) -> str:
@@ -240,7 +240,7 @@ def _levels_table(levels: dict[str, dict[str, Any]]) -> Table:
         if name not in costs
     ]
     caption = "Reference: time to accuracy; of errors, bounds that the finest level gives"
-    return plain_table(caption, ["", *map(_words, levels)], rows)
+    return Table(caption, ["", *map(_words, levels)], rows)
 
 
 def _nested(key: str, record: dict[str, Any]) -> Table:
@@ -252,9 +252,9 @@ def _nested(key: str, record: dict[str, Any]) -> Table:
             [metric_title(name), *(_value(entry.get(column)) for column in columns)]
             for name, entry in record.items()
         ]
-        return plain_table(caption, ["", *map(_words, columns)], rows, "prose")
+        return Table(caption, ["", *map(_words, columns)], rows, "prose")
     rows = [[_words(name), _value(value)] for name, value in record.items()]
-    return plain_table(caption, ["", "value"], rows)
+    return Table(caption, ["", "value"], rows)
 
 
 def _value(value: Any) -> str:

@@ -16,7 +16,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from verify.report.blocks import Cell, Drawing, plain_table
+from verify.report.blocks import Cell, Drawing, Table
 from verify.report.notation import (
     error_title,
     metric_title,
@@ -83,7 +83,7 @@ def _environment(kind: str) -> Environment:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         finalize=_final if kind == "html" else _final_markdown, extensions=["jinja2.ext.do"],
     )  # fmt: skip
-    made.globals |= {"table": plain_table, "cell": Cell}
+    made.globals |= {"table": Table, "cell": Cell}
     made.filters |= {
         "number": number,
         "seconds": seconds_text,
