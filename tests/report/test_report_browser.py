@@ -82,7 +82,8 @@ def test_the_page_opens_whole_without_errors_and_does_not_overflow(
 
 
 def test_the_print_has_no_empty_page_and_two_pages_a_case_at_most(browser, pictured_run, tmp_path):
-    target = print_page(shutil.copy(pictured_run / "report.html", tmp_path))
+    page = shutil.copy(pictured_run / "report.html", tmp_path / "report.html")
+    target = print_page(page)
     pdf = target.read_bytes()
     pages = re.findall(rb"/Type /Page\b.*?/Contents (\d+) 0 R", pdf, re.DOTALL)
     front_and_back = 2

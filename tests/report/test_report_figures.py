@@ -12,12 +12,11 @@ from verify.report import load_run, render
 from verify.report.bodies import Body, deformed_body
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
-from verify.report.error_maps import scale_top
-from verify.report.figures import convergence, profiles
+from verify.report.figures import convergence, plots
 from verify.report.figures.convergence import error_panel, error_range
 from verify.report.figures.style import Palette, drawing
 from verify.report.opening_view import opening_figures
-from verify.report.pictures import case_pictures
+from verify.report.pictures import case_pictures, scale_top
 from verify.result import (
     Metric,
     Notice,
@@ -239,7 +238,7 @@ def openings_drawn(result, monkeypatch):
             panels.append((lines, bands))
             return drawing(figure, alt, kind)
 
-        monkeypatch.setattr(profiles, "drawing", keep)
+        monkeypatch.setattr(plots, "drawing", keep)
         return opening_figures(replace(result, openings=list(shown)), Palette()), panels
 
     return of

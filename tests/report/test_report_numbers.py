@@ -13,7 +13,7 @@ from verify.cli import run_ranking as runner_ranking
 from verify.cli.run_ranking import rank_run
 from verify.conformance import CheckResult, State
 from verify.report import load_run, render
-from verify.report.figures import studies as figures
+from verify.report.figures import plots as figures
 from verify.report.figures.style import Palette
 from verify.report.notation import error_text, number, with_interval
 from verify.report.sliver_view import graded

@@ -19,8 +19,7 @@ from verify.report.case_view import CaseView, case_view
 from verify.report.drawn_bodies import draw
 from verify.report.figures.style import Palette, Style
 from verify.report.notation import solver_title
-from verify.report.picture import CasePictures
-from verify.report.pictures import case_pictures
+from verify.report.pictures import CasePictures, case_pictures
 from verify.report.run_directory import CaseEntry, load_entry, load_record
 from verify.whole_files import write_whole
 

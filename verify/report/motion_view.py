@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Table
-from verify.report.figures.profiles import profile_panel
+from verify.report.figures.plots import profile_panel
 from verify.report.figures.style import Palette
 from verify.report.notation import error_text, metric_title, number, solver_title
 from verify.result import CaseResult, SolveRecord, Status, finest_of

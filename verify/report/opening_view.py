@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from verify.report.blocks import Drawing, Figure
-from verify.report.figures.profiles import profile_panel
+from verify.report.figures.plots import profile_panel
 from verify.report.figures.style import Palette
 from verify.report.notation import solver_title
 from verify.result import CaseResult, OpeningCurve, OpeningProfile

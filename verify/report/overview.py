@@ -8,7 +8,7 @@ from typing import Any
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.case_view import CaseView, PictureRow
 from verify.report.notation import bytes_text, number, solver_title
-from verify.report.picture import Picture
+from verify.report.pictures import Picture
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
 from verify.result import NoticeKind, Status, Verdict, VerdictRecord

@@ -1,30 +1,104 @@
-"""Pictures of a case: the reference and the solvers with the cut open, and where each errs."""
+"""Pictures of a case: reference and solvers with the cut open, and where each of them errs."""
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.path import Path as Outline
+from numpy.typing import NDArray
 
 from verify.applied_checks import REFERENCE
 from verify.errors import InputError
-from verify.report.bodies import common_view, deformed_body, read_stored
-from verify.report.error_maps import add_error_maps
-from verify.report.notation import number_text, solver_title
-from verify.report.picture import CasePictures, Picture
+from verify.report.bodies import (
+    Body,
+    View,
+    common_view,
+    deformed_body,
+    error_body,
+    read_stored,
+    zoomed,
+)
+from verify.report.notation import ROUND_OFF, number, number_text, solver_title
+from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry
-from verify.result import CaseResult, SolveRecord, Status, finest_of
+from verify.report.turntable import packed
+from verify.result import CaseResult, SolveRecord, Status, error_picture, finest_of
 from verify.solution import Solution
 
-__all__ = ["CasePictures", "case_pictures"]
-
-_COLOURS = "cividis"
+_OF_BODIES, _OF_ERRORS = "cividis", "YlOrBr"  # colours
 _MOST = 4  # bodies side by side
+_MOST_MAPS = 8  # of errors of a case
 _FILMED = 3  # bodies whose output times are shown
 _FRAMES = 6  # of a film
 _FRAME_PIXELS = 110_000
 _STILL = 1e-200  # of the body's diagonal: displacements below are none
 _WILD = 1e3  # times the smallest displacement beside it: what moves farther is not drawn
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
+_PEAK = 0.995  # of the nodes: what single nodes have is no measure of a map
+_CLIP = 2.0  # times the peak of the solver in the middle, where the scale ends
+_TIP_SHARE = 0.15  # of the cut's length: half of what is shown around a tip
+_TIP_CELLS = 4.0  # elements that are shown on each side of a tip at least
+_TIP_SIZE = (420, 420)  # in pixels
+_PLANE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_ON = 1e-6  # of the body's size: an end that is closer to a line ends on it
+
+Points = NDArray[np.float64]
+
+
+@dataclass
+class Picture:
+    """One picture: what it shows, and its image once it is drawn."""
+
+    title: str
+    description: str
+    body: Body
+    view: View
+    image: bytes = b""  # WebP
+    turnable: bool = True  # whether a body in space may be turned in the page
+
+    @cached_property
+    def solid(self) -> dict[str, str]:
+        """What a view that can be turned needs; empty for plane bodies."""
+        return packed(self.body, self.view)
+
+    @property
+    def turned(self) -> dict[str, str]:
+        """The same if the page has room for it."""
+        return self.solid if self.turnable else {}
+
+
+@dataclass
+class CasePictures:
+    """The pictures of a case and what has to be said about them.
+
+    `deformed` share view, colours and `scale` (displacements are drawn that much enlarged), as do
+    the frames of `film`: for each of some bodies its output times. `tip` are the errors around the
+    tip that `tip_at` names.
+    """
+
+    deformed: list[Picture] = field(default_factory=list)
+    error: list[Picture] = field(default_factory=list)
+    film: list[list[Picture]] = field(default_factory=list)
+    tip: list[Picture] = field(default_factory=list)
+    tip_at: str = ""
+    scale: float = 1.0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def all(self) -> list[Picture]:
+        """Every picture of the case."""
+        frames = [picture for body in self.film for picture in body]
+        return [*self.deformed, *self.error, *self.tip, *frames]
+
+    def say_left_out(self, what: str, solvers: Sequence[str], shown: int) -> None:
+        """Say of which solvers there is no picture, `shown` of them being shown."""
+        if solvers:
+            names = ", ".join(map(solver_title, solvers))
+            self.notes.append(f"Without picture of the {what}, {shown} being shown: {names}.")
 
 
 def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
@@ -49,7 +123,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         _film(pictures, shown)
     elif not pictures.notes:
         pictures.notes.append("No pictures: no solution is stored.")
-    add_error_maps(pictures, root, entry.result)
+    _add_error_maps(pictures, root, entry.result)
     return pictures
 
 
@@ -95,7 +169,7 @@ def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]])
     moves = largest > _STILL * diagonal
     pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if moves else 1.0
     bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
-    view = common_view(bodies, _COLOURS)
+    view = common_view(bodies, _OF_BODIES)
     for (solve, solution), body in zip(shown, bodies, strict=True):
         title = _named(solve)
         when = "" if len(solution.times) == 1 else f" at t = {solution.times[-1]:.4g} s"
@@ -115,7 +189,7 @@ def _film(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> 
     steps = np.unique(np.linspace(0, len(times) - 1, _FRAMES).round().astype(int))
     bodies = [[deformed_body(own, pictures.scale, step) for step in steps] for _, own in shown]
     every = [body for own in bodies for body in own]
-    view = common_view(every, _COLOURS, pixels=_FRAME_PIXELS)
+    view = common_view(every, _OF_BODIES, pixels=_FRAME_PIXELS)
     for (solve, _), own in zip(shown, bodies, strict=True):
         name = _named(solve)
         pictures.film.append([
@@ -130,3 +204,126 @@ def _round_scale(scale: float) -> float:
         return 1.0
     power = 10.0 ** math.floor(math.log10(scale))
     return next(m * power for m in (5, 2, 1) if scale >= m * power * (1 - 1e-12))
+
+
+def _add_error_maps(pictures: CasePictures, root: Path, result: CaseResult) -> None:
+    """Prepare the error of each solver, the largest first, in one view and one colour scale."""
+    bodies = _error_bodies(pictures, root, result)
+    if not bodies:
+        pictures.notes.append("No picture of the error: no error field is stored for this case.")
+        return
+    largest = {solver: float(body.values.max()) for solver, body in bodies.items()}
+    moved = max((float(one.body.values.max()) for one in pictures.deformed), default=0.0)
+    for solver in [name for name, most in largest.items() if most <= ROUND_OFF * moved]:
+        most = number(largest[solver], 2)
+        said = f"Error of {solver_title(solver)}: at most {most} m, which is round-off."
+        pictures.notes.append(said)
+        del bodies[solver]
+    if not bodies:
+        return
+    worst_first = sorted(bodies, key=lambda solver: -largest[solver])
+    pictures.say_left_out("error", worst_first[_MOST_MAPS:], _MOST_MAPS)
+    shown = {solver: bodies[solver] for solver in worst_first[:_MOST_MAPS]}
+    view = common_view(list(shown.values()), _OF_ERRORS, scale_top(list(shown.values())))
+    for solver, body in shown.items():
+        most = number(largest[solver], 3)
+        title = f"error of {solver_title(solver)}, at most {most} m"
+        title += " (FAIL)" if solver in result.failing else ""
+        description = (
+            f"Error of the displacement of {solver_title(solver)} on the undeformed body; "
+            f"largest {most} m."
+        )
+        pictures.error.append(Picture(title, description, body, view))
+    _add_tip(pictures, result, shown)
+
+
+def scale_top(bodies: Sequence[Body]) -> float:
+    """Return where the scale of maps ends: no higher than their largest value.
+
+    A solver that errs by far more than the one in the middle would leave nothing to see of the
+    others, and so would a single node: both are clipped.
+    """
+    largest = [float(body.values.max()) for body in bodies]
+    peaks = [float(np.quantile(body.values, _PEAK, method="lower")) for body in bodies]
+    peaks = sorted(peak or most for peak, most in zip(peaks, largest, strict=True))
+    return min(max(largest), _CLIP * peaks[(len(peaks) - 1) // 2])
+
+
+def _error_bodies(pictures: CasePictures, root: Path, result: CaseResult) -> dict[str, Body]:
+    bodies: dict[str, Body] = {}
+    for solver in dict.fromkeys(solve.solver for solve in result.solves):
+        if (named := result.pictures.get(error_picture(solver))) is None:
+            continue
+        path = root / named
+        if not path.resolve().is_relative_to(root.resolve()) or not path.is_file():
+            pictures.notes.append(f"No picture of the error of {solver_title(solver)}: no file.")
+            continue
+        try:
+            bodies[solver] = error_body(path)
+        except InputError as error:
+            said = f"No picture of the error of {solver_title(solver)}: {error.what}."
+            pictures.notes.append(said)
+    return bodies
+
+
+def _add_tip(pictures: CasePictures, result: CaseResult, shown: dict[str, Body]) -> None:
+    """Show the surroundings of the tip where a solver errs most, with the elements there."""
+    sizes = [solve.size for solve in result.solves if solve.solver in shown and solve.size]
+    worst = -1.0
+    for (x, y), length in plane_tips(result.scene):
+        half = max(_TIP_SHARE * length, _TIP_CELLS * min(sizes, default=0.0))
+        window = (x - half, x + half, y - half, y + half)
+        parts = {solver: zoomed(body, window) for solver, body in shown.items()}
+        parts = {solver: part for solver, part in parts.items() if len(part.triangles)}
+        if not parts:
+            continue
+        top = scale_top(list(parts.values()))
+        most = max(float(part.values.max()) for part in parts.values())
+        if most <= worst:
+            continue
+        worst = most
+        view = View(*_PLANE, window, _TIP_SIZE, _OF_ERRORS, (0.0, top or 1.0), beyond=most > top)
+        pictures.tip_at = f"({number(x, 4)}, {number(y, 4)}) m, {number(2 * half, 2)} m wide"
+        pictures.tip = [
+            Picture(
+                f"{solver_title(solver)}, at most {number(float(part.values.max()), 3)} m",
+                f"Error of {solver_title(solver)} around the tip {pictures.tip_at}.", part, view,
+            )
+            for solver, part in parts.items()
+        ]  # fmt: skip
+
+
+def plane_tips(scene: Mapping[str, Any]) -> list[tuple[Points, float]]:
+    """Return the ends of cuts inside a rectangle or polygon, each with the length of its cut, m.
+
+    An end on the boundary or on another cut is no tip.
+    """
+    body = scene.get("geometry") or {}
+    if body.get("kind") == "rectangle":
+        (x0, y0), (x1, y1) = body["lower"], body["upper"]
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
+    elif body.get("kind") == "polygon":
+        corners = np.asarray(body["corners"], dtype=float)
+    else:
+        return []
+    outline = np.vstack([corners, corners[:1]])
+    near = _ON * float(np.ptp(corners, axis=0).max())
+    lines = [line for cut in scene.get("cuts") or [] for line in cut_lines(cut)]
+    tips = []
+    for line in lines:
+        others = [outline, *(other for other in lines if other is not line)]
+        length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+        for end in line[[0, -1]]:
+            apart = min(_distance(end, other) for other in others) > near
+            closed = np.allclose(line[0], line[-1], rtol=0.0, atol=near)
+            if apart and not closed and Outline(outline).contains_point(end):
+                tips.append((end, length))
+    return tips
+
+
+def _distance(point: Points, line: Points) -> float:
+    """Return the distance of a point from a line of straight pieces."""
+    start, along = line[:-1], np.diff(line, axis=0)
+    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.clip(np.einsum("ij,ij->i", point - start, along) / square, 0.0, 1.0)
+    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())

@@ -11,7 +11,7 @@ from verify.report.case_view import case_view, show_pictures
 from verify.report.drawing import drawn_before, drawn_case, run_palette
 from verify.report.exports import all_results, csv_rows, junit_document
 from verify.report.page import page_view
-from verify.report.picture import CasePictures
+from verify.report.pictures import CasePictures
 from verify.report.printing import print_page
 from verify.report.run_directory import Run, load_run
 from verify.report.template_sets import as_html, as_markdown, load_templates

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Table
-from verify.report.figures.studies import Series, loglog
+from verify.report.figures.plots import Series, loglog
 from verify.report.figures.style import Palette
 from verify.report.notation import error_title, is_error, number, solver_title
 

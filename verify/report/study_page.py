@@ -9,8 +9,7 @@ from verify.errors import InputError
 from verify.json_files import read_json
 from verify.printable import shown
 from verify.report.blocks import Drawing
-from verify.report.figures.profiles import profile_panel
-from verify.report.figures.studies import Bar, Series, bars, loglog, scatter
+from verify.report.figures.plots import Bar, Series, bars, loglog, profile_panel, scatter
 from verify.report.figures.style import Palette
 from verify.report.notation import metric_title, number, solver_title
 from verify.report.overview import origin_facts
