@@ -16,14 +16,9 @@ from verify.report.problem import problem_facts, sketch
 from verify.report.run_directory import CaseEntry
 from verify.report.tables import (
     MANY,
-    checks_table,
-    cuts_table,
-    numbers_table,
-    reasons_table,
+    case_tables,
     reference_facts,
     reference_tables,
-    regularisations_table,
-    times_table,
 )
 from verify.result import CaseResult, SolveRecord, Verdict, worst
 
@@ -48,7 +43,7 @@ class CaseView:
 
     Parameters
     ----------
-    anchor, name, title, requirement : str
+    anchor, name, title : str
     verdict : Verdict
     failing : list of str
         Titles of the solvers that fail.
@@ -70,11 +65,9 @@ class CaseView:
     by_solver: dict[str, str] = field(default_factory=dict)
     defect: str = ""
     unjudged: list[SolveRecord] = field(default_factory=list)
-    badge: str = ""  # of the check whose reference is the worst
     warnings: list[tuple[str, str]] = field(default_factory=list)
     facts: list[tuple[str, list[str]]] = field(default_factory=list)
     sketch: Drawing | None = None
-    checks: Table | None = None
     pictures: CasePictures = field(default_factory=CasePictures)
     rows: list[PictureRow] = field(default_factory=list)
     turnable: bool = False
@@ -87,11 +80,7 @@ class CaseView:
     motion: MotionView | None = None
     has_order: bool = False
     many: bool = False  # more solvers than a table of them has room for beside the figures
-    reasons: Table | None = None
-    numbers: Table | None = None
-    times: Table | None = None
-    regularisations: Table | None = None
-    cuts: Table | None = None
+    tables: dict[str, Table | None] = field(default_factory=dict)
     reference: list[tuple[str, str]] = field(default_factory=list)
     reference_tables: list[Table] = field(default_factory=list)
     lead: tuple[str, Drawing] | None = None
@@ -119,7 +108,6 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     for record in result.verdicts:
         of_solver.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
     view.by_solver = {name: str(worst(own)) for name, own in of_solver.items()}
-    view.badge = result.badge
     for notice in result.warnings:
         whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
         view.warnings.append((f"{whose}{notice.about}", notice.text))
@@ -127,16 +115,13 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
         view.facts, view.sketch = problem_facts(result.scene), sketch(result.scene)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         view.facts.append(("Sketch", [f"cannot be drawn ({words_of(error)})"]))
-    view.checks, view.metrics = checks_table(result), metric_names(result)
+    view.tables, view.metrics = case_tables(result), metric_names(result)
     _convergence(view, result, palette)
     view.openings = opening_figures(result, palette)
     view.motion = motion_view(result, palette)
     view.many = len({solve.solver for solve in result.solves}) > MANY
-    view.numbers, view.reasons = numbers_table(result), reasons_table(result)
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
-    view.times, view.regularisations = times_table(result), regularisations_table(result)
-    view.cuts = cuts_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from verify.applied_checks import REFERENCE
@@ -27,6 +26,7 @@ from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry
 from verify.report.turntable import packed
 from verify.result import CaseResult, SolveRecord, Status, error_picture, finest_of
+from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
 from verify.solution import Solution
 
 _OF_BODIES, _OF_ERRORS = "cividis", "YlOrBr"  # colours
@@ -306,24 +306,16 @@ def plane_tips(scene: Mapping[str, Any]) -> list[tuple[Points, float]]:
         corners = np.asarray(body["corners"], dtype=float)
     else:
         return []
-    outline = np.vstack([corners, corners[:1]])
     near = _ON * float(np.ptp(corners, axis=0).max())
     lines = [line for cut in scene.get("cuts") or [] for line in cut_lines(cut)]
     tips = []
     for line in lines:
-        others = [outline, *(other for other in lines if other is not line)]
+        others = [other for other in lines if other is not line]
         length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-        for end in line[[0, -1]]:
-            apart = min(_distance(end, other) for other in others) > near
-            closed = np.allclose(line[0], line[-1], rtol=0.0, atol=near)
-            if apart and not closed and Outline(outline).contains_point(end):
-                tips.append((end, length))
+        if np.allclose(line[0], line[-1], rtol=0.0, atol=near):
+            continue
+        ends = line[[0, -1]]
+        from_others = [distance_to_polyline(ends, other) for other in others]
+        apart = np.min([distance_to_outline(ends, corners), *from_others], axis=0) > near
+        tips += [(end, length) for end in ends[apart & inside_polygon(ends, corners)]]
     return tips
-
-
-def _distance(point: Points, line: Points) -> float:
-    """Return the distance of a point from a line of straight pieces."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-    share = np.clip(np.einsum("ij,ij->i", point - start, along) / square, 0.0, 1.0)
-    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())

@@ -79,25 +79,25 @@ def _written(run: Run, directory: Path, drawings: Path | None) -> tuple[Path, di
         cases.append((made or drawn_case(run.root, index, entry, palette)).view)
     pictures = [case.pictures for case in cases]
     notes: list[str] = []
-    view = page_view(run, cases, palette, notes)
-    text = as_html("report.j2", **view, turnable=_turnable(pictures))
+
+    def page() -> tuple[dict[str, Any], str]:
+        view = page_view(run, cases, palette, notes)
+        turned = any(picture.turned for shown in pictures for picture in shown.all)
+        return view, as_html("report.j2", **view, turnable=turned)
+
+    view, text = page()
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
     if excess > 0:
         notes.append(_left_out(pictures, excess))
         for case in cases:
             show_pictures(case)
-        view = page_view(run, cases, palette, notes)
-        text = as_html("report.j2", **view, turnable=_turnable(pictures))
+        view, text = page()
     write_json(all_results(run), directory / "results.json")
     write_whole(directory / "results.csv", csv_rows(run))
     write_whole(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
     write_whole(target, text)
     return target, view
-
-
-def _turnable(pictures: list[CasePictures]) -> bool:
-    return any(picture.turned for shown in pictures for picture in shown.all)
 
 
 def _summary(run: Run, directory: Path) -> Path:

@@ -36,6 +36,18 @@ MANY = 4  # solvers beyond which they stand side by side
 _CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": ""}
 
 
+def case_tables(result: CaseResult) -> dict[str, Table | None]:
+    """Return the tables of a case by their names in the template; None where there is no row."""
+    return {
+        "checks": _checks_table(result),
+        "reasons": _reasons_table(result),
+        "numbers": _numbers_table(result),
+        "times": _times_table(result),
+        "regularisations": _regularisations_table(result),
+        "cuts": cuts_table(result),
+    }
+
+
 def check_text(record: VerdictRecord, named: bool = True) -> str:
     """Return what a check looks at in words, after whom it judges if `named`."""
     name = metric_title(record.metric) if record.check == "value" else error_title(record.metric)
@@ -67,7 +79,7 @@ def _observed(record: VerdictRecord) -> str:
     return with_interval(value, low, high)
 
 
-def checks_table(result: CaseResult) -> Table | None:
+def _checks_table(result: CaseResult) -> Table | None:
     """Return the verdicts of a case: a row for each, or, for many solvers, one for each check."""
     if not result.verdicts:
         return None
@@ -90,7 +102,7 @@ def checks_table(result: CaseResult) -> Table | None:
     return Table("Verdicts", ["check, limit", *names], across, "many", named=True)
 
 
-def reasons_table(result: CaseResult) -> Table | None:
+def _reasons_table(result: CaseResult) -> Table | None:
     """Return, for many solvers, why checks did not pass."""
     few = len({record.solver for record in result.verdicts}) <= MANY
     rows = [check_row(r) for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
@@ -98,7 +110,7 @@ def reasons_table(result: CaseResult) -> Table | None:
     return Table("Not passed", head, rows, "verdicts") if rows else None
 
 
-def numbers_table(result: CaseResult) -> Table | None:
+def _numbers_table(result: CaseResult) -> Table | None:
     """Return every measured number of every solve with its uncertainty."""
     names = metric_names(result)
     if not result.solves:
@@ -123,7 +135,7 @@ def numbers_table(result: CaseResult) -> Table | None:
     return Table("Numbers: value ± uncertainty", head, rows)
 
 
-def times_table(result: CaseResult) -> Table | None:
+def _times_table(result: CaseResult) -> Table | None:
     """Return the wall time of every phase: median, and smallest to largest repetition."""
     phases = list(dict.fromkeys(name for solve in result.solves for name in solve.timings))
     if not phases:
@@ -154,7 +166,7 @@ def times_table(result: CaseResult) -> Table | None:
     return Table("Wall times: median (smallest to largest repetition)", head, rows)
 
 
-def regularisations_table(result: CaseResult) -> Table | None:
+def _regularisations_table(result: CaseResult) -> Table | None:
     """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
     groups: dict[tuple[str, str], list[tuple[int, Regularisation]]] = {}
     for solve in _ordered(result):

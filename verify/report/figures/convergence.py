@@ -113,11 +113,7 @@ def _draw(axes: Axes, curve: Curve, style: Style, abscissa: Abscissa, label: str
         placed = _placed(stretch, abscissa)
         if not placed:
             continue
-        axes.plot(
-            [x for x, _ in placed], [p.value for _, p in placed], color=style.colour,
-            marker=style.marker, markerfacecolor="white" if style.hollow else style.colour,
-            label=label,
-        )  # fmt: skip
+        axes.plot([x for x, _ in placed], [p.value for _, p in placed], label=label, **style.marked)
         label = "_again"
         barred = [(x, p) for x, p in placed if limits(p)]
         if barred:

@@ -21,6 +21,7 @@ from verify.report.figures.style import (
 )
 
 _TOTAL, _PART = "#4d4d4d", "#0067a5"
+_DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,8 @@ def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette)
         for s, places in drawn:
             style = palette[s.name]
             gaps = [place if _can_be_drawn(place) else (math.nan, math.nan) for place in s.places]
-            axes.plot(*zip(*gaps, strict=True), color=style.colour, marker=style.marker,
-                      markerfacecolor="white" if style.hollow else style.colour,
-                      label=f"{s.name}\n{s.second}".strip())  # fmt: skip
+            label = f"{s.name}\n{s.second}".strip()
+            axes.plot(*zip(*gaps, strict=True), label=label, **style.marked)
             if s.ringed:
                 axes.plot(*zip(*s.ringed, strict=True), color=style.colour, marker="o",
                           markersize=11, markerfacecolor="none", linestyle="none")  # fmt: skip
@@ -122,7 +122,7 @@ def bars(title: str, parts: Sequence[Bar], said: str) -> Drawing:
 
 
 def _can_be_drawn(place: tuple[Any, Any]) -> bool:
-    return all(isinstance(v, int | float) and 1e-200 < v < 1e200 for v in place)
+    return all(isinstance(v, int | float) and 1 / _DRAWABLE < v < _DRAWABLE for v in place)
 
 
 def _logarithmic(axes: Axes, x_title: str, places: Sequence[tuple[float, float]]) -> None:
@@ -131,7 +131,6 @@ def _logarithmic(axes: Axes, x_title: str, places: Sequence[tuple[float, float]]
     axes.set_xlabel(x_title)
 
 
-_DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
 _PARTS = tuple(
     Style(colour, "", dashes=dashes)
     for colour, dashes in (("#c04a00", "-"), ("#0067a5", (0, (5, 2))), ("#00785a", (0, (2, 1.5))),

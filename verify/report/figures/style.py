@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from textwrap import wrap
+from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -35,6 +36,12 @@ class Style:
     marker: str
     hollow: bool = False
     dashes: str | tuple[int, tuple[float, ...]] = "-"
+
+    @property
+    def marked(self) -> dict[str, Any]:
+        """What matplotlib draws a curve of the solver with, apart from its dashes."""
+        face = "white" if self.hollow else self.colour
+        return {"color": self.colour, "marker": self.marker, "markerfacecolor": face}
 
 
 _KNOWN = {
@@ -131,7 +138,7 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
     return Drawing(body, (72.0 * inches[0], 72.0 * inches[1]), alt, kind)
 
 
-def legend(axes: Axes, title: str = "") -> None:
+def legend(axes: Axes) -> None:
     """Name the curves right of the axes, long names in several lines; many make room for all."""
     handles, found = axes.get_legend_handles_labels()
     labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 20) or [""])
@@ -140,7 +147,7 @@ def legend(axes: Axes, title: str = "") -> None:
         return
     axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
                 fontsize=8, handlelength=2.1, borderaxespad=0.4, labelspacing=0.45,
-                handletextpad=0.5, title=title or None)  # fmt: skip
+                handletextpad=0.5)  # fmt: skip
     lines = sum(label.count("\n") + 1 for label in labels)
     needed = (9.8 * lines + 3.6 * len(labels)) / 72 + 0.45  # inches
     figure = axes.get_figure(root=True)
