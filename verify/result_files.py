@@ -10,6 +10,12 @@ from verify.printable import one_line, words_of
 from verify.result import SCHEMA_VERSION, CaseResult
 
 
+def folder_of_case(case: str) -> str:
+    """Return the name of the folder of a case below ``cases/`` of a run."""
+    name = case.replace("/", "__")
+    return f"_{name}" if name.startswith(".") else name
+
+
 def write_result(result: CaseResult, path: Path) -> None:
     """Write `result` as JSON, in one step (a reader never sees half a file).
 

@@ -14,12 +14,7 @@ from verify.report.opening_view import opening_figures
 from verify.report.pictures import CasePictures, Picture
 from verify.report.problem import problem_facts, sketch
 from verify.report.run_directory import CaseEntry
-from verify.report.tables import (
-    MANY,
-    case_tables,
-    reference_facts,
-    reference_tables,
-)
+from verify.report.tables import MANY, case_tables, reference_facts, reference_tables
 from verify.result import CaseResult, SolveRecord, Verdict, worst
 
 

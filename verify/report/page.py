@@ -11,10 +11,7 @@ from verify.report.figures.plots import Series, loglog
 from verify.report.figures.style import Palette
 from verify.report.notation import error_title
 from verify.report.overview import origin_facts, overview
-from verify.report.ranking_tables import (
-    compared,
-    profiles_figure,
-)
+from verify.report.ranking_tables import compared, profiles_figure
 from verify.report.run_directory import Run
 from verify.result import CaseResult
 

@@ -10,11 +10,10 @@ from verify.json_files import write_json
 from verify.report.case_view import case_view, show_pictures
 from verify.report.drawing import drawn_before, drawn_case, run_palette
 from verify.report.exports import all_results, csv_rows, junit_document
+from verify.report.forms import as_html, as_markdown, load_templates, print_page
 from verify.report.page import page_view
 from verify.report.pictures import CasePictures
-from verify.report.printing import print_page
 from verify.report.run_directory import Run, load_run
-from verify.report.template_sets import as_html, as_markdown, load_templates
 from verify.whole_files import write_whole
 
 # of the provenance, what says something to a reader elsewhere

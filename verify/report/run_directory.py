@@ -14,7 +14,7 @@ from verify.json_files import read_json
 from verify.printable import words_of
 from verify.ranking import Ranking
 from verify.result import CaseResult, SolveRecord
-from verify.result_files import checked, read_result
+from verify.result_files import checked, folder_of_case, read_result
 
 _RANKING = TypeAdapter(Ranking)
 
@@ -79,7 +79,7 @@ def load_run(directory: Path) -> Run:
     found = {entry.folder.name: entry for entry in map(load_entry, folders)}
     entries = []
     for name in record.get("cases", []):
-        path = folder / _folder_name(name)
+        path = folder / folder_of_case(name)
         entry = found.pop(path.name, None)
         if entry is None:
             defect = "not started: the run was stopped before it, or its folder was removed"
@@ -148,9 +148,3 @@ def _finished_solves(folder: Path) -> list[SolveRecord]:
         except InputError:
             continue
     return sorted(records, key=lambda record: (record.solver, record.level))
-
-
-def _folder_name(case: str) -> str:
-    """Return the folder of a case below ``cases/``, as the runner names it."""
-    name = case.replace("/", "__")
-    return f"_{name}" if name.startswith(".") else name

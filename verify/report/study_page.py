@@ -11,11 +11,10 @@ from verify.printable import shown
 from verify.report.blocks import Drawing
 from verify.report.figures.plots import Bar, Series, bars, loglog, profile_panel, scatter
 from verify.report.figures.style import Palette
+from verify.report.forms import as_html, as_markdown, print_page
 from verify.report.notation import metric_title, number, solver_title
 from verify.report.overview import origin_facts
-from verify.report.printing import print_page
 from verify.report.sliver_view import listed, sliver_families
-from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
 _STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
@@ -86,13 +85,21 @@ def _iterations(settings: Sequence[Mapping[str, Any]]) -> list[Drawing | None]:
         ("iteration_error", "error of the iterations"),
         ("whole_error", "error of the whole"),
     ):
-        series = []
-        for substeps in dict.fromkeys(one["substeps"] for one in settings):
-            own = [one for one in settings if one["substeps"] == substeps and one["iterations"]]
-            places = [(one["seconds"], one[key]) for one in own if one["seconds"] and one[key]]
-            series.append(Series(f"{substeps} per step", places))
+        shown = [one for one in settings if one["iterations"] and one["seconds"] and one[key]]
+        series = _series(shown, "substeps", "seconds", key, "{} per step".format)
         panels.append(loglog(title, "seconds", series, palette))
     return panels
+
+
+def _series(
+    records: Sequence[Mapping[str, Any]], by: str, x: str, y: str,
+    named: Callable[[Any], str] = solver_title,
+) -> list[Series]:  # fmt: skip
+    """Return a curve for each value of the key `by`, of the keys `x` and `y`."""
+    places: dict[Any, list[tuple[Any, Any]]] = {}
+    for one in records:
+        places.setdefault(one[by], []).append((one[x], one[y]))
+    return [Series(named(value), own) for value, own in places.items()]
 
 
 def _running(record: Mapping[str, Any]) -> list[Drawing]:
@@ -204,12 +211,7 @@ def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing | None
     palette, panels = Palette(), []
     for dimension in dict.fromkeys(row["dimension"] for row in slivers):
         own = listed(slivers, dimension=dimension)
-        series = [
-            Series(
-                solver_title(name), [(r["size"], r["ratio"]) for r in own if r["method"] == name]
-            )
-            for name in dict.fromkeys(row["method"] for row in own)
-        ]
         title = f"critical step over uncut, {dimension}D"
-        panels.append(loglog(title, "distance of cut and nodes, element sizes", series, palette))
+        x_title = "distance of cut and nodes, element sizes"
+        panels.append(loglog(title, x_title, _series(own, "method", "size", "ratio"), palette))
     return panels

@@ -118,13 +118,7 @@ def _numbers_table(result: CaseResult) -> Table | None:
     titles = [Cell(metric_title(name), _common_reference(result, name)) for name in names]
     head = ["solver", "level", "h (m)", "unknowns", *titles]
     rows: list[list[Any]] = [
-        [
-            solver_title(solve.solver),
-            str(solve.level),
-            number(solve.size),
-            number(solve.unknowns),
-            *(_measured(solve, name, result) for name in names),
-        ]
+        [*_named(solve), solve.size, solve.unknowns, *(_measured(solve, n, result) for n in names)]
         for solve in _ordered(result)
     ]
     for notice in result.notices:
@@ -153,8 +147,7 @@ def _times_table(result: CaseResult) -> Table | None:
         iterations = ", ".join(f"{name} {count}" for name, count in solve.iterations.items())
         rows.append(
             [
-                solver_title(solve.solver),
-                str(solve.level),
+                *_named(solve),
                 *(_spread(solve.timings.get(phase, [])) for phase in phases),
                 seconds_text(whole.median) if whole else "–",
                 seconds_text(solve.wall),
@@ -194,12 +187,9 @@ def cuts_table(result: CaseResult) -> Table | None:
         judged += ", under-resolved" if cut.under_resolved else ""
         rows.append(
             [
-                solver_title(solve.solver),
-                str(solve.level),
-                *(
-                    _in_elements(off, solve)
-                    for off in (cut.asked_to_realised, cut.realised_to_asked)
-                ),
+                *_named(solve),
+                _in_elements(cut.asked_to_realised, solve),
+                _in_elements(cut.realised_to_asked, solve),
                 *(f"{number(amount, 2)} {of_ends}" for amount in (cut.missing, cut.surplus)),
                 f"{number(cut.swept, 2)} {of_swept}",
                 judged,
@@ -211,6 +201,10 @@ def cuts_table(result: CaseResult) -> Table | None:
         "judged", "L² error that is not",
     ]  # fmt: skip
     return Table("Cuts that are not where they were asked", head, rows) if rows else None
+
+
+def _named(solve: SolveRecord) -> list[str]:
+    return [solver_title(solve.solver), str(solve.level)]
 
 
 def _in_elements(length: float, solve: SolveRecord) -> str:

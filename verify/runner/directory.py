@@ -21,6 +21,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.result_files import folder_of_case
 from verify.whole_files import asked_place
 
 RUN_SCHEMA = 1
@@ -43,8 +44,7 @@ class RunDirectory:
 
     def case_folder(self, case: str) -> Path:
         """Folder of a case."""
-        name = case.replace("/", "__")
-        return self.root / "cases" / (f"_{name}" if name.startswith(".") else name)
+        return self.root / "cases" / folder_of_case(case)
 
     def solve_folder(self, case: str, solver: str, level: int) -> Path:
         """Folder of one solve."""

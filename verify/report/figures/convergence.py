@@ -14,10 +14,6 @@ _BAND, _BAND_EDGE = "#e2e2e2", "#8f8f8f"
 Abscissa = Callable[[Point], float | None]
 
 
-def _unknowns(point: Point) -> float | None:
-    return float(point.unknowns) if point.unknowns else None
-
-
 def _seconds(point: Point) -> float | None:
     return point.duration.median if point.duration and point.duration.median > 0 else None
 
@@ -25,7 +21,7 @@ def _seconds(point: Point) -> float | None:
 # title, unit and place of what the error is drawn over
 _OVER: dict[str, tuple[str, str, Abscissa]] = {
     "size": ("element size h (m)", " m", lambda point: point.size),
-    "unknowns": ("unknowns", "", _unknowns),
+    "unknowns": ("unknowns", "", lambda point: point.unknowns),
     "time": ("wall time (s), median", " s", _seconds),
 }
 

@@ -1,12 +1,15 @@
-"""The two sets of templates: HTML, escaped by Jinja2, and Markdown, escaped by `in_markdown`.
+"""The forms of a page: HTML, escaped by Jinja2, Markdown, escaped by `in_markdown`, and PDF.
 
-Both read the same view data and the same page; only the macros of ``blocks`` differ.
+HTML and Markdown read the same view data and the same page; only the macros of ``blocks`` differ.
+PDF is the HTML page printed by a browser without a window.
 """
 
 import base64
 import io
 import re
 import shutil
+import subprocess
+import tempfile
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +19,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
+from verify.errors import InputError
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.notation import (
     error_title,
@@ -28,9 +32,11 @@ from verify.report.notation import (
     spread_text,
 )
 from verify.report.ranking_tables import rank
-from verify.whole_files import write_whole
+from verify.whole_files import whole_file, write_whole
 
 PICTURES = "report-pictures"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_PRINT_SECONDS = 180.0
 _SPECIAL = re.compile(r"([\\`*\[\]|])")
 _START = re.compile(r"^(\s*)([#>+=-]|\d+[.)](?=\s))")
 _LOOK = (
@@ -60,6 +66,41 @@ def as_markdown(template: str, folder: Path, pictures: str = PICTURES, **view: A
     target.mkdir(parents=True)
     text = _environment("markdown").get_template(template).render(assets=Beside(target), **view)
     return re.sub(r"[ \t]+\n", "\n", re.sub(r"\n\s*\n", "\n\n", text)).strip() + "\n"
+
+
+def print_page(page: Path) -> Path:
+    """Print the HTML file `page` to the PDF file beside it.
+
+    Raises
+    ------
+    InputError
+        If no browser of `BROWSERS` is here, or it does not print.
+    """
+    browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if browser is None:
+        wanted = f"looked for {', '.join(BROWSERS)}"
+        raise InputError(
+            f"PDF needs Chromium ({wanted}); --format markdown needs nothing, and any browser "
+            "prints report.html"
+        )
+    with tempfile.TemporaryDirectory(prefix="verify-print-") as place:
+        printed = Path(place) / "report.pdf"
+        command = [
+            browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
+            f"--user-data-dir={place}/profile", f"--print-to-pdf={printed}",
+            page.resolve().as_uri(),
+        ]  # fmt: skip
+        try:
+            subprocess.run(command, capture_output=True, timeout=_PRINT_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise InputError(
+                f"{browser} did not print within {_PRINT_SECONDS:g} s", str(page)
+            ) from None
+        if not printed.is_file():
+            raise InputError(f"{browser} did not print", str(page))
+        with whole_file(page.with_suffix(".pdf")) as partial:
+            shutil.copyfile(printed, partial)
+    return page.with_suffix(".pdf")
 
 
 def load_templates(kind: str, template: str) -> None:
