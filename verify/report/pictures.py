@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from verify.applied_checks import REFERENCE
 from verify.errors import InputError
+from verify.geometry.nearest import distance_to_outline, distance_to_polyline
+from verify.geometry.planar import inside_polygon
 from verify.report.bodies import (
     Body,
     View,
@@ -26,7 +28,6 @@ from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry
 from verify.report.turntable import packed
 from verify.result import CaseResult, SolveRecord, Status, error_picture, finest_of
-from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
 from verify.solution import Solution
 
 _OF_BODIES, _OF_ERRORS = "cividis", "YlOrBr"  # colours
