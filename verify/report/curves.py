@@ -35,7 +35,7 @@ class Point:
 
     level: int
     size: float | None
-    unknowns: int | None
+    unknowns: float | None
     value: float
     uncertainty: float
     duration: Duration | None
@@ -180,5 +180,5 @@ def _point(solve: SolveRecord, measured: Metric) -> Point:
     value, uncertainty = _error_of(measured)
     drawn = value if value >= _DRAWABLE[0] else 0.0
     size = solve.size if solve.size and _DRAWABLE[0] < solve.size < _DRAWABLE[1] else None
-    unknowns = solve.unknowns if solve.unknowns and solve.unknowns > 0 else None
+    unknowns = float(solve.unknowns) if solve.unknowns and solve.unknowns > 0 else None
     return Point(solve.level, size, unknowns, drawn, max(uncertainty, 0.0), duration(solve))
