@@ -50,7 +50,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
-    from verify.simulator import Session, quality_of
+    from verify.simulator import PHASES, Session, quality_of
     from verify.simulator.animation import (
         Frame,
         Underlay,
@@ -59,7 +59,7 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         write_film,
         write_picture,
     )
-    from verify.simulator.step_record import timings_of
+    from verify.simulator.step_record import Spread
 
     session = Session(stage)
     every = max(1, round(stage.steps / (arguments.frames - 1)))
@@ -68,7 +68,9 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         record = session.step()
         if arguments.out is not None and (record.step % every == 0 or session.finished):
             frames.append(Frame(record.time, session.picture(), session.blades(), session.hooks()))
-    records, quality, timings = session.records, quality_of(session), timings_of(session.records)
+    records, quality = session.records, quality_of(session)
+    step = Spread.of(record.total_seconds for record in records)
+    cutting = Spread.of(record.total_seconds for record in records if record.newly_split)
     if arguments.out is not None:
         skin = scene.geometry.kind == "skin"
         under = Underlay(frames[0].picture, scene.material.thickness or 0.0) if skin else None
@@ -91,13 +93,13 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         "split": int(session.cutter.body.split_cells.sum()),
         "unknowns": int(session.displacement.size),
         "median_seconds": {
-            **{phase: spread[0].median for phase, spread in timings.phases.items()},
-            "step": timings.step.median,
+            **{phase: Spread.of(r.seconds[phase] for r in records).median for phase in PHASES},
+            "step": step.median,
         },
-        "median_seconds_of_a_cutting_step": timings.cutting.median,
-        "seconds_of_95_percent_of_the_steps": timings.step.most,
-        "seconds_of_the_slowest_step": timings.step.largest,
-        "steps_within": timings.step.within,
+        "median_seconds_of_a_cutting_step": cutting.median,
+        "seconds_of_95_percent_of_the_steps": step.most,
+        "seconds_of_the_slowest_step": step.largest,
+        "steps_within": step.within,
         "volume_error": quality.volume_error,
         "loose_edges": quality.loose_edges,
         "inverted_elements": quality.inverted_elements,

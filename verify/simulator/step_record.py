@@ -4,7 +4,7 @@ Only the phases are timed: all that a simulator does in a step. The record itsel
 energies and the measures of `verify.simulator.quality` are kept beside it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,50 +106,3 @@ class Spread:
         median, most, largest = np.quantile(found, (0.5, 0.95, 1.0))
         within = {name: float(np.mean(found <= limit)) for name, limit in LIMITS.items()}
         return cls(len(found), float(median), float(most), float(largest), within)
-
-
-@dataclass(frozen=True)
-class Timings:
-    """Steps of a scene.
-
-    Attributes
-    ----------
-    step, cutting, resting : Spread
-        Of whole steps: all, those in which elements were split, and the others.
-    phases : dict
-        By phase, the `Spread` over all steps, those that cut, and the others.
-    """
-
-    step: Spread
-    cutting: Spread
-    resting: Spread
-    phases: dict[str, tuple[Spread, Spread, Spread]]
-
-    @property
-    def table(self) -> str:
-        """In words: a line for each kind of step, in ms."""
-        lines = []
-        kinds = (("all", self.step), ("cutting", self.cutting), ("resting", self.resting))
-        for k, (name, step) in enumerate(kinds):
-            if step.count == 0:
-                continue
-            phases = ", ".join(f"{p} {1e3 * s[k].median:.2f}" for p, s in self.phases.items())
-            within = ", ".join(f"{share:.0%} in {limit}" for limit, share in step.within.items())
-            lines.append(
-                f"{name} ({step.count} steps): median {1e3 * step.median:.2f} ms ({phases}), "
-                f"95 % {1e3 * step.most:.2f}, max {1e3 * step.largest:.2f}; {within}"
-            )
-        return "\n".join(lines)
-
-
-def timings_of(records: Sequence[StepRecord]) -> Timings:
-    """Sum up the steps; the first and the first that cuts, which compile, are for the caller."""
-    cutting = [record for record in records if record.newly_split > 0]
-    resting = [record for record in records if record.newly_split == 0]
-
-    def spreads(seconds: Callable[[StepRecord], float]) -> tuple[Spread, Spread, Spread]:
-        of = [Spread.of(map(seconds, kind)) for kind in (records, cutting, resting)]
-        return of[0], of[1], of[2]
-
-    phases = {name: spreads(lambda record, name=name: record.seconds[name]) for name in PHASES}  # type: ignore[misc]
-    return Timings(*spreads(lambda record: record.total_seconds), phases)
