@@ -33,7 +33,7 @@ def _element(space, dim, normal):
     return Elements(
         cells=np.zeros((1, dim + 1), dtype=np.int64), parent=one, gradients=np.empty(0),
         volumes=np.ones(1), normals=normal[None], lam=np.array([LAM]), mu=np.array([MU]),
-        axes=tuple(range(space)), corners=tuple(range(dim + 1)),
+        axes=tuple(range(space)), corners=tuple(range(dim + 1)), is_membrane=dim < space,
     )  # fmt: skip
 
 

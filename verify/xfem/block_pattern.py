@@ -44,7 +44,10 @@ class BlockPattern:
         return blocks
 
     def fold(self, added: Floats, blocks: Floats) -> None:
-        """Add what elements have added to the array of `unfold` to the blocks (B, d, d)."""
+        """Add what elements have added to the array of `unfold` to the blocks (B, d, d).
+
+        Here that array is the blocks themselves: nothing is left to do.
+        """
 
     @property
     def node_count(self) -> int:
@@ -155,6 +158,7 @@ def body_pattern(phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPa
 
 
 def _with_pairs(cells: Ints, pairs: Ints) -> Ints:
+    """Cells, then for each pair (i, j) a cell [i, j, j, …], which couples the same two nodes."""
     if len(pairs) == 0:
         return cells
     return np.concatenate([cells, pairs[:, [0] + [1] * (cells.shape[1] - 1)]])

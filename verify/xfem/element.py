@@ -8,8 +8,13 @@ is linear elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative 
     rotation-fixed   A = μ (δ_kl δ_nm + R_km R_ln) + λ R_kn R_lm,
     consistent       A = 2μ δ_kl δ_nm + λ R_kn R_lm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm.
 
-A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane; what
-holds it across that is in `verify.xfem.membrane`.
+The second follows from P = 2μF + (λ tr(E) − 2μ) R, as RᵀF is symmetric. The first is that of P at a
+fixed R, where P is linear in E: its product with a vector v is the force of E = sym(Rᵀ ∇v), that
+without I. A law that is not linear in E would need another `add_force` for it.
+
+A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane, and in
+the first A with δ_kl − n_k n_l for δ_kl, n the turned normal. What holds it across its plane is in
+`verify.xfem.membrane`.
 """
 
 from typing import NamedTuple
@@ -89,35 +94,38 @@ def elements_of(phantom: PhantomMesh, material: Material) -> Elements:
 
 
 @njit(cache=True)
-def deform(elements, displacement, share, F):
-    """Write `share` I + ∇u to F (p, d, d), restricted to the tangent plane of membranes."""
+def deform(elements, displacement, unit, F):
+    """Write `unit` I + ∇u to F (p, d, d), restricted to the tangent plane of membranes.
+
+    The displacement is that of the corners, (N_corners, d).
+    """
     cells, parent, gradients, _, normals, _, _, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
     for p in range(len(cells)):
         cell = parent[p]
         for k in range(d):
             for l in range(d):
-                total = share if k == l else 0.0
+                total = unit if k == l else 0.0
                 if is_membrane:
-                    total -= share * normals[cell, k] * normals[cell, l]
+                    total -= unit * normals[cell, k] * normals[cell, l]
                 for i in range(c):
                     total += displacement[cells[p, i], k] * gradients[cell, i, l]
                 F[p, k, l] = total
 
 
 @njit(cache=True)
-def add_force(elements, R, F, share, scale, force):
-    """Add `scale` times the forces of E = sym(Rᵀ F) − `share` I; return `scale` times the energy.
+def add_force(elements, R, F, unit, scale, force):
+    """Add `scale` times the forces of E = sym(Rᵀ F) − `unit` I; return `scale` times the energy.
 
-    With F from `deform`: the internal force for a share of one, for a share of zero the product of
+    With F from `deform` and the same `unit`: for one the internal force, for zero the product of
     rotation-fixed tangent and vector.
 
     Parameters
     ----------
     elements : Elements
     R, F : (p, d, d) float array
-    share, scale : float
-    force : (N, d) float array
+    unit, scale : float
+    force : (N_corners, d) float array
     """
     cells, parent, gradients, volumes, normals, lam, mu, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
@@ -136,10 +144,10 @@ def add_force(elements, R, F, share, scale, force):
                 for k in range(d):
                     across += normals[cell, k] * E[k, l]
                 for k in range(d):
-                    E[k, l] -= normals[cell, k] * (across - share * normals[cell, l])
+                    E[k, l] -= normals[cell, k] * (across - unit * normals[cell, l])
         trace = square = 0.0
         for k in range(d):
-            E[k, k] -= share
+            E[k, k] -= unit
             trace += E[k, k]
             for l in range(k):
                 E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])

@@ -287,12 +287,12 @@ class EnergyMomentum(NewtonIntegrator):
             self._before = self.body.force.configuration(self._start.displacement)
         return StepEnds(self._before.F, after.F, self._before.R, after.R)
 
-    def _solved(
+    def _linear_solve(
         self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
     ) -> Floats:
         self._takes_all |= is_slow and self.body.force.is_corotational
         if not self._takes_all:
-            return super()._solved(end, residual, kind, is_slow)
+            return super()._linear_solve(end, residual, kind, is_slow)
         self._assemble(end._replace(blocks=None), kind)
         self._general.factorize(self._blocks)
         return self._general.solve(residual)

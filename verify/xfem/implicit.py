@@ -79,6 +79,14 @@ class Iterate(NamedTuple):
 class NewtonIntegrator(ABC):
     """M (v₁ − v₀)/h = f_ext − f_int − f_visc with v₁ = γ (u₁ − u₀)/h − (γ − 1) v₀, solved for u₁.
 
+    With r the residual, damping α M + β K_R, K_R the rotation-fixed and K_C the consistent tangent
+    at the end, and s the `share` of the forces there, a correction Δu₁ solves A Δu₁ = r,
+
+        A = (γ/h² + s α γ/h) M + s (1 + β γ/h) K_R + s (K_C − K_R).
+
+    ``step`` calls ``_newton``. That evaluates r by ``_iterate`` (``_resistance``, ``_forces``), and
+    solves by ``_correction`` (``_linear_solve``, which makes A by ``_assemble``).
+
     Parameters
     ----------
     body : DynamicBody
@@ -101,7 +109,9 @@ class NewtonIntegrator(ABC):
 
     rate: float  # γ: 1 for implicit Euler, 2 for schemes centred in the step
     share: float  # derivative of the forces used with respect to those at the end
-    weight: float | None = None  # derivative of h² times the inertia by M u₁; None: γ
+    # derivative of h² times the inertia by M u₁; None: γ. It and `StepForces.inertia` are set by
+    # schemes whose inertia is not M (v₁ − v₀)/h, as `verify.methods.generalised_alpha`
+    weight: float | None = None
     tolerance = 1e-10
     iterations = 80
 
@@ -112,6 +122,8 @@ class NewtonIntegrator(ABC):
         self.step_size = check_step(step_size)
         self.solves = 0
         space = body.shape[1]
+        # after `_assemble` A with the supports; after an evaluation in one pass the stiffness in A,
+        # without mass and supports; after any other whatever was there
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
         self._solver = body.step_solver(_INEXACT) if solver is None else solver
         self._held = held_entries(body.pattern, body.fixed)
@@ -172,7 +184,7 @@ class NewtonIntegrator(ABC):
 
     @property
     def _stiffness_share(self) -> float:
-        """Of the rotation-fixed tangent, in the matrix of a correction."""
+        """Factor s (1 + β γ/h) of the rotation-fixed tangent in the matrix of a correction."""
         return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
 
     def _configuration(self, end: Resistance) -> Configuration:
@@ -191,10 +203,10 @@ class NewtonIntegrator(ABC):
         self._prepare()
         with np.errstate(over="ignore", invalid="ignore"):
             try:
-                end = self._solve(state.displacement + self.step_size * state.velocity)
+                end = self._newton(state.displacement + self.step_size * state.velocity)
             except StepFailedError:
                 # where the predictor has turned cells inside out, start from where they are
-                end = self._solve(state.displacement.copy())
+                end = self._newton(state.displacement.copy())
         state.displacement[:], state.velocity[:] = end.displacement, end.velocity
         state.time = self._start.time + self.step_size
         self._end = end.resistance._replace(blocks=None)
@@ -232,8 +244,11 @@ class NewtonIntegrator(ABC):
     def _size(self, force: Floats) -> float:
         return float(np.linalg.norm(self._inverse_mass * force))
 
-    def _solve(self, displacement: Floats) -> Iterate:
-        """End of the step, from a first guess (N, d)."""
+    def _newton(self, displacement: Floats) -> Iterate:
+        """End of the step, from a first guess (N, d).
+
+        Whenever a correction is asked for, `now` is what was evaluated last: its blocks hold.
+        """
         body = self.body
         prescribed, self._speed = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
@@ -249,13 +264,14 @@ class NewtonIntegrator(ABC):
                 return now
             aim = self._aim(number, self.tolerance * now.scale / now.norm)
             correction = self._correction(now.resistance, now.residual, aim, is_slow)
+            # within what round-off may keep from falling
             nearly = self._excess(now.residual, 100.0 * noise) <= 1e3 * self.tolerance * now.scale
             for halving in range(_HALVINGS):
                 trial = self._iterate(now.displacement + 0.5**halving * correction)
                 if trial.norm < now.norm:
                     break
             else:
-                if nearly:
+                if nearly:  # once more, as schemes keep what the last evaluation found
                     return self._iterate(now.displacement)
                 # a dead end of the residual, not a root: leap over it
                 leaps += 1
@@ -297,7 +313,7 @@ class NewtonIntegrator(ABC):
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
     def _excess(self, residual: Floats, noise: Floats) -> float:
-        """Norm of the accelerations that are left, as far as they are more than round-off."""
+        """Norm of the accelerations that are left beyond round-off: ‖(|M⁻¹ r| − noise)₊‖."""
         left = np.abs(self._inverse_mass * residual) - noise
         return float(np.linalg.norm(np.maximum(left, 0.0)))
 
@@ -334,10 +350,11 @@ class NewtonIntegrator(ABC):
         self._solver.tolerance = tolerance
         try:
             try:
-                return self._solved(end, residual, "consistent", is_slow)
+                return self._linear_solve(end, residual, "consistent", is_slow)
             except SingularStiffnessError:
-                # the exact one may be indefinite far from equilibrium; that without turns is not
-                return self._solved(end._replace(blocks=None), residual, "geometric", is_slow)
+                # K_C may be indefinite far from equilibrium, the rotation-fixed K_R never is
+                held = end._replace(blocks=None)
+                return self._linear_solve(held, residual, "geometric", is_slow)
         except SingularStiffnessError as failure:
             raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         except XfemError as failure:
@@ -346,11 +363,11 @@ class NewtonIntegrator(ABC):
                 "step is too long, or a load is not finite"
             ) from failure
 
-    def _solved(
+    def _linear_solve(
         self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
     ) -> Floats:
         given = None if self.body.force.is_corotational else (self.step_size, self.body.damping)
-        if given is None or given != self._factorised:  # the matrix of linear motion stays
+        if given is None or given != self._factorised:  # K of linear kinematics is constant
             self._factorised = None
             self._assemble(end, kind)
             self._solver.factorize(self._blocks)
@@ -358,7 +375,7 @@ class NewtonIntegrator(ABC):
         return self._solver.solve(residual)
 
     def _assemble(self, end: Resistance, kind: TangentKind) -> None:
-        """Fill the blocks with the matrix of a correction: of stiffness, damping and mass."""
+        """Fill the blocks with A of the class, with supports; what one pass has found is there."""
         body, h = self.body, self.step_size
         per_velocity = self.share * self.rate / h
         if end.blocks is None:

@@ -2,7 +2,10 @@
 
 Every piece, being a cell of the phantom-node mesh, has one polar rotation of its own.
 `verify.xfem.element` has the equations. Force and stiffness are found at the corners of the pieces,
-f and K; where corners follow others, u = C û, those of the dof nodes are Cᵀf and CᵀKC.
+f and K; where corners follow others, u = C û, those of the dof nodes are f̂ = Cᵀf and K̂ = CᵀKC.
+`extend`, `restrict` and `fold` are these products; without aggregation C is the identity.
+
+What is in or behind `has_one_pass` runs with accelerated kernels only: never with `PLAIN`.
 """
 
 from collections.abc import Callable
@@ -176,10 +179,10 @@ class InternalForce:
         """Deformation gradients (p, d, d) at a displacement (N, d), of membranes as above."""
         return self._gradient(displacement, 1.0)
 
-    def _gradient(self, displacement: Floats, share: float) -> Floats:
+    def _gradient(self, displacement: Floats, unit: float) -> Floats:
         self._check(displacement=displacement)
         found = np.empty_like(self._unturned)
-        deform(self.elements, self.phantom.extend(displacement), share, found)
+        deform(self.elements, self.phantom.extend(displacement), unit, found)
         return found
 
     def evaluate(self, displacement: Floats, out: Floats | None = None) -> tuple[Floats, float]:
@@ -222,9 +225,9 @@ class InternalForce:
         if self.ghost is not None:
             out += scale * (self.ghost.matrix @ vector)
 
-    def _add_force(self, R: Floats, F: Floats, share: float, scale: float, out: Floats) -> float:
+    def _add_force(self, R: Floats, F: Floats, unit: float, scale: float, out: Floats) -> float:
         corner_force = np.zeros_like(self.phantom.corners.node_points)
-        energy = add_force(self.elements, R, F, share, scale, corner_force)
+        energy = add_force(self.elements, R, F, unit, scale, corner_force)
         out += self.phantom.restrict(corner_force)
         return float(energy)
 
@@ -259,9 +262,9 @@ class InternalForce:
             Its first cells must be those of the body.
         blocks : (B, d, d) float array
         kind : {"rotation-fixed", "geometric", "consistent", "tension"}
-            Rotations held; the same and the geometric stiffness of membranes, which has no
-            negative mode either; the second derivative of the potential; the geometric stiffness
-            of a membrane alone.
+            K_R, with rotations held: no negative mode; K_R, of membranes with K_T, their geometric
+            stiffness, which has none either; K_C, the second derivative of the potential; K_T. In
+            linear kinematics all of them are K_R, but for the last.
         least : float
             Tension over μ that every direction of a membrane is taken to have at least: without it
             what is slack has no stiffness across its plane.
@@ -357,15 +360,19 @@ class InternalForce:
     ) -> Configuration | None:
         """Overwrite force and stiffness of an implicit step.
 
+        With the rotation-fixed tangent K_R and the consistent one K_C, both at u,
+
+            force = f_int(u) + implicit K_R v,
+            blocks = scale K_R + rotational (K_C − K_R).
+
         Parameters
         ----------
         pattern : BlockPattern
             Its first cells must be those of the body.
         displacement, velocity : (N, d) float array
         implicit : float
-            In seconds; the force is f_int(u) + `implicit` K v, K the rotation-fixed tangent.
+            In seconds; with zero the velocity is not read.
         scale : float
-            Of the rotation-fixed tangent in the blocks.
         force : (N, d) float array
             Overwritten.
         blocks : (B, d, d) float array
@@ -373,7 +380,7 @@ class InternalForce:
         whole : bool
             Without it what is below the diagonal may be anything.
         rotational : float
-            Of what the consistent tangent has beyond the rotation-fixed one.
+            Without a meaning in linear kinematics, where K_C is K_R.
 
         Returns
         -------

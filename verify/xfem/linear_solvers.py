@@ -253,6 +253,7 @@ class OnePass(Protocol):
     ) -> object:
         """Overwrite the force averaged over a step, and the stiffness at its end.
 
+        The stiffness is `scale` K_R + `rotational` (K_C − K_R), as of `InternalForce.linearise`.
         `start` and `end` (N, 3) are displacements, `substituted` (p,) cells that have taken the
         substitute for the averaged stress, which is updated.
         """

@@ -1,4 +1,9 @@
-"""Newton's method for the equilibrium of a cut body, on its potential energy."""
+"""Newton's method for the equilibrium of a cut body, on its potential energy.
+
+Its matrix is K_ρ = K_R + ρ (K_C − K_R), of the rotation-fixed and the consistent tangent; ρ, the
+`rotational` of arguments here, falls along `SHARES` until K_ρ is positive definite. A correction is
+then taken by a share, that of the line search.
+"""
 
 from typing import NamedTuple
 
@@ -65,11 +70,14 @@ class Newton:
 
     @property
     def largest_stiffness(self) -> float:
-        """Largest entry of the tangent that was linearised last, in N/m."""
+        """Largest entry of the tangent assembled last, in N/m; with supports if it was inverted."""
         return float(np.abs(self._blocks).max(initial=0.0))
 
     def solve(self, displacement: Floats, change: Floats, load: Floats) -> tuple[Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took.
+
+        The first correction, for the load and the change, is taken whole. Of the others, a whole
+        one by K_C counts if the residual falls; else the energy must fall.
 
         Parameters
         ----------
@@ -121,7 +129,7 @@ class Newton:
         return Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
 
     def _spread(self, start: Place, change: Floats) -> Floats:
-        """Respond linearly to a prescribed change."""
+        """Respond linearly to a prescribed change, and to the residual at the start."""
         try:
             return self._solve(start, change, 1.0)
         except SingularStiffnessError:
@@ -147,7 +155,9 @@ class Newton:
                 return self.place(place.displacement + share * correction, load)
         if leap is None:
             raise self._failure(place, "where no correction lowers the potential energy")
-        return leap  # beside a cell whose force jumps, or in round-off
+        # no energy falls, as in round-off or beside a collapsed cell, whose force jumps: go on from
+        # the whole correction by K_C, although its residual is larger
+        return leap
 
     def _share_downhill(self, place: Place, correction: Floats, load: Floats) -> float:
         """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
@@ -171,9 +181,9 @@ class Newton:
     def _solve(
         self, place: Place, change: Floats | None, rotational: float, least: float = 0.0
     ) -> Floats:
-        """Solve for a change of the fixed components, or for the residual; see `linearise`."""
+        """Correct for the residual, and for a change of the fixed components; see `linearise`."""
         matrix = self.linearise(place.displacement, rotational, least)
-        load = place.residual.copy()
+        load = place.residual.copy()  # the product comes before `inverse`, which spoils the matrix
         if change is not None:
             load -= (matrix @ change.ravel()).reshape(change.shape)
             load[self.fixed] = 0.0
@@ -181,7 +191,9 @@ class Newton:
         return correction if change is None else correction + change
 
     def linearise(self, displacement: Floats, rotational: float, least: float = 0.0) -> bsr_array:
-        """Assemble the tangent (N d, N d) at a displacement, over that of the last call.
+        """Assemble the tangent K_ρ (N d, N d) at a displacement, without supports.
+
+        It is in the memory of this object: until the next call, or until `inverse` constrains it.
 
         Parameters
         ----------
