@@ -126,7 +126,7 @@ def test_a_blade_that_turns_about_its_end_sweeps_a_connected_fan() -> None:
     path = ToolPath(np.stack([np.zeros((7, 3)), far], axis=1), angle)
     facets = path.surface.facets
     assert len(facets) == 6
-    inner_edges = (~path.surface.arrays.part_rim[:, [1, 2, 4]]).sum()
+    inner_edges = (~path.surface.arrays.feature_rim[:, [1, 2, 4]]).sum()
     assert inner_edges == 2 * 5
 
 

@@ -8,6 +8,16 @@ triangular and the volume share is a *product* of positive r and s: no cancellat
 the sliver. Paths follow the order of the corners; with corners ordered by their global number the
 sub-simplices of neighbours match on shared faces.
 
+A triangle with a above, b and c below, and zero points ab, ac, has three of them:
+
+    above   a ab ac   r_ab r_ac
+    below   b ab ac   s_ab r_ac
+    below   b c ac    s_ac
+
+The first zero point of a path lies on an edge from a corner that is there, a or b or c, and brings
+in the other end: m with r, p with s. Each step to a next m brings that in with its r, to a next p
+with its s. The quadrilateral ab ac c b has the diagonal b–ac: from the smaller corner number.
+
 Where a cut ends, the cells that it divides have points on faces and edges that their undivided
 neighbours do not know of. Bisected at these (`bisected`), the neighbours match again.
 """

@@ -107,7 +107,8 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
         node_parent=node_parent,
         sub_cells=replace(sub, piece=number[into[sub.piece]]),
     )
-    # the cut has moved past nodes, but unknowns stay on their sides
+    # the cut has moved past nodes, but unknowns stay on their sides: this takes the place of the
+    # cached property, until a `replace` makes another mesh
     treated.__dict__["node_side"] = phantom.node_side[
         np.argsort(node)[np.count_nonzero(node < 0) :]
     ]

@@ -16,6 +16,11 @@ State = Literal["plane strain", "plane stress", "solid"]
 class Material:
     """σ = λ tr(ε) I + 2 μ ε, with the λ that suits the state.
 
+    There is no seam for another law. This one is written out in `verify.xfem.element`, `membrane`,
+    `energy_momentum` (for it alone), `critical_step`, `ghost_penalty`, and the kernels of
+    `verify.accelerated`. That K is constant in linear kinematics is relied on by `solve_static` and
+    `implicit`; that P is linear in E, by every product with the rotation-fixed tangent.
+
     Attributes
     ----------
     lam, mu : (m,) or () float array

@@ -2,17 +2,26 @@
 
 The work of the average is the change of strain energy, exactly.
 
-The potential is quadratic in F but for the trace of the stretch, t. Its discrete gradient needs
-only a T with T : (F₁ − F₀) = t₁ − t₀ that is R in the limit and has T Fₘᵀ symmetric, so that
-angular momentum is kept, Fₘ = (F₀ + F₁)/2. Then
+Per volume the potential is, with t the trace of the stretch and d the dimension of the simplex
+(2 of a membrane),
+
+    W = μ (‖F‖² − 2t + d) + ½λ (t − d)²,
+
+quadratic in F but for t. Its discrete gradient needs only a T with T : (F₁ − F₀) = t₁ − t₀ that is
+R in the limit and has T Fₘᵀ symmetric, so that angular momentum is kept, Fₘ = (F₀ + F₁)/2. Then
 
     P = 2μ (Fₘ − T) + λ (½(t₀ + t₁) − d) T.
 
 In the plane t R is linear in F, and T = (t₀ R₀ + t₁ R₁)/(t₀ + t₁). In space
 U₁² − U₀² = ½[(U₁−U₀)(U₀+U₁) + (U₀+U₁)(U₁−U₀)], hence t₁ − t₀ = (U₀+U₁)⁻¹ : (C₁ − C₀) and
 T = 2 Fₘ A⁻¹, A = U₀ + U₁. Neither has a quotient that is 0/0 at rest. Where an inverted element
-makes A indefinite, T = R(Fₘ) plus a multiple of Fₘ (C₁ − C₀) takes its place (Gonzalez 2000), and
-keeps it to the end of the step, so that Newton's method does not alternate between the two.
+makes A indefinite, a substitute takes its place (Gonzalez 2000),
+
+    T = R(Fₘ) + α D,  D = 2Fₘ (C₁ − C₀),  α = (t₁ − t₀ − R(Fₘ) : (F₁ − F₀)) / ‖C₁ − C₀‖²,
+
+as D : (F₁ − F₀) = ‖C₁ − C₀‖². After the first evaluations of a step (`_FREE_EVALUATIONS`) elements
+keep it once they take it, so that Newton's method does not alternate between the two. In the plane
+T = R₁ stands in where t₀ + t₁ is not positive, and nothing is kept.
 
 The derivative by the end of the step, with c = λ(½(t₀ + t₁) − d) − 2μ, is
 
@@ -69,7 +78,7 @@ def averaged_stress(elements: Elements, ends: StepEnds, substituted: Bools) -> F
     elements : Elements
     ends : StepEnds
     substituted : (p,) bool array
-        Elements that have taken the substitute in this step; added to.
+        Elements that have taken the substitute in this step: added to, in the plane overwritten.
     """
     T = _secant(elements, ends, substituted)
     _, mu, factor = _factors(elements, ends)
@@ -79,7 +88,7 @@ def averaged_stress(elements: Elements, ends: StepEnds, substituted: Bools) -> F
 def averaged_moduli(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
     """∂P/∂F₁ (p, d, d, d, d), the last two indices those of F₁; not symmetric.
 
-    Arguments as the last call of `averaged_stress` left them.
+    Arguments as the last call of `averaged_stress` left them: `substituted` is read, too.
     """
     T = _secant(elements, ends, substituted)
     if len(elements.axes) == 2:
@@ -184,8 +193,8 @@ class EnergyMomentum(NewtonIntegrator):
 
     The internal force is a discrete gradient of the potential; the docstring of the module has the
     equations. Its stiffness is not symmetric, and differs from half of that at the end by the
-    square of the turn in a step. Corrections take the latter, which is found in a tenth of the
-    time, as long as each takes half of the residual off.
+    square of the turn in a step. Corrections take half of that at the end, which is found in a
+    tenth of the time. After one that leaves more than half of the residual they take its own.
 
     Parameters
     ----------
@@ -239,7 +248,7 @@ class EnergyMomentum(NewtonIntegrator):
         self._before, self._evaluations, self._takes_all = None, 0, False
 
     def _resistance(self, displacement: Floats) -> Resistance:
-        """Resistance averaged over the step; substituted cells are updated."""
+        """Resistance averaged over the step; `substituted` is that of this evaluation."""
         body, force, start = self.body, self.body.force, self._start.displacement
         found = np.zeros(body.shape)
         if not force.is_corotational:

@@ -52,7 +52,7 @@ class _Step(NamedTuple):
     potential: float  # less the work of the loads, J
     excess: float  # of the strain energy over the work, J
     allowed: float  # of it, J
-    trusted: bool
+    trusted: bool  # energy and work agree, hardly any volume turned inside out
 
 
 class LoadPath:
@@ -60,7 +60,8 @@ class LoadPath:
 
     A step counts if its strain energy is that at its start and the work of its reactions and loads
     by the trapezoidal rule, up to a quarter, and hardly any volume turned inside out. It may store
-    less than that where supports rest, as what stiffens under dead loads does. Any other step is
+    less than that where supports move no body but rigidly, as what stiffens under dead loads does.
+    Any other step is
     solved again in two halves. If both paths end at one energy, that counts; if not, the state of
     less potential energy does. So a column that buckles or an arch that snaps through is found, and
     a state that its supports could not have paid for is left or refused.
@@ -70,8 +71,10 @@ class LoadPath:
     force : InternalForce
     fixed : (N, d) bool array
     prescribed : callable
-        Displacement (N, d) of the fixed components at a load factor, zero elsewhere. On a straight
-        path, in proportion to the factor, bodies are turned all the same.
+        Displacement (N, d) of the fixed components at a load factor, zero elsewhere. Where it is
+        straight, in proportion to the factor, but turns bodies, supports move along rotations
+        (`RigidMotions.turned_path`): the path tells where supports are, `RigidMotions.follow` from
+        where Newton's method starts.
     load : (N, d) float array
         Dead nodal forces at load factor 1.
     newton : Newton
@@ -150,7 +153,15 @@ class LoadPath:
         )
 
     def _advance(self, start: Floats, since: float, until: float, room: int) -> list[_Step]:
-        """Take steps from one load factor to another, halved as often as the checks ask for."""
+        """Take steps from one load factor to another, halved as often as the checks ask for.
+
+        `room` is how many halvings are left. They are used if
+
+        - supports turn parts of a body too far against one another: `room` − 1 in the halves;
+        - no equilibrium is found: the same; with no room left that is raised;
+        - the step is not trusted: at most `_COMPARED`, and the better path counts. With no room
+          left the step counts, unless its energy is more than the work, which is refused.
+        """
         middle = 0.5 * (since + until)
 
         def halves(room: int) -> list[_Step]:
@@ -213,15 +224,15 @@ class LoadPath:
         change = self._change(start, until)
         followed = start if self._motions is None else self._motions.follow(start, change)
         before, energy_before = self._force.evaluate(followed)
-        rest = np.where(self._fixed, start + change - followed, 0.0)
-        found, count = self._newton.solve(followed, rest, until * self._load)
+        beyond = np.where(self._fixed, start + change - followed, 0.0)
+        found, count = self._newton.solve(followed, beyond, until * self._load)
         after, energy = self._force.evaluate(found)
-        # reactions and loads, as the rest of the internal force is zero; none in a rigid motion
+        # trapezoidal rule for ∫ f_int·du, the work of supports and loads; a rigid motion takes none
         work = 0.5 * float(np.vdot(before + after, found - followed))
         excess = energy - energy_before - work
         allowed = _UNBALANCED * max(energy, energy_before) + self._floor()
         # under dead loads alone less than the work is stored by what stiffens or snaps through
-        least = -allowed if rest.any() else -np.inf
+        least = -allowed if beyond.any() else -np.inf
         trusted = least <= excess <= allowed and not self._turns_inside_out(followed, found)
         potential = energy - until * float(np.vdot(self._load, found))
         return _Step(found, count, energy, potential, excess, allowed, trusted)

@@ -131,11 +131,12 @@ class FacetArrays(NamedTuple):
         In metres; the last axis is that of the coordinates.
     normals : (t, k) float array
         Of length one.
-    part_normals : (t, 2^k, k) float array
-        At parts of the facet: number Σ 2^j over the corners j that do not belong to it, so that
-        0 is the facet itself, 2^j the edge opposite to corner j. Of length one; at an edge where
-        the cut ends that of the facet.
-    part_rim : (t, 2^k) bool array
+    feature_normals : (t, 2^k, k) float array
+        At the features of the facet: number Σ 2^j over the corners j that do not belong to one.
+        0 is the facet itself. Of a segment 2 and 1 are corners 0 and 1. Of a triangle 1, 2, 4 are
+        the edges opposite to corners 0, 1, 2, and 6, 5, 3 those corners. Of length one; at an edge
+        where the cut ends that of the facet.
+    feature_rim : (t, 2^k) bool array
         Whether the cut ends there.
     rim : (r, k - 1, k) float array
         The facets of the rim: points in 2D, edges in 3D.
@@ -145,8 +146,8 @@ class FacetArrays(NamedTuple):
 
     corners: Floats
     normals: Floats
-    part_normals: Floats
-    part_rim: Bools
+    feature_normals: Floats
+    feature_rim: Bools
     rim: Floats
     travel: Floats
 
@@ -172,19 +173,19 @@ def facet_arrays(points: Floats, facets: Ints, travel: Floats | None = None) -> 
     rim_facets = facets[facet[:, None], facets_of(np.arange(count)[None])[k]]
     on_rim = np.zeros(len(points), dtype=bool)
     on_rim[rim_facets] = True
-    part_normals = np.repeat(normals[:, None], 2**count, axis=1)
-    part_rim = np.zeros((len(facets), 2**count), dtype=bool)
+    feature_normals = np.repeat(normals[:, None], 2**count, axis=1)
+    feature_rim = np.zeros((len(facets), 2**count), dtype=bool)
     edges = 1 << np.arange(count)
     vertices = 2**count - 1 - edges  # in the plane they are the edges
-    part_normals[:, edges] = _of_length_one(normals[:, None] + beside)
-    part_normals[:, vertices] = _of_length_one(total)[facets]
-    part_rim[:, edges] = rim
-    part_rim[:, vertices] = on_rim[facets]
+    feature_normals[:, edges] = _of_length_one(normals[:, None] + beside)
+    feature_normals[:, vertices] = _of_length_one(total)[facets]
+    feature_rim[:, edges] = rim
+    feature_rim[:, vertices] = on_rim[facets]
     return FacetArrays(
         corners=corners,
         normals=normals,
-        part_normals=part_normals,
-        part_rim=part_rim,
+        feature_normals=feature_normals,
+        feature_rim=feature_rim,
         rim=np.ascontiguousarray(points[rim_facets]),
         travel=np.zeros(facets.shape) if travel is None else travel[facets],
     )
@@ -214,13 +215,13 @@ class _Foot(NamedTuple):
 
 def _foot(points: Floats, facets: FacetArrays) -> _Foot:
     facet, weights, square = _nearest(points, facets.corners)
-    part = (weights == 0.0) @ (1 << np.arange(weights.shape[1]))
-    normal, rim = facets.part_normals[facet, part], facets.part_rim[facet, part]
+    feature = (weights == 0.0) @ (1 << np.arange(weights.shape[1]))
+    normal, rim = facets.feature_normals[facet, feature], facets.feature_rim[facet, feature]
     # x − y with the nearest point y = Σ_k w_k c_k; φ = (x − y)·n beside a face or past the rim
     off = points - np.einsum("nk,nki->ni", weights, facets.corners[facet])
     along = np.einsum("ni,ni->n", off, normal)
     distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)
-    level = np.where(rim | (part == 0), along, distance)
+    level = np.where(rim | (feature == 0), along, distance)
     beside = off - along[:, None] * normal
     beyond = np.where(rim, np.sqrt(np.einsum("ni,ni->n", beside, beside)), 0.0)
     return _Foot(facet, weights, level, beyond)

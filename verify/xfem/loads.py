@@ -160,7 +160,8 @@ def facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Fl
     """Material of the facets of `cells` opposite to a corner, as simplices.
 
     A facet that a cut crosses is divided by it. Pieces (q,), barycentric coordinates (q, d, d + 1)
-    of the corners, and measures (q,).
+    of the corners, and measures (q,). Where a zero point lies on the facet, its coordinate of the
+    corner is s·0 + r·0 (`verify.xfem.clip`), exactly zero.
     """
     mesh = phantom.mesh
     others = [k for k in range(mesh.dim + 1) if k != local]

@@ -43,7 +43,8 @@ class RigidMotions:
     def follow(self, displacement: Floats, change: Floats) -> Floats:
         """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.
 
-        It is the least-squares motion of the nodes that are held in all components.
+        It is the least-squares motion of the nodes that are held in all components: place x goes
+        to c₁ + Q (x − c₀), with c₀, c₁ the centres of those nodes before and after.
         """
         moved = displacement.copy()
         for nodes, turn, centre, wanted in self._turns(displacement, change):
@@ -55,7 +56,11 @@ class RigidMotions:
         """Path to a prescribed displacement (N, d) along rotations; None if no body turns.
 
         Each body turns by a share of its angle, so that it does not shrink on the way as on the
-        straight one, and what its supports want beyond that grows in proportion.
+        straight one, and what its supports want beyond that grows in proportion:
+
+            x(s) = c₀ + s (c₁ − c₀) + Qˢ (X − c₀ + s e),  e = Qᵀ(X + u − c₁) − (X − c₀),
+
+        with Qˢ the rotation by s times the angle (`part_of_rotation`).
         """
         turns = list(self._turns(np.zeros_like(displacement), displacement))
         if not turns:

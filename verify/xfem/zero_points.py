@@ -5,6 +5,9 @@
 An edge is a pair of numbered points: mesh nodes, or zero points of cuts applied before. Asking
 twice for the same edge and cut gives the same number, so that neighbouring elements agree on the
 position, and on the sign of every other cut there, to the last bit.
+
+Asking may append: `find` and `on_edges` number what they have not met before, and change nothing
+else. Points that no sub-simplex uses do no harm.
 """
 
 import numpy as np
@@ -99,6 +102,7 @@ class ZeroPoints:
         """Sort places (k,) of zero points in `ends` as divisions used them, last ends first.
 
         Bisecting edges in this order gives the diagonals by which `verify.xfem.clip` divides faces.
+        Of a triangle with zero points ab, ac, b < c, bisection at ac comes first and makes b–ac.
         """
         ends = self.ends[numbers]
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], self.turn[numbers]])]
