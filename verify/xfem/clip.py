@@ -77,7 +77,7 @@ def staircase(corners: int) -> Staircase:
     for pattern in range(2**corners):
         above = [k for k in range(corners) if pattern >> k & 1]
         below = [k for k in range(corners) if not pattern >> k & 1]
-        for sign, vertices, steps in _parts(above, below) if above and below else ():
+        for sign, vertices, steps in _sub_simplices(above, below) if above and below else ():
             plus.append([a for a, _ in vertices])
             minus.append([b for _, b in vertices])
             # filled up with s_00, which `divided` sets to one
@@ -96,7 +96,7 @@ def staircase(corners: int) -> Staircase:
     )
 
 
-def _parts(
+def _sub_simplices(
     above: list[int], below: list[int]
 ) -> Iterator[tuple[int, _Path, list[tuple[int, int, int]]]]:
     """(side, vertices, factors) of all sub-simplices."""
@@ -138,7 +138,8 @@ class Simplices:
     fraction : (q,) float array
         Share in the volume of the cell.
     sign : (q,) int8 array
-        Orientation in the cell, +1 or −1: from how it came about, hence right for any sliver.
+        Orientation in the cell, +1 or −1: from how it came about, hence right for any sliver. It is
+        for bodies whose cuts grow (`verify.simulator`); nothing here reads it.
     """
 
     piece: Ints
@@ -196,12 +197,12 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
     beneath = touched & ~plus.any(axis=1)
     moved = np.where(beneath, below[simplices.piece], simplices.piece)
     whole = Simplices(moved, *list(vars(simplices).values())[1:])[~clipped]
-    parts = simplices[clipped]
-    if len(parts) == 0:
+    crossed = simplices[clipped]
+    if len(crossed) == 0:
         return whole
-    order = np.argsort(parts.points, axis=1, kind="stable")
-    row = np.arange(len(parts))[:, None]
-    ids, corners = parts.points[row, order], parts.barycentric[row, order]
+    order = np.argsort(crossed.points, axis=1, kind="stable")
+    row = np.arange(len(crossed))[:, None]
+    ids, corners = crossed.points[row, order], crossed.barycentric[row, order]
     level = zero.values[ids, cut]
     number = zero.on_edges(cut, ids)
     entry, of = staircase_entries(level >= 0.0)
@@ -216,14 +217,14 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Si
         r[:, diagonal, diagonal], s[:, diagonal, diagonal] = 0.0, 1.0
         places = s[..., None] * corners[:, :, None] + r[..., None] * corners[:, None]
     share = np.stack([r, s])[kind, at, a, b].prod(axis=1)
-    swaps = sum(parts.points[:, i] > parts.points[:, j] for i, j in combinations(diagonal, 2))
+    swaps = sum(crossed.points[:, i] > crossed.points[:, j] for i, j in combinations(diagonal, 2))
     turned = (1 - 2 * (np.asarray(swaps) % 2)).astype(np.int8)
     new = Simplices(
-        np.where(stairs.side[entry] > 0, parts.piece[of], below[parts.piece[of]]),
+        np.where(stairs.side[entry] > 0, crossed.piece[of], below[crossed.piece[of]]),
         number[at, p, m],
         places[at, p, m],
-        parts.fraction[of] * share,
-        parts.sign[of] * turned[of] * stairs.sign[entry],
+        crossed.fraction[of] * share,
+        crossed.sign[of] * turned[of] * stairs.sign[entry],
     )
     zero.divided(new.points)
     return whole + new
@@ -262,6 +263,9 @@ def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices
 
 def facets_between(parent: Ints, piece: Ints, points: Ints) -> tuple[Ints, Ints, Ints]:
     """Facets (f, d) of sub-simplices between two pieces of one cell, and both pieces (f,), (f,).
+
+    It relies on sub-simplices of a cell that match facet by facet: `divided` makes them so by the
+    order of corners, `bisected` beside the ends of cuts.
 
     Parameters
     ----------

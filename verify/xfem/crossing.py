@@ -69,6 +69,9 @@ def crossed_through(
 ) -> tuple[Bools, Bools]:
     """Which pieces (p,) a cut goes through, and in which (p,) it ends by the rule `inside`.
 
+    By the other rules it ends in none. A piece is gone through if all of its zero points are inside
+    the extent (`inside`), if one is (`through`), or if their mean is (`nearest`).
+
     Parameters
     ----------
     cut : Cut

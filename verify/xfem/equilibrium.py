@@ -211,14 +211,14 @@ class LoadPath:
             return False
         within = [k / _SAMPLES for k in range(1, _SAMPLES) if since < k / _SAMPLES < until]
         return any(
-            self._motions.strain(start, self._change(start, share)) > _MOST_STRAIN
-            for share in (*within, until)
+            self._motions.strain(start, self._change(start, factor)) > _MOST_STRAIN
+            for factor in (*within, until)
         )
 
-    def _change(self, displacement: Floats, share: float) -> Floats:
-        if share not in self._sampled:
-            self._sampled[share] = self._prescribed(share)
-        return np.where(self._fixed, self._sampled[share] - displacement, 0.0)
+    def _change(self, displacement: Floats, factor: float) -> Floats:
+        if factor not in self._sampled:
+            self._sampled[factor] = self._prescribed(factor)
+        return np.where(self._fixed, self._sampled[factor] - displacement, 0.0)
 
     def _step(self, start: Floats, until: float) -> _Step:
         change = self._change(start, until)
@@ -342,8 +342,8 @@ def static_equilibrium(
         raise XfemError(f"{load_steps} load steps; expected at least one")
     full_load = np.zeros(shape) if load is None else finite_array(load, "load", shape)
 
-    def wanted(share: float) -> Floats:
-        values = np.zeros(shape) if prescribed is None else prescribed(share)
+    def wanted(factor: float) -> Floats:
+        values = np.zeros(shape) if prescribed is None else prescribed(factor)
         if values.shape == shape:  # what is not fixed may be anything
             values = np.where(fixed, values, 0.0)
         return finite_array(values, "prescribed displacement", shape)

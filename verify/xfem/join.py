@@ -10,6 +10,9 @@ A tip closes so: the face between the last divided cell and the whole one ahead 
 on either side of the cut. The whole cell has one piece, label 0, that touches across both. Hence
 both sides share the dof nodes of that face, and the jump is zero on it. So a cut through a single
 cell inside the mesh makes two pieces and no unknown.
+
+Inside a cell pieces are apart, but for those of one part (`Partition.one_part`). The ends of cuts
+enter there, and by which cells they divide: regions of faces are those of the whole level sets.
 """
 
 from dataclasses import dataclass
@@ -117,14 +120,14 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
         ids = np.sort(nodes[mixed], axis=1)
         entry, of = staircase_entries(points.values[ids, cut] >= 0.0)
         number = points.on_edges(cut, ids)
-        parts = number[of[:, None], stairs.plus[entry], stairs.minus[entry]]
-        part_side = side[mixed[of]]
-        part_side[:, cut] = stairs.side[entry]
+        regions = number[of[:, None], stairs.plus[entry], stairs.minus[entry]]
+        region_side = side[mixed[of]]
+        region_side[:, cut] = stairs.side[entry]
         rest = np.ones(len(face), dtype=bool)
         rest[mixed] = False
-        nodes = np.concatenate([nodes[rest], parts])
+        nodes = np.concatenate([nodes[rest], regions])
         face = np.concatenate([face[rest], face[mixed[of]]])
-        side = np.concatenate([side[rest], part_side])
+        side = np.concatenate([side[rest], region_side])
     # a zero point that is a corner comes twice: there the region has no area (2D: no length)
     ordered = np.sort(nodes, axis=1)
     area = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
@@ -176,6 +179,7 @@ def number_nodes(
 
     # The material in which a node lies keeps the node's number. On cuts through the node that is
     # the one above most of them: there may be none above all, as where a cut runs along a wall.
+    # Only numbers depend on that, not the space.
     rank = np.zeros(nodes.shape, dtype=np.int64)
     level = partition.points.values[nodes[:pieces]]
     label = partition.label[:, None, :]

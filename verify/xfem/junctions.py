@@ -70,12 +70,12 @@ def junction_cuts(
     if known is not None:
         more |= known & suspects
     # of the cuts those that keep two parts asunder
-    through = np.zeros_like(meets)
+    forced = np.zeros_like(meets)
     apart = part[facets.first] != part[facets.second]
     facet, cut = np.nonzero(inside & apart[:, None])
-    through[divided.parent[facets.first[facet]], cut] = True
-    through[~more] = False
-    return through
+    forced[divided.parent[facets.first[facet]], cut] = True
+    forced[~more] = False
+    return forced
 
 
 def pieces_of_one_part(
@@ -130,6 +130,7 @@ def _inside_extent(
         )
         inside = depth >= -AT_END * size
         if not inside.all():
+            # corners past the end of a facet that begins inside the extent
             past = (depth < -AT_END * size) & (depth > depth.max(axis=1, keepdims=True) - size)
             past &= (depth > AT_END * size).any(axis=1, keepdims=True)
             row, corner = np.nonzero(past)

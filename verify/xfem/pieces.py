@@ -57,7 +57,7 @@ class _Rules(NamedTuple):
     tip: TipRule
     separated: Separated | None
     opened: Bools | None
-    through: Bools | None = None  # (m, cuts) cells in which a cut has no end
+    forced: Bools | None = None  # (m, cuts) cells in which a cut has no end
 
 
 def split_cells(
@@ -130,14 +130,14 @@ def split_cells(
         free = rules._replace(separated=None, opened=None)
         junctions = junction_cuts(
             *((partition, ends) if opened is None else divide(crossed, free)),
-            lambda cells, through: divide(cells, free._replace(through=through))[0],
+            lambda cells, forced: divide(cells, free._replace(forced=forced))[0],
             cuts,
             sizes,
             junction_cells,
         )
         at_junctions = junctions.any(axis=1)
         if at_junctions.any():
-            partition = divide(crossed, rules._replace(through=junctions))[0]
+            partition = divide(crossed, rules._replace(forced=junctions))[0]
     partition = partition.only_split()
     pairs = pieces_of_one_part(partition, cuts, sizes, at_junctions)
     return replace(partition, one_part=pairs).absorbed()
@@ -196,8 +196,8 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
         on_others = partial(reached, rules.cuts, index, points)
     active, ending = crossed_through(cut, points.positions, crossing, rules.tip, on_others)
     meets = np.bincount(piece, minlength=len(active)) > 0
-    if rules.through is not None:
-        active |= meets & rules.through[parent, index]
+    if rules.forced is not None:
+        active |= meets & rules.forced[parent, index]
     if rules.separated is not None:
         doubtful = np.flatnonzero(meets & ~active)
         active[doubtful] = rules.separated(parent[doubtful], partition.label[doubtful], index)

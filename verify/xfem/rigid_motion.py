@@ -66,13 +66,13 @@ class RigidMotions:
         if not turns:
             return None
 
-        def at(share: float) -> Floats:
-            values = share * displacement
+        def at(s: float) -> Floats:
+            values = s * displacement
             for nodes, turn, centre, wanted in turns:
                 arm = self._points[nodes] - centre
                 strained = (self._points[nodes] + displacement[nodes] - wanted) @ turn - arm
-                part = part_of_rotation(turn, share)
-                values[nodes] = (arm + share * strained) @ part.T - arm + share * (wanted - centre)
+                part = part_of_rotation(turn, s)
+                values[nodes] = (arm + s * strained) @ part.T - arm + s * (wanted - centre)
             return values
 
         return at
