@@ -65,6 +65,9 @@ free body
     pieces that hang together by shared dof nodes; a cut through the whole makes two of one
 share, fraction
     without further words, of the volume of a cell
+fixed, held
+    a component of a dof node is *fixed* if supports prescribe it; what such components keep in
+    place, a node or a body, is *held*
 sliver
     a piece with a small share in the volume of its cell
 corner

@@ -254,7 +254,8 @@ def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floa
     """Return ∂R/∂F (p, d, d, d, d) of nearest rotations; zero where there is none.
 
     With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b,
-    H = tr(U) I − U in space and tr(U) in the plane.
+    H = tr(U) I − U in space and tr(U) in the plane. For dR = Σ ω_a G_a keeps RᵀF symmetric, so that
+    S_b : (dRᵀF + RᵀdF) = 0, which is Σ H_ba ω_a = G_b : dF with H_ba = S_b : (S_a U).
 
     Parameters
     ----------

@@ -178,7 +178,8 @@ def _substitute(ends: StepEnds) -> tuple[Floats, Floats]:
     moving = square > _STILL * _inner(C1, C1)
     square = np.where(moving, square, 1.0)[:, None, None]
     factor = np.where(moving, t1 - t0 - _inner(middle, F1 - F0), 0.0)[:, None, None] / square
-    # T = Rₘ + α D, D = 2Fₘ (C₁ − C₀), α = (t₁ − t₀ − Rₘ : (F₁ − F₀))/|C₁ − C₀|²; slope = dα
+    # T = Rₘ + α D, D = 2Fₘ (C₁ − C₀), α = (t₁ − t₀ − Rₘ : (F₁ − F₀))/|C₁ − C₀|²; slope = dα,
+    # dT = dRₘ + D dα + α dD, dD = dF (C₁ − C₀) + 2Fₘ dC₁
     slope = R1 - middle - np.einsum("pknlm,pkn->plm", dT, F1 - F0)
     slope = (slope - 2.0 * factor * np.einsum("pab,pablm->plm", change, dC)) / square
     slope[~moving] = 0.0

@@ -353,8 +353,8 @@ class NewtonIntegrator(ABC):
                 return self._linear_solve(end, residual, "consistent", is_slow)
             except SingularStiffnessError:
                 # K_C may be indefinite far from equilibrium, the rotation-fixed K_R never is
-                held = end._replace(blocks=None)
-                return self._linear_solve(held, residual, "geometric", is_slow)
+                end = end._replace(blocks=None)
+                return self._linear_solve(end, residual, "geometric", is_slow)
         except SingularStiffnessError as failure:
             raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         except XfemError as failure:

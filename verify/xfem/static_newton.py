@@ -181,7 +181,10 @@ class Newton:
     def _solve(
         self, place: Place, change: Floats | None, rotational: float, least: float = 0.0
     ) -> Floats:
-        """Correct for the residual, and for a change of the fixed components; see `linearise`."""
+        """Correct for the residual r, and for a change c of the fixed components.
+
+        The free components of K_ρ (δ + c) are r; those of c and the fixed ones of δ are zero.
+        """
         matrix = self.linearise(place.displacement, rotational, least)
         load = place.residual.copy()  # the product comes before `inverse`, which spoils the matrix
         if change is not None:

@@ -82,7 +82,7 @@ class ZeroPoints:
         """Numbers (q, c, c) of the points of `cut` on the edges of simplices with points (q, c).
 
         Entry ab is the point between corner a, where φ ≥ 0, and b, where φ < 0; if a = b it is
-        the corner itself, elsewhere 0.
+        the corner itself, elsewhere 0, which is not read.
         """
         plus = self.values[points, cut] >= 0.0
         row, a, b = np.nonzero(plus[:, :, None] & ~plus[:, None, :])
