@@ -20,37 +20,47 @@ def state(solver, *names, **options):
     return {result.name: result for result in results}
 
 
+AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it can fail
+
+
 @pytest.mark.parametrize(
     "solver, check, said",
     [
         ("IgnoresTheCut", "cut-patch", "displacement off by"),
-        ("SwapsTheSides", "cut-patch", "displacement off by"),
-        ("SwapsTheSides", "traction", "displacement off by"),
+        pytest.param("SwapsTheSides", "cut-patch", "displacement off by", marks=AGAIN),
+        pytest.param("SwapsTheSides", "traction", "displacement off by", marks=AGAIN),
         ("TakesTheFirstCut", "two-cuts", "displacement off by"),
-        ("TakesTheLastCut", "two-cuts", "displacement off by"),
+        pytest.param("TakesTheLastCut", "two-cuts", "displacement off by", marks=AGAIN),
         ("TakesTheFirstCut", "crossing-cuts", "displacement off by"),
         ("TakesTheFirstCut", "branched-cut", "displacement off by"),
-        ("EndsElsewhere", "ending-cut", "open a quarter of an element beyond its end"),
+        pytest.param(
+            "EndsElsewhere",
+            "ending-cut",
+            "open a quarter of an element beyond its end",
+            marks=AGAIN,
+        ),
         ("EndsTooSoon", "ending-cut", "closed a quarter of an element before its end"),
         ("TakesOneMaterial", "crossed-interface", "displacement off by"),
         ("TooStiffInSpace", "traction-3d", "displacement off by"),
-        ("TakesOneMaterial", "two-materials", "displacement off by"),
+        pytest.param("TakesOneMaterial", "two-materials", "displacement off by", marks=AGAIN),
         ("TakesThePoissonRatioOfOne", "two-materials", "displacement off by"),
         ("WrongEnergy", "energy-account", "ledger"),
         ("HalfAsStiff", "traction", "displacement off by 1.0"),
         ("TakesTheWrongDensity", "weight", "Galerkin"),
         ("SpinsFreely", "rigid-rotation-2d", "displacement off by"),
         ("TurnsALittle", "finite-rotation-2d", "displacement off by"),
-        ("StatesStrainOfRotation", "finite-rotation-2d", "where there is none"),
+        pytest.param(
+            "StatesStrainOfRotation", "finite-rotation-2d", "where there is none", marks=AGAIN
+        ),
         ("IgnoresTheCut", "parted-3d", "displacement off by"),
         ("LumpsAsTheThesis", "free-fall", "does not stay as it is"),
-        ("ForgetsOutputs", "free-fall", "output times"),
+        pytest.param("ForgetsOutputs", "free-fall", "output times", marks=AGAIN),
         ("SaysTooFast", "energy-in-motion", "not the rates of its displacements"),
         ("KnowsOnlyUpright", "mirrored-cut", "discretisation"),
         ("DependsOnNumbers", "renumbering", ""),
         ("Noisy", "repeatability", "not equal bit by bit"),
-        ("Remembers", "repeatability", "not equal bit by bit"),
-        ("LosesAPiece", "cut-patch", "do not cover the body"),
+        pytest.param("Remembers", "repeatability", "not equal bit by bit", marks=AGAIN),
+        pytest.param("LosesAPiece", "cut-patch", "do not cover the body", marks=AGAIN),
         ("AnswersAnything", "free-piece", "nothing holds a piece"),
         ("RaisesInSpace", "refusals", "unusual-space: IndexError: index 2 is out of bounds"),
     ],

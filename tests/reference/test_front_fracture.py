@@ -150,6 +150,7 @@ def test_each_station_sees_its_own_intensity_whichever_others_are_asked_for():
     assert three / flat == pytest.approx(1 + np.array([0.25, 0.5, 0.75]), rel=0.02)
 
 
+@pytest.mark.heavy
 class TestThePenny:
     """A penny of radius 1 in a cube of side 4 with the exact field on its surface."""
 

@@ -42,6 +42,7 @@ def test_slivers_are_aggregated_and_a_penalty_does_not_change_the_answer_much(ca
     assert penalised == pytest.approx(kept, rel=5e-3)
 
 
+@pytest.mark.heavy
 def test_cutting_finds_the_tool_on_the_cut_body_and_on_the_cut_skin(capsys, tmp_path, monkeypatch):
     # the surface that the page crops: a square of 0.02 m that faces the blade
     square = (-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)
