@@ -93,7 +93,7 @@ def test_on_regular_meshes_every_sliver_of_the_catalogue_leaves_three_quarters_o
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("mass", ["consistent", "row sum", "weighted diagonal"])
 def test_the_step_of_the_other_masses_vanishes_with_the_sliver(dim, mass):
-    # of the cells that it meets in a corner alone a sliver of 1e-5 takes 1e-15, which is a piece still
+    # a sliver of 1e-5 takes 1e-15 of the cells that it meets in a corner: a piece still
     coarse, fine, finest = (_step(_sliver(dim, e), mass) for e in (1e-2, 1e-4, 1e-5))
     # in proportion to its size
     assert fine / coarse == pytest.approx(1e-2, rel=0.05)
