@@ -1,4 +1,4 @@
-"""When the facets of a mesh open that conforms to all cuts of a scene; meshes before and after."""
+"""Opening times of the facets of a mesh that conforms to all cuts; meshes before and after."""
 
 import numpy as np
 from numpy.typing import NDArray

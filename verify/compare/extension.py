@@ -5,7 +5,7 @@ what of the values is a rigid motion, then what is affine, is taken exactly; onl
 harmonic in the body, in one piece across all cuts, as it is while they are closed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _NOTHING = 1e-9  # of the largest value: an affine field that fits so well is the field
 
 
-@dataclass(frozen=True)
+@dataclass
 class Extension:
     """Fields of the nodes of a solution by their values where it is held.
 
@@ -38,11 +38,17 @@ class Extension:
         Which components of which nodes have values.
     in_layer : bool
         Whether what is not affine ends in the cells at what is held; else it is harmonic.
+
+    Attributes
+    ----------
+    is_affine : bool
+        Whether all values so far were affine where it is held, so that nothing was harmonic.
     """
 
     solution: Solution
     held: NDArray[np.bool_]
     in_layer: bool = False
+    is_affine: bool = field(default=True, init=False)
 
     def of(self, values: Array, points: Array) -> tuple[Array, bool]:
         """Extend values (n, d), of which those that are held count, to all nodes (n, d).
@@ -81,6 +87,7 @@ class Extension:
 
     def _harmonic(self, rest: Array, nothing: float) -> Array:
         """Extend the rest (n, d) by Δw = 0, without flux where it is not held."""
+        self.is_affine = False
         place, found = self._places, np.zeros_like(rest)
         for axis, (own, known) in enumerate(zip(self.held.T, self._solvers, strict=True)):
             values = np.zeros(place.max() + 1)

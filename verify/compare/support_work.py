@@ -86,7 +86,7 @@ def support_work(
     parts = scene, solution, law, mass, nodes, forces
     smooth = _Work(*parts, Extension(solution, nodes.held))
     steps = smooth.steps()
-    if smooth.is_affine:
+    if smooth.extension.is_affine:  # known once the steps have asked it
         return _since(steps), _since(smooth.off(steps))
     layer = _Work(*parts, Extension(solution, nodes.held, in_layer=True))
     other = layer.steps()
@@ -162,11 +162,6 @@ class _Work:
         ends = sorted({*ends, len(times) - 1})
         runs = [range(a, b, stride) for a, b in pairwise(ends)]
         return np.concatenate([*runs, ends[-1:]]).astype(np.int64)
-
-    @property
-    def is_affine(self) -> bool:
-        """Whether all velocities asked for so far were affine at what is held."""
-        return "_solvers" not in vars(self.extension)
 
     @cached_property
     def _knots(self) -> Array:
