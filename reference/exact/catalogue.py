@@ -4,25 +4,17 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from reference.exact.airy import Airy
 from reference.exact.arc_crack import ArcCrack
-from reference.exact.bending import Bending
-from reference.exact.blade_strip import BladeStrip
 from reference.exact.circular_cut import CircularCut
-from reference.exact.crack_tip import CrackTip
-from reference.exact.griffith import Griffith
 from reference.exact.hooke import Hooke, hooke
 from reference.exact.layers import Layers
-from reference.exact.linear import Linear
+from reference.exact.moving_cracks import BladeStrip
 from reference.exact.parameters import Parameters
-from reference.exact.patch import Patch
 from reference.exact.penny import Penny
 from reference.exact.rolled_halves import RolledHalves
-from reference.exact.sinusoidal import Sinusoidal
-from reference.exact.solid_patch import SolidPatch
-from reference.exact.solid_sinusoidal import SolidSinusoidal
+from reference.exact.smooth_fields import Airy, Bending, Linear, Patch, Sinusoidal
 from reference.exact.solution import ExactSolution
-from reference.exact.straight_front import StraightFrontField
+from reference.exact.straight_cracks import CrackTip, Griffith, StraightFrontField
 from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.scene.nearest import nearest
@@ -69,12 +61,12 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "disc at rest, cut out of a body that is drawn outwards: centre, radius, outward, at",
     ),
     "solid_patch": (
-        SolidPatch,
+        Patch,
         "3D: uniform strain on each side of a plane cut: point, normal, axis, strain and shift "
         "(rows above, below)",
     ),
     "solid_smooth": (
-        SolidSinusoidal,
+        Sinusoidal,
         "3D: plane waves with a body force on each side of a plane cut: point, normal, axis, above "
         "and below (rows A, k1, k2, phase of U1, U2, V), shift",
     ),

@@ -46,7 +46,10 @@ class ExactField(ABC):
 
     @property
     def cut_plane(self) -> Plane | None:
-        """In space: point and normal of the plane across which the field jumps, if it does."""
+        """Point and normal of the line or plane through the body across which the field jumps.
+
+        None if there is none. It is smooth on either side, and the field of a side beyond it.
+        """
         return None
 
     def at(self, time: float) -> Self:
@@ -73,17 +76,9 @@ class ExactField(ABC):
         """Stress (n, d, d), Pa."""
         return self.law.stress(self.gradient(points, near))
 
-    def smooth_parts(self, outline: Array) -> list[tuple[Array, Array | None]]:
-        """Divide a polygon into parts on which the field is smooth, extended if need be.
-
-        Returns
-        -------
-        list of (corners, direction)
-            Corners (k, 2), counter-clockwise; and the direction (2,) from any point to where
-            the side of this part is, or None if the part's own inside says it.
-        """
-        return [(outline, None)]
-
     def kinks(self, start: Array, end: Array) -> list[float]:
-        """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`."""
+        """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`.
+
+        In the plane; not across `cut_plane`.
+        """
         return []

@@ -7,12 +7,11 @@ of the jump, which shears, is a rotation of the second material.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.exact.hooke import Hooke, hooke
 from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
-from reference.exact.straight_cut import StraightCutSolution, axes, side
+from reference.exact.two_sided import Above, TwoSidedSolution, line_axes, side
 from verify.errors import InputError
 from verify.scene import Material
 
@@ -21,7 +20,7 @@ _BESIDE = 1e-4, 1e-7  # m: how far along the interface and beside it materials a
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
-class Layers(StraightCutSolution):
+class Layers(TwoSidedSolution):
     """Uniform stress S s⊗s on each side of the cut, in two materials.
 
     ``point`` is where the interface crosses the cut.
@@ -44,7 +43,7 @@ class Layers(StraightCutSolution):
     def __init__(self, material: Material, parameters: Parameters) -> None:
         super().__init__(hooke(material), parameters)
         self._stress = parameters.take("stress", (2,))
-        along = axes(parameters, "interface_")[0] @ self._axes.T  # in the axes of the cut
+        along = line_axes(parameters, "interface_")[0] @ self._axes.T  # in the axes of the cut
         self._normal = _QUARTER @ along
         laws = self._laws_beside(material, along @ self._axes)
         # per unit of stress: (left, right) of the interface
@@ -61,7 +60,7 @@ class Layers(StraightCutSolution):
 
     def stress(self, points: Array, near: Array | None = None) -> Array:
         """Stress (n, 2, 2), Pa; that of each point's material."""
-        _, _, above = self._local(points, near)
+        _, above = self._local(points, near)
         unit = np.outer(self._axes[0], self._axes[0])
         return np.asarray(side(self._stress, above)[:, None, None] * unit)
 
@@ -87,21 +86,9 @@ class Layers(StraightCutSolution):
             )
         return [hooke(material.each[k]) for k in number[[0, 2]]]
 
-    def _second(self, s: Array, t: Array) -> NDArray[np.bool_]:
-        return np.asarray(np.column_stack([s, t]) @ self._normal < 0.0)
+    def _local_displacement(self, s: Array, above: Above) -> Array:
+        return np.asarray(np.einsum("nij,nj->ni", self._local_gradient(s, above), s))
 
-    def _local_displacement(
-        self, s: Array, t: Array, above: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
-        gradient = self._gradients[self._second(s, t).astype(int)]
-        u = side(self._stress, above)[:, None] * np.einsum(
-            "nij,nj->ni", gradient, np.column_stack([s, t])
-        )
-        return u[:, 0], u[:, 1]
-
-    def _local_gradient(
-        self, s: Array, t: Array, above: NDArray[np.bool_]
-    ) -> tuple[Array, Array, Array, Array]:
-        gradient = self._gradients[self._second(s, t).astype(int)]
-        g = side(self._stress, above)[:, None, None] * gradient
-        return g[:, 0, 0], g[:, 0, 1], g[:, 1, 0], g[:, 1, 1]
+    def _local_gradient(self, s: Array, above: Above) -> Array:
+        second = s @ self._normal < 0.0
+        return side(self._stress, above)[:, None, None] * self._gradients[second.astype(int)]

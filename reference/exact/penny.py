@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from reference.exact.hooke import Hooke
 from reference.exact.parameters import Parameters
-from reference.exact.plane_cut import axes_of
 from reference.exact.solution import Array, ExactSolution
+from reference.exact.two_sided import matrices, plane_axes
 from verify.errors import InputError
 from verify.scene import Scene
 
@@ -50,7 +50,7 @@ class Penny(ExactSolution):
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
         super().__init__(law)
         self._centre = parameters.take("centre", (3,), default=np.zeros(3))
-        axes = axes_of(parameters) if parameters.has("normal") else np.eye(3)
+        axes = plane_axes(parameters) if parameters.has("normal") else np.eye(3)
         self._a = parameters.positive("a")
         if parameters.has("stress"):
             remote = parameters.take("stress", (3, 3))
@@ -131,7 +131,7 @@ class Penny(ExactSolution):
             [bend * x * y, spread + bend * y * y, by_z * y],
             [rise_r * x, rise_r * y, rise_z],
         ]
-        return np.moveaxis(np.array(rows), 2, 0)
+        return matrices(rows)
 
     def _shearing(self, s: Array, z: Array, upper: Array, f: _Derivatives) -> Array:
         """Gradient of what a shear along x slides, of C = 2μ."""
@@ -148,7 +148,7 @@ class Penny(ExactSolution):
             [-(1 - 2 * nu) * xx + z * xxz, -(1 - 2 * nu) * xy + z * xyz,
              (2 * nu * xz + z * x * f.zzr_r) * upper],
         ]  # fmt: skip
-        return np.moveaxis(np.array(rows), 2, 0)
+        return matrices(rows)
 
     def _evaluate(
         self, points: Array, near: Array | None

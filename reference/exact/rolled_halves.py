@@ -1,17 +1,16 @@
 """Bending of either side of a straight cut to a circle, at any rotation: the sides peel apart."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.exact.hooke import Hooke
 from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
-from reference.exact.straight_cut import StraightCutSolution, side
+from reference.exact.two_sided import Above, TwoSidedSolution, matrices, side
 from verify.errors import InputError
 from verify.scene import Scene
 
 
-class RolledHalves(StraightCutSolution):
+class RolledHalves(TwoSidedSolution):
     """Strips on both sides of a cut, each bent away from the other to a circle of its own.
 
     In the energy μ‖U − I‖² + ½ λ tr²(U − I) a strip |ξ| < h/2 takes the places
@@ -40,28 +39,26 @@ class RolledHalves(StraightCutSolution):
         """Refuse: at finite rotation the linear work on the surface is not the energy."""
         raise InputError("the strain energy at finite rotation is integrated over the body")
 
-    def _radius(self, xi: Array, above: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def _radius(self, xi: Array, above: Above) -> tuple[Array, Array]:
         """Radius r (n,), m, and dr/dξ (n,)."""
         c = side(self._curvature, above)
         even, odd = side(self._cosh, above), side(self._sinh, above)
         r = even * np.cosh(c * xi) + odd * np.sinh(c * xi) + self._b / c
         return r, c * (even * np.sinh(c * xi) + odd * np.cosh(c * xi))
 
-    def _local_displacement(
-        self, s: Array, t: Array, above: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
+    def _local_displacement(self, s: Array, above: Above) -> Array:
         sign, middle = np.where(above, 1.0, -1.0), 0.5 * side(self._thickness, above)
-        c = side(self._curvature, above)
+        (x, t), c = s.T, side(self._curvature, above)
         r, _ = self._radius(middle - sign * t, above)
         at_middle = side(self._cosh, above) + self._b / c
         # ξ points away from the centre of the circle: towards the cut
-        return r * np.sin(c * s) - s, sign * (middle + at_middle - r * np.cos(c * s)) - t
+        rise = sign * (middle + at_middle - r * np.cos(c * x))
+        return np.column_stack([r * np.sin(c * x) - x, rise - t])
 
-    def _local_gradient(
-        self, s: Array, t: Array, above: NDArray[np.bool_]
-    ) -> tuple[Array, Array, Array, Array]:
+    def _local_gradient(self, s: Array, above: Above) -> Array:
         sign, middle = np.where(above, 1.0, -1.0), 0.5 * side(self._thickness, above)
-        c = side(self._curvature, above)
+        (x, t), c = s.T, side(self._curvature, above)
         r, slope = self._radius(middle - sign * t, above)
-        cos, sin = np.cos(c * s), np.sin(c * s)
-        return c * r * cos - 1.0, -sign * slope * sin, sign * c * r * sin, slope * cos - 1.0
+        cos, sin = np.cos(c * x), np.sin(c * x)
+        return matrices([[c * r * cos - 1.0, -sign * slope * sin],
+                         [sign * c * r * sin, slope * cos - 1.0]])  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 from reference_scenes import needs_fenicsx
 
 from reference.exact.hooke import Hooke, hooke
-from reference.exact.sudden_crack import sudden_intensity, sudden_slip
+from reference.exact.moving_cracks import sudden_intensity, sudden_slip
 from verify.assess.quantities import Measured
 from verify.assess.reference import known_quantity, size_of
 from verify.assess.richardson import extrapolate

@@ -13,7 +13,7 @@ term on the outline, by least squares. Nothing of it is finite elements.
 import numpy as np
 from numpy.polynomial import polynomial
 
-from reference.exact.complex_crack import ComplexCrack, Potentials
+from reference.exact.straight_cracks import ComplexCrack, Potentials
 
 _ORDER, _POINTS = 24, 120  # terms of each polynomial; collocation points on a side
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from reference.exact.hooke import hooke
-from reference.exact.sudden_crack import sudden_intensity
+from reference.exact.moving_cracks import sudden_intensity
 from verify.scene import Material
 from verify.study.calibration.plane_scenes import Content, Random
 
