@@ -1,5 +1,8 @@
 """Opening times of the facets of a mesh that conforms to all cuts; meshes before and after."""
 
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,26 +10,60 @@ from reference.meshing import ConformingMesh, open_cut
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.geometry.nearest import distance_to_pieces
+from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Scene, ToolPathCut
 
 Array = NDArray[np.float64]
+_SAME = 1e-6  # of a facet: points that are one
 
 
-def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Array:
-    """Give the times (f,) from which on each of `mesh.cut_facets` is open, s.
+class FacetOpenings(NamedTuple):
+    """When each of `mesh.cut_facets` opens.
+
+    Attributes
+    ----------
+    times : (f,) array
+        From when on it is open, s.
+    passed : (f,) array
+        When the blade has passed all of it, s.
+    shares : SweptShares or None
+        Of the places of nodes on the cut; None where facets are released at once.
+    place : (n,) int array
+        Number of the place of each node.
+    """
+
+    times: Array
+    passed: Array
+    shares: SweptShares | None
+    place: NDArray[np.int64]
+
+
+def facet_openings(
+    scene: Scene,
+    space: ConformingSpace,
+    facing: NDArray[np.int64],
+    swept: bool,
+    delay: float = 0.0,
+) -> FacetOpenings:
+    """Find when each facet of the cut opens.
 
     Those of a cut open with it. One on a tool path opens when the blade has passed all of it, the
-    last of its corners. A facet belongs to the cut that it is closest to: one on a curved cut is
+    last of its corners; or if `swept` so early that each node is let go as the first facet at it
+    begins to be swept. A facet belongs to the cut that it is closest to: one on a curved cut is
     off by its own sagitta, and cuts do not lie on each other.
 
     Parameters
     ----------
     scene : Scene
-    mesh : ConformingMesh
+    space : ConformingSpace
         With all final cuts open.
+    facing : (f, q, 2) int array
+        Of `reference.ties.facing_nodes`.
+    swept : bool
     delay : float
         By which facets on tool paths open late, s.
     """
+    mesh = space.mesh
     corners = mesh.realised_cut
     places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
     points = places.reshape(-1, mesh.dimension)
@@ -34,15 +71,45 @@ def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Arr
         distance_to_pieces(points, cut.pieces()).reshape(places.shape[:2]).max(axis=1)
         for cut in scene.final_cuts
     ]
-    times = np.zeros(len(corners))
+    _, place = np.unique(space.node_points, axis=0, return_inverse=True)
+    shares = SweptShares(len(corners)) if swept else SweptShares(len(corners), 1)
+    times, passed = np.zeros((2, len(corners)))
     for i, cut in enumerate(scene.cuts):
         mine = np.argmin(off, axis=0) == i
         if isinstance(cut, ToolPathCut):
-            passed = cut.passed_at(corners[mine].reshape(-1, mesh.dimension))
-            times[mine] = passed.reshape(corners[mine].shape[:2]).max(axis=1) + delay
+            which, nodes = np.flatnonzero(mine), facing[mine, :, 0]
+            shape = _weights(corners[mine], space.node_points[nodes])
+            simplices = CutSimplices(corners[mine], which, place.ravel()[nodes], shape)
+            found = shares.add(simplices, partial(_passed_at, cut, delay))
+            times[mine], passed[mine] = (one[mine] for one in found)
         else:
-            times[mine] = cut.opens_at
-    return times
+            times[mine] = passed[mine] = cut.opens_at
+    known = shares if swept and shares.used else None
+    return FacetOpenings(times if known else passed, passed, known, place.ravel())
+
+
+def _passed_at(cut: ToolPathCut, delay: float, points: Array) -> Array:
+    return cut.passed_at(points) + delay
+
+
+def _weights(corners: Array, nodes: Array) -> Array:
+    """Weights (f, d, q) of the nodes (f, q, d) of facets at their corners.
+
+    That of the corner a node is at; of one between two corners both, the same as N over a segment
+    but for its shape, and never negative.
+    """
+    away = np.linalg.norm(corners[:, :, None] - nodes[:, None], axis=3)
+    size = away.max(axis=(1, 2), keepdims=True)
+    at = away <= _SAME * size
+    between = np.zeros_like(at)
+    count = corners.shape[1]
+    for a in range(count):
+        for b in range(a + 1, count):
+            middle = 0.5 * (corners[:, a] + corners[:, b])
+            off = np.linalg.norm(middle[:, None] - nodes, axis=2) <= _SAME * size[:, 0]
+            between[:, a] |= off
+            between[:, b] |= off
+    return np.asarray(at | between, dtype=float)
 
 
 def partly_opened(mesh: ConformingMesh, opened: NDArray[np.bool_]) -> ConformingMesh:

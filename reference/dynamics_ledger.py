@@ -16,7 +16,7 @@ from reference.dynamics_body import MovingBody
 from reference.dynamics_step import State, StepForces
 
 Array = NDArray[np.float64]
-DONE = ("work_of_loads", "work_of_supports", "damping", "algorithmic", "unbalanced")
+DONE = ("work_of_loads", "work_of_supports", "damping", "algorithmic", "unbalanced", "cut_work")
 
 
 class Ledger:
@@ -26,10 +26,13 @@ class Ledger:
     ----------
     done : dict of str to float
         What was done since then by the names in `DONE`, J (in the plane per metre).
+    turned : (1 or 3,) array or float
+        Angular impulse since then of the forces on what the cut has released, N m s.
     """
 
     def __init__(self) -> None:
         self.done = dict.fromkeys(DONE, 0.0)
+        self.turned: Array | float = 0.0
         self._kinetic = self._strain = 0.0
 
     def open(self, body: MovingBody, state: State) -> None:
@@ -50,7 +53,12 @@ class Ledger:
         kinetic, strain = _energies(body, state)
         slip = change @ forces.inertia - (kinetic - self._kinetic)
         done = self.done
-        done["work_of_loads"] += float(change @ (forces.external - body.weight))
+        done["work_of_loads"] += float(change @ (forces.external - body.weight - forces.held))
+        done["cut_work"] -= float(change @ forces.held)
+        d = body.space.dimension
+        middle = 0.5 * (before.displacement + state.displacement).reshape(-1, d)
+        turning = _turning(body.space.node_points + middle, forces.held.reshape(-1, d))
+        self.turned = self.turned + (state.time - before.time) * turning
         done["work_of_supports"] += float(change @ reaction)
         done["damping"] += float(change @ forces.viscous)
         done["algorithmic"] += float(slip + change @ forces.internal - (strain - self._strain))

@@ -1,5 +1,6 @@
 """One implicit step of a body in motion, by generalised-α, Newmark or implicit Euler."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,6 +84,7 @@ class StepForces:
     internal: Array
     viscous: Array
     inertia: Array
+    held: Array  # of the external ones, those on what the cut has released
 
     @property
     def residual(self) -> Array:
@@ -115,7 +117,7 @@ class Stepper:
         self.solves = 0
         self._solver: NodalSolver | TiedSolver | None = None
         self._before = np.zeros(0)  # internal and viscous force at the start of the step
-        self._load = np.zeros(0)
+        self._load = self._hold = np.zeros(0)
         self._travelled: Array | None = None  # in the last step
 
     def step(self, state: State) -> StepForces:
@@ -129,7 +131,8 @@ class Stepper:
         start = state.copy()
         if not self.averaged:
             self._before = self._resisting(start.displacement, start.velocity)
-        self._load = self._external(start.time)
+        self._load = self._over_step(self.body.external, start.time)
+        self._hold = self._over_step(self.body.holds.at, start.time)
         a, forces = self._solved(start, self._first(start))
         state.displacement, state.velocity = self._end(start, a)
         state.acceleration, state.time = a, start.time + self.size
@@ -230,13 +233,13 @@ class Stepper:
             self._solver.destroy()
             self._solver = None
 
-    def _external(self, time: float) -> Array:
-        body, h = self.body, self.size
+    def _over_step(self, forces: Callable[[float], Array], time: float) -> Array:
+        h = self.size
         if self.averaged:
-            return body.external(time + 0.5 * h)
+            return forces(time + 0.5 * h)
         old = self.scheme.alpha_f
-        later = (1 - old) * body.external(time + h * (1 - _JUST))
-        return later + old * body.external(time + h * _JUST) if old else later
+        later = (1 - old) * forces(time + h * (1 - _JUST))
+        return later + old * forces(time + h * _JUST) if old else later
 
     def _forces(self, start: State, u: Array, v: Array, a: Array) -> StepForces:
         body, scheme, external = self.body, self.scheme, self._load
@@ -245,10 +248,11 @@ class Stepper:
         if self.averaged:
             internal = body.law.averaged(start.displacement, u)
             middle = 0.5 * (start.displacement + u), 0.5 * (start.velocity + v)
-            return StepForces(external, internal, self._viscous(*middle), inertia)
+            viscous = self._viscous(*middle)
+            return StepForces(external, internal, viscous, inertia, self._hold)
         keep = 1 - scheme.alpha_f
         internal, viscous = keep * self._resisting(u, v) + scheme.alpha_f * self._before
-        return StepForces(external, internal, viscous, inertia)
+        return StepForces(external, internal, viscous, inertia, self._hold)
 
     def _resisting(self, u: Array, v: Array) -> Array:
         """Return internal and viscous force (2, k)."""

@@ -200,3 +200,42 @@ times = [0.03, 0.09, 0.18]
         assert hidden(found.ledger) < 1e-10
         uncut = found.displacement[0]
         assert np.isfinite(uncut).all()
+
+
+@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_what_a_blade_lets_go_is_held_by_what_held_it(monkeypatch, kinematics, degree):
+    """No acceleration jumps, momenta stay but for the couple, and the work is in the account."""
+    from verify.solvers.conforming_motion import TiedMotion
+
+    jumps = []
+    genuine = TiedMotion._release
+
+    def released(self, closed, time):
+        body, d = self.body, self.space.dimension
+        before = body.accelerations(self._unbalanced(self._later)).reshape(-1, d)
+        genuine(self, closed, time)
+        after = body.accelerations(self._unbalanced(self._later)).reshape(-1, d)
+        if not body.holds._holds[-1].factor(time).all():
+            return  # swept within one step: held by nothing
+        jumps.append([np.abs(after - before).max(), np.abs(before).max()])
+
+    monkeypatch.setattr(TiedMotion, "_release", released)
+    paths = [{**INCLINED, "times": [0.02, 0.12]}, {**ACROSS, "times": [0.09, 0.28]}]
+    linear = kinematics == "linear"
+    begun = PULLED if linear else {"initial": FLYING}
+    scene = altered(plate(paths, kinematics=kinematics, **begun), time_step=4e-3)
+    scheme = "newmark" if linear else "energy_momentum"
+    ledger = solved(scene, scheme=scheme, degree=degree, opening="swept").ledger
+    assert len(jumps) >= 8
+    largest, scale = np.max(jumps, axis=0)
+    assert largest < 1e-9 * scale
+    assert hidden(ledger) < 1e-10
+    assert np.abs(ledger["work_of_loads"]).max() < 1e-12 * ledger["kinetic"].max()
+    assert ledger["cut_work"].any()
+    if not linear:
+        for axis in "xy":
+            assert np.ptp(ledger[f"linear_momentum_{axis}"]) < 1e-10 * 1000
+        turned = ledger["angular_momentum_z"] - ledger["cut_angular_impulse_z"]
+        assert spread(turned) < 1e-10
+        assert spread(ledger["angular_momentum_z"]) > 1e-9

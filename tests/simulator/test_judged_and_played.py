@@ -24,7 +24,7 @@ def test_played_and_judged_open_the_same_elements_at_the_same_steps(name) -> Non
     scene, played = load_scene(CASES / f"{name}.toml"), stage(name)
     cuts = cuts_of(scene, 0.1)
     phantom = cut_mesh(played.mesh, cuts)
-    opening = Openings(scene.cuts, cuts, [0.0] * len(cuts)).of_cells(phantom)
+    opening = Openings(scene.cuts, cuts, [0.0] * len(cuts)).of_cells(phantom).times
     alone = (~np.isnan(opening)).sum(axis=1) == 1
     cutter = SemiProgressiveCutter(played.mesh)
     for path in played.strokes:

@@ -15,8 +15,9 @@ SIGNS = {
     "kinetic": 1.0, "strain": 1.0, "gravity": 1.0, "damping": 1.0, "work_of_loads": -1.0,
     "work_of_supports": -1.0,
 }  # fmt: skip
-# what the time scheme itself takes, and material that is removed: only where it is asked about
-SCHEME = {"algorithmic": 1.0, "removed_energy": 1.0}
+# what the time scheme itself takes, the tie forces of a cut that is released, and what goes with
+# material that is removed or a state that is projected: only where it is asked about
+SCHEME = {"algorithmic": 1.0, "cut_work": 1.0, "projection": 1.0, "removed_energy": 1.0}
 
 
 @dataclass(frozen=True)

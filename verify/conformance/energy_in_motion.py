@@ -21,7 +21,7 @@ _GAINED = 0.05
 # of nine times its frequency; a velocity that is half a step late by 1.5 %.
 _NO_RATE = 0.05
 # What no field has: dissipated by the scheme, stored in a ghost penalty, gone with removed cells.
-_STATED = ("algorithmic", "penalty", "removed_energy")
+_STATED = ("algorithmic", "penalty", "removed_energy", "cut_work", "projection")
 
 
 def energy_in_motion(shaken: bool = False) -> Check:

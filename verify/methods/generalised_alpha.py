@@ -152,4 +152,5 @@ class GeneralisedAlpha(NewtonIntegrator):
             new * self._load_at_end(time) + old * before.external,
             new * body.viscous(velocity, end.configuration) + old * before.viscous,
             body.mass.apply(middle),
+            ((0.0, old), (1.0, new)),
         )

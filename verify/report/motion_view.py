@@ -26,6 +26,8 @@ _WORDS = {
     "work_of_loads": "work of the loads",
     "work_of_supports": "work of the supports",
     "damping": "energy that damping took",
+    "cut_work": "energy that the released cut took",
+    "projection": "energy lost where a state is projected",
 }
 Curve = tuple[str, list[float], list[float]]  # solver, times, values
 

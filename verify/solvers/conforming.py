@@ -23,6 +23,7 @@ from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
 from verify.solvers.interface import check_choices
 from verify.solvers.runs import Record, at_rest, repeated
+from verify.solvers.timeline import OPENINGS
 from verify.system import System
 
 # Spectral radii of the reference in linear motion: what jumps excites waves that no mesh resolves.
@@ -71,11 +72,15 @@ class ConformingSolver:
         Of generalised-α at infinite frequency, 0 to 1.
     delay : float
         By which facets behind a blade on its way open late, s.
+    opening : {"late", "swept"}
+        Dynamics: when a blade opens a facet, when it has passed all of it, or ahead of it against
+        forces that fade (docs/theory/dynamics.md).
     """
 
     name = "conforming"
     choices: Mapping[str, Collection[Any]] = {
         "mesh": ("imprinted", "remeshed"), "degree": (1, 2), "scheme": SCHEMES,
+        "opening": OPENINGS,
     }  # fmt: skip
 
     def refuses(self, scene: Scene) -> str | None:
@@ -96,14 +101,15 @@ class ConformingSolver:
         scheme: str = "newmark",
         spectral_radius: float = 0.8,
         delay: float = 0.0,
+        opening: str = "late",
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
-        given = {"mesh": mesh, "degree": degree, "scheme": scheme}
+        given = {"mesh": mesh, "degree": degree, "scheme": scheme, "opening": opening}
         check_choices(self.name, self.choices, given)
 
         def marching(_level: int, size: float) -> Marching:
             largest = scene.analysis.time_step or natural_step(scene, size)
-            return Marching(scheme, largest, spectral_radius, delay)
+            return Marching(scheme, largest, spectral_radius, delay, opening=opening)
 
         size = structure(scene, level)[1]
         return _solve(
@@ -149,7 +155,14 @@ class ReferenceSolver:
         """Return the number of levels of the reference."""
         return scene.reference.levels
 
-    def solve(self, scene: Scene, level: int, repetitions: int = 1, delay: float = 0.0) -> Solution:
+    def solve(
+        self,
+        scene: Scene,
+        level: int,
+        repetitions: int = 1,
+        delay: float = 0.0,
+        opening: str = "late",
+    ) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
         behind = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
         damped = behind or scene.analysis.kinematics == "linear"
@@ -159,7 +172,7 @@ class ReferenceSolver:
 
         def marching(level: int, size: float) -> Marching:
             step = scene.analysis.time_step or natural_step(scene, size * 2**level)
-            return Marching(scheme, step, radius, delay, level)
+            return Marching(scheme, step, radius, delay, level, opening)
 
         degree = scene.reference.degree
         return _solve(

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
 from reference.dynamics_body import MovingBody
-from reference.dynamics_cuts import inherit, opening_times, partly_opened
+from reference.dynamics_cuts import facet_openings, inherit, partly_opened
 from reference.dynamics_ledger import Ledger, momenta_of
+from reference.dynamics_release import Hold, parted_nodes
 from reference.dynamics_step import Scheme, State, Stepper, generalised_alpha, implicit_euler
 from reference.fracture.pressure import MIXED
 from reference.moduli import wave_speed
@@ -46,6 +47,8 @@ class Marching:
         By which facets on tool paths open late, s.
     halvings : int
         As of `timeline.march`.
+    opening : {"late", "swept"}
+        When facets behind a blade open; see docs/theory/dynamics.md.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Marching:
     spectral_radius: float = 0.8
     delay: float = 0.0
     halvings: int = 0
+    opening: str = "late"
 
     def scheme(self) -> tuple[Scheme, bool]:
         """Give the scheme, and whether the internal force is the mean of a step."""
@@ -110,8 +114,9 @@ class TiedMotion:
         with record.timed("loading"):
             self.body = MovingBody(scene, space, exact, pressure)
             self.facing = facing_nodes(space)
-            self.opening = opening_times(scene, space.mesh, marching.delay)
-            self.closed = np.ones(len(self.opening), dtype=bool)
+            swept = marching.opening == "swept"
+            self.opening = facet_openings(scene, space, self.facing, swept, marching.delay)
+            self.closed = np.ones(len(self.opening.times), dtype=bool)
             self.planned = self._plan()
         self.ledger, self.account = Ledger(), Account()
         self.steppers: dict[float, Stepper] = {}
@@ -177,7 +182,7 @@ class TiedMotion:
     def open(self, time: float) -> bool:
         """Untie what the cuts have passed at a time."""
         self.state.time = time  # without the round-off of the sum of steps
-        return self._untie(time)
+        return self._untie(self.opening.times, time)
 
     def begin(self) -> None:
         """Take up what jumps: velocities of supports, and accelerations."""
@@ -204,7 +209,8 @@ class TiedMotion:
             found.acceleration = self.body.accelerations(self._unbalanced(found.time))
         self.outputs.append(found)
         energies = self.ledger.state(self.body, self.state)
-        self.account.enter(energies, self.ledger.done, *momenta_of(self.body, self.state))
+        turned = self.ledger.turned + 0.0 * momenta_of(self.body, self.state)[1]
+        self.account.enter(energies, self.ledger.done, *momenta_of(self.body, self.state), turned)
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""
@@ -228,23 +234,40 @@ class TiedMotion:
         """
         if self.scene.analysis.kinematics != "linear" or self.body.iterates:
             return False
-        lasting = lasting_ties(self.facing, self.opening)
+        lasting = lasting_ties(self.facing, self.opening.times)
         ties = lasting.size // 2 * self.space.dimension
         step = self.marching.largest / 2**self.marching.halvings
-        openings = len(np.unique(np.ceil(self.opening / step)))
+        openings = len(np.unique(np.ceil(self.opening.times / step)))
         if not 0 < ties <= min(_MOST_TIES, _SOLVES * openings):
             return False
         self.body.plan(lasting)
         return True
 
-    def _untie(self, time: float) -> bool:
-        due = self.closed & (self.opening <= time + self.timeline.close)
+    def _untie(self, times: Array, time: float) -> bool:
+        """Untie the facets whose times have come; hold the nodes that these let go."""
+        due = self.closed & (times <= time + self.timeline.close)
         if not due.any():
             return False
         with self.record.timed("loading"):
-            self._tie(self.closed & ~due)
+            if self.opening.shares is None or times is self.opening.passed:
+                self._tie(self.closed & ~due)
+            else:
+                self._release(self.closed & ~due, time)
         self.openings += 1
         return True
+
+    def _release(self, closed: NDArray[np.bool_], time: float) -> None:
+        """Untie all but what stays closed, and hold what is let go as it was held until now."""
+        body, shares = self.body, self.opening.shares
+        assert shares is not None
+        before, acceleration = body.ties.leader, body.accelerations(self._unbalanced(self._later))
+        self._tie(closed)
+        nodes = parted_nodes(before, body.ties.leader)
+        forces = body.mass @ acceleration - self._unbalanced(self._later)
+        forces[body.held] = 0.0
+        fading = shares.fading(self.opening.place[nodes], time, self.timeline.close)
+        hold = Hold(nodes, forces.reshape(-1, self.space.dimension)[nodes], fading.at)
+        body.holds.add(hold, time)
 
     def _tie(self, closed: NDArray[np.bool_]) -> None:
         self.closed = closed
@@ -256,7 +279,7 @@ class TiedMotion:
         """State at the time 0, before what opens then."""
         initial, body, d = self.scene.initial, self.body, self.space.dimension
         balanced = isinstance(initial, Equilibrium)
-        if not (starts_open(initial) and self._untie(0.0)):
+        if not (starts_open(initial) and self._untie(self.opening.passed, 0.0)):
             self._tie(self.closed)
         u, v = np.zeros((2, self.space.node_points.size))
         if isinstance(initial, Moving):

@@ -26,7 +26,7 @@ from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import Record, check_steps, repeated
-from verify.solvers.timeline import timeline_of
+from verify.solvers.timeline import OPENINGS, timeline_of
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import solution_on, springs_left_out
 from verify.solvers.xfem_static import Law, solve_equilibrium
@@ -55,12 +55,13 @@ class MethodSolver:
     scheme : str
         Dynamics: as of the solver ``xfem``.
     step_factor, spectral_radius : float
-        Dynamics: as of the solver ``xfem``.
+    opening : {"late", "swept"}
+        Dynamics: as of the solver ``xfem``; cells that are removed are so late.
     further parameters
         Those of the method, in `verify.methods`.
     """
 
-    choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES}
+    choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES, "opening": OPENINGS}
     _law: Law = InternalForce
 
     def __init__(self, name: str) -> None:
@@ -93,6 +94,7 @@ class MethodSolver:
         scheme: str = "newmark",
         step_factor: float = 0.9,
         spectral_radius: float = 0.8,
+        opening: str = "late",
         **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`.
@@ -109,14 +111,16 @@ class MethodSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        check_choices(self.name, self.choices, {"scheme": scheme})
+        check_choices(self.name, self.choices, {"scheme": scheme, "opening": opening})
+        if opening != "late" and self._method.startswith("removal"):
+            raise InputError("cells are removed behind the blade; expected opening = 'late'")
         check_steps(load_steps, step_factor)
         self._check(scene, scheme, parameters)
         marching = Marching(scheme, step_factor, spectral_radius)
 
         def run(mesh: tuple[SimplexMesh, float], trial: bool) -> Solution:
             if scene.analysis.kind == "dynamic":
-                return self._moved(scene, *mesh, marching, parameters, trial)
+                return self._moved(scene, *mesh, marching, opening, parameters, trial)
             return self._at_rest(scene, *mesh, load_steps, parameters)
 
         with errors_of_scene(scene):
@@ -156,6 +160,7 @@ class MethodSolver:
         mesh: SimplexMesh,
         size: float,
         marching: Marching,
+        rule: str,
         parameters: dict[str, Any],
         trial: bool,
     ) -> Solution:
@@ -172,7 +177,7 @@ class MethodSolver:
             return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
         timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline)
+        openings = openings_of(scene, size, timeline, rule)
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
         motion = CutMotion(scene, timeline, opening, marching, exact_of(scene), record)
         phantom, fields = motion.run(trial)
@@ -222,7 +227,7 @@ class MassSpringSolver(MethodSolver):
     """
 
     choices: Mapping[str, Collection[str]] = {
-        "scheme": SCHEMES, "cut": METHODS, "fit": ("fitted", "van_gelder"),
+        "scheme": SCHEMES, "opening": OPENINGS, "cut": METHODS, "fit": ("fitted", "van_gelder"),
     }  # fmt: skip
 
     def __init__(self) -> None:

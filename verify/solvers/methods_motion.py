@@ -10,7 +10,9 @@ from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody, make_body
 from verify.methods.opening import Seams, seams_of, welded
 from verify.solution import Regularisation
-from verify.solvers.openings_of_scene import Openings
+from verify.solvers.motion_of_scene import Fade
+from verify.solvers.openings_of_scene import Opened, Openings
+from verify.solvers.xfem_motion import RULES
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
 from verify.xfem.inherit import ancestors
@@ -71,36 +73,39 @@ class MethodOpening:
         openings: Openings,
     ) -> None:
         self.removal = method.startswith("removal")
-        self.rule = _RULES.get(method, "cells as a whole, when the blade has crossed them through")
+        self.rule = _RULES.get(method, RULES[openings.rule])
         self.mesh, self.openings = mesh, openings
         self._method, self._parameters, self._inertia = method, parameters, inertia
         self._bodies: dict[int, CutBody] = {}  # by the identity of their mesh
         self._seams: Seams | None = None
-        self._seam_times = np.empty(0)
-        self._opening = np.empty((0, 0))
+        self._place: NDArray[np.int64]
+        self._opened = Opened(np.empty(0), np.empty(0), None)
 
     def events(self) -> _Floats:
         """Return the times at which something opens, s."""
         self.final = self._kept_body(self._made(np.inf))
         if self._method in _WELDED:
             self._seams = seams_of(self.final.phantom)
-            self._seam_times = self.openings.of_seams(self._seams.points)
-            return np.unique(self._seam_times)
-        return np.unique(self._opening[~np.isnan(self._opening)])
+            _, place = np.unique(self.final.phantom.node_points, axis=0, return_inverse=True)
+            self._place = place.ravel()
+            at = self._place[self._seams.one]
+            self._opened = self.openings.of_seams(self._seams.points, at)
+        return self._opened.events()
 
-    def at(self, time: float) -> PhantomMesh:
-        """Return the body as far as the cuts have come at a time."""
+    def at(self, time: float, passed: bool = False) -> PhantomMesh:
+        """Return the body as far as it is open at a time, or as far as blades have passed it."""
         if self._seams is not None:
-            closed = self._seam_times > time
+            closed = ~self._opened.until(time, passed)
             if not closed.any():
                 return self.final.phantom
             phantom = welded(self.final.phantom, self._seams, closed)
             shown, origin = self.final.conforming, self.final.cell_origin
             body = make_body(self.mesh, phantom, conforming=shown, cell_origin=origin)
             return self._kept_body(body).phantom
-        if self._method == "uncut" or not (self._opening > time).any():
+        all_open = self._opened.until(np.inf, passed)
+        if self._method == "uncut" or (self._opened.until(time, passed) == all_open).all():
             return self.final.phantom
-        return self._kept_body(self._made(time)).phantom
+        return self._kept_body(self._made(time, passed)).phantom
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a body that `at` has returned."""
@@ -127,19 +132,27 @@ class MethodOpening:
         source[new.cells] = old.cells[place]
         return source
 
+    def fading(self, new: PhantomMesh) -> Fade | None:
+        """Return the factors of the forces at dof nodes that are released."""
+        place = new.node_parent
+        if self._seams is not None:
+            place = np.empty(new.node_count, dtype=np.int64)
+            place[new.cells] = self._place[self.final.phantom.cells]
+        return self._opened.fade(place)
+
     def regularisations(self) -> list[Regularisation]:
         """Return nothing: what a method changed is said by its body."""
         return []
 
-    def _made(self, time: float) -> CutBody:
+    def _made(self, time: float, passed: bool = False) -> CutBody:
         """Make the body that the method cuts as far as the cuts have come at a time."""
         given = (self.mesh, self.openings.cuts)
         if self._method in (*_WELDED, "uncut"):
             return METHODS[self._method](*given, **self._parameters)
 
         def opened(cut: PhantomMesh) -> _Bools:
-            self._opening = self.openings.of_cells(cut)
-            return self._opening <= time
+            self._opened = self.openings.of_cells(cut)
+            return self._opened.until(time, passed)
 
         return METHODS[self._method](*given, **self._parameters, opened=opened)
 

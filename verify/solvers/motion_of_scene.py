@@ -33,9 +33,12 @@ from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
+from verify.xfem.release import hold_released
 from verify.xfem.supports import check_bodies
 
 _Floats = NDArray[np.float64]
+# dof nodes and the time at which they are let go, to factors over time
+Fade = Callable[[NDArray[np.int64], float], Callable[[float], _Floats]]
 
 
 class OpeningBody(Protocol):
@@ -61,8 +64,8 @@ class OpeningBody(Protocol):
     def events(self) -> _Floats:
         """Return the times at which something opens, s; asked for once, before all else."""
 
-    def at(self, time: float) -> PhantomMesh:
-        """Cut the body as far as the cuts have come at a time, in s."""
+    def at(self, time: float, passed: bool = False) -> PhantomMesh:
+        """Cut the body as far as it is open at a time, in s, or as far as blades have passed it."""
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a body that `at` has returned."""
@@ -72,6 +75,9 @@ class OpeningBody(Protocol):
 
     def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
         """Corner of an old body from which each corner of one that is cut further comes."""
+
+    def fading(self, new: PhantomMesh) -> Fade | None:
+        """Factors of the forces that hold released nodes of a body; None: all is let go at once."""
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was changed in the body that was made last."""
@@ -132,11 +138,13 @@ class CutMotion:
         with record.timed(opening.phase):
             self._events = opening.events()
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
-        self._opened = -np.inf if closed_before else timeline.close
         self._account = StagedAccount(opening.removal)
         self._outputs: list[_Output] = []
         self._solves = 0
-        body = self._made(self._opened)
+        start = -np.inf if closed_before else timeline.close
+        body = self._made(start, passed=True)
+        at_once = opening.fading(body.force.phantom) is None
+        self._entered = start if at_once else -np.inf  # events until then are taken up
         with record.timed("initial state"):
             state = _initial_state(scene, body, exact)
         self._take(body, state)
@@ -183,11 +191,15 @@ class CutMotion:
 
     def open(self, time: float) -> bool:
         """Cut the body as far as the cuts have come at a time, and hand the state on."""
-        before, self._opened = self._opened, time + self.timeline.close
-        if not np.any((self._events > before) & (self._events <= self._opened)):
+        before, self._entered = self._entered, time + self.timeline.close
+        if not np.any((self._events > before) & (self._events <= self._entered)):
             return False
-        further = self._made(self._opened)
-        state = self.opening.inherited(self.body.force.phantom, self.state, further)
+        old, further = self.body.force.phantom, self._made(self._entered)
+        state = self.opening.inherited(old, self.state, further)
+        new = further.force.phantom
+        if (fade := self.opening.fading(new)) is not None:
+            source = self.opening.source(old, new)
+            hold_released(self.body, self.state, further, state, source, fade)
         self._leave()
         self._account.open(self.body, self.state, further, state)
         self._take(further, state)
@@ -215,9 +227,9 @@ class CutMotion:
             self._recorder.record(self.state, forces)
         self._taken += 1
 
-    def _made(self, time: float) -> DynamicBody:
+    def _made(self, time: float, passed: bool = False) -> DynamicBody:
         with self.record.timed(self.opening.phase):
-            phantom = self.opening.at(time)
+            phantom = self.opening.at(time, passed)
         with self.record.timed("loading"):
             return _body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
 

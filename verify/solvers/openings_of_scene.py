@@ -1,11 +1,14 @@
 """Times from which on the cuts of a moving scene have opened what, on any mesh that is cut."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Scene, ToolPathCut
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.timeline import Timeline
@@ -13,6 +16,48 @@ from verify.xfem.cuts import Cut
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Opened:
+    """When pieces (elements, or facets of a finished mesh) open.
+
+    Attributes
+    ----------
+    times, passed : (p, ...) array
+        When each opens, and when the blade has passed all of it, s; NaN: never.
+    shares : SweptShares or None
+        Of the nodes that are let go; None where all of them is released at once.
+    close : float
+        Times that differ by no more are one, s.
+    """
+
+    times: _Floats
+    passed: _Floats
+    shares: SweptShares | None
+    close: float = 0.0
+
+    def until(self, time: float, passed: bool = False) -> NDArray[np.bool_]:
+        """Return which pieces are open at a time, or passed by then."""
+        return np.asarray((self.passed if passed else self.times) <= time)
+
+    def fade(self, place: _Ints) -> Callable[[_Ints, float], Callable[[float], _Floats]] | None:
+        """Return what makes the factors of the forces that hold released dof nodes.
+
+        Parameters
+        ----------
+        place : (N,) int array
+            The node of the shares that each dof node is at.
+        """
+        shares, close = self.shares, self.close
+        if shares is None:
+            return None
+        return lambda nodes, time: shares.fading(place[nodes], time, close).at
+
+    def events(self) -> _Floats:
+        """Return the times at which something opens, ascending, s."""
+        return np.unique(self.times[~np.isnan(self.times)])
 
 
 @dataclass(frozen=True)
@@ -29,77 +74,114 @@ class Openings:
         The same as level sets.
     times : list of float
         When each opens as a whole, s; of a tool path not read.
+    rule : str
+        One of `verify.solvers.timeline.OPENINGS`.
+    close : float
+        Times that differ by no more are one, s.
     """
 
     asked: list[Any]
     cuts: list[Cut]
     times: list[float]
+    rule: str = "late"
+    close: float = 0.0
 
-    def of_cells(self, phantom: PhantomMesh) -> _Floats:
-        """Return when each cut opens each cell that it splits: (m, cuts), NaN elsewhere, s.
+    def of_cells(self, phantom: PhantomMesh) -> Opened:
+        """Return when each cut opens each cell that it splits: (m, cuts).
 
-        A tool path opens a cell when the blade has passed all points at which it crosses an edge
-        of it: the cell is then crossed through. Other cuts open all their cells at once.
+        A cell is passed with all points at which the cut crosses an edge of it: it is then crossed
+        through. Cuts that are no tool paths open all their cells at once.
 
         Parameters
         ----------
         phantom : PhantomMesh
             The mesh with all of them.
         """
-        found = np.full((len(phantom.mesh.cells), len(self.asked)), np.nan)
+        shares = self._none_swept(len(phantom.mesh.cells))
+        times, passed = np.full((2, len(phantom.mesh.cells), len(self.asked)), np.nan)
         for k, cut in enumerate(self.asked):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             if isinstance(cut, ToolPathCut):
-                found[cells, k] = _passed(cut, phantom, cells, k)
+                sections = _sections(phantom, cells, k)
+                times[:, k], passed[:, k] = shares.add(sections, cut.passed_at)
             else:
-                found[cells, k] = self.times[k]
-        return found
+                times[cells, k] = passed[cells, k] = self.times[k]
+        return self._by_rule(times, passed, shares)
 
-    def of_seams(self, seams: _Floats) -> _Floats:
-        """Return when seams (k, d, space) open, given by their corners: (k,), s.
+    def of_seams(self, seams: _Floats, node: _Ints) -> Opened:
+        """Return when seams (k, d, space) open, given by their corners: (k,).
 
-        A tool path opens a seam when the blade has passed all corners of it, another cut at once.
-        A seam is of the cut to which its corners and its middle are nearest: nodes may be off it.
+        A tool path has passed a seam with all its corners, another cut opens it at once. A seam is
+        of the cut to which its corners and its middle are nearest: nodes may be off it.
+
+        Parameters
+        ----------
+        seams : (k, d, space) array
+        node : (k, d) int array
+            Number of the place of each corner.
         """
         count, corners, space = seams.shape
+        shares = self._none_swept(count)
         if not count:
-            return np.empty(0)
+            return Opened(np.empty(0), np.empty(0), None)
         middles = seams.mean(axis=1, keepdims=True)
         places = np.concatenate([seams, middles], axis=1).reshape(-1, space)
         off = np.stack(
             [np.maximum(np.abs(cut.level_set(places)), -cut.depth(places)) for cut in self.cuts]
         )
         nearest = off.reshape(len(self.cuts), count, corners + 1).max(axis=2).argmin(axis=0)
-        found = np.array(self.times)[nearest]
+        times, passed = np.tile(np.array(self.times)[nearest], (2, 1))
         for k, cut in enumerate(self.asked):
             mine = np.flatnonzero(nearest == k)
             if isinstance(cut, ToolPathCut) and len(mine):
-                passed = cut.passed_at(seams[mine].reshape(-1, space))
-                found[mine] = passed.reshape(len(mine), corners).max(axis=1)
-        return found
+                shape = np.broadcast_to(np.eye(corners), (len(mine), corners, corners))
+                simplices = CutSimplices(seams[mine], mine, node[mine], shape)
+                one, other = shares.add(simplices, cut.passed_at)
+                times[mine], passed[mine] = one[mine], other[mine]
+        return self._by_rule(times, passed, shares)
+
+    def _none_swept(self, pieces: int) -> SweptShares:
+        return SweptShares(pieces, 1) if self.rule == "late" else SweptShares(pieces)
+
+    def _by_rule(self, times: _Floats, passed: _Floats, shares: SweptShares) -> Opened:
+        if self.rule == "late":
+            return Opened(passed, passed, None)
+        return Opened(times, passed, shares if shares.used else None, self.close)
 
 
-def openings_of(scene: Scene, size: float, timeline: Timeline) -> Openings:
-    """Return when the cuts of a moving scene open on a mesh of a size, in m."""
+def openings_of(scene: Scene, size: float, timeline: Timeline, rule: str) -> Openings:
+    """Return when the cuts of a moving scene open on a mesh of a size, in m, by a rule."""
     order, cuts = np.argsort(timeline.opens, kind="stable"), cuts_of(scene, size)
     return Openings(
         [scene.cuts[k] for k in order],
         [cuts[k] for k in order],
         timeline.opens[order].tolist(),
+        rule,
+        timeline.close,
     )
 
 
-def _passed(cut: ToolPathCut, phantom: PhantomMesh, cells: NDArray[np.int64], k: int) -> _Floats:
-    """(c,) time at which the blade has passed all points where it crosses edges of the cells."""
-    corners = phantom.mesh.cells[cells]
-    value = phantom.level_sets[:, k]
-    latest = np.full(len(cells), -np.inf)
-    for a, b in zip(*np.triu_indices(corners.shape[1], 1), strict=True):
-        one, other = value[corners[:, a]], value[corners[:, b]]
-        crossed = np.flatnonzero((one >= 0.0) != (other >= 0.0))
-        share = (one / (one - np.where(one == other, np.inf, other)))[crossed, None]
-        ends = phantom.mesh.points[corners[crossed][:, [a, b]]]
-        places = (1.0 - share) * ends[:, 0] + share * ends[:, 1]
-        if len(places):
-            latest[crossed] = np.maximum(latest[crossed], cut.passed_at(places))
-    return latest
+def _sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
+    """Sections of cells by the zero level of a cut, with the shape functions of their nodes."""
+    nodes = phantom.mesh.cells[cells]
+    value = phantom.level_sets[nodes, k]
+    corners = nodes.shape[1]
+    above = value >= 0.0
+    owner, shapes = [], []
+    for signs in product((False, True), repeat=corners):
+        rows = np.flatnonzero((above == signs).all(axis=1))
+        plus, minus = np.flatnonzero(signs), np.flatnonzero(~np.array(signs))
+        # around the section: two edges that follow each other share a face
+        edges = [(a, b) for n, a in enumerate(plus) for b in (minus if n % 2 == 0 else minus[::-1])]
+        points = np.zeros((len(edges), len(rows), corners))
+        for (a, b), shape in zip(edges, points, strict=True):
+            share = value[rows, a] / (value[rows, a] - value[rows, b])
+            shape[:, a], shape[:, b] = 1.0 - share, share
+        for parts in combinations(range(1, len(edges)), corners - 2):
+            if len(edges) == 4 and parts[1] - parts[0] != 1:
+                continue  # a quadrilateral is two triangles
+            owner.append(rows)
+            shapes.append(points[[0, *parts]].transpose(1, 0, 2))
+    row, shape = np.concatenate(owner), np.concatenate(shapes)
+    points = shape @ phantom.mesh.points[nodes[row]]
+    return CutSimplices(points, cells[row], nodes[row], shape)

@@ -14,6 +14,7 @@ _DONE = {
     "damping": "damping",
     "algorithmic": "algorithmic",
     "unbalanced": "unbalanced",
+    "cut_work": "cut_work",
 }
 
 
@@ -29,6 +30,8 @@ class StagedAccount(Account):
     def __init__(self, removal: bool = False) -> None:
         super().__init__()
         self._done = dict.fromkeys(_DONE.values(), 0.0)
+        self._turned: float | _Floats = 0.0  # angular impulse of tie forces, N m s
+        self._projection = 0.0
         self._removed = dict.fromkeys(("removed_energy", "removed_mass") if removal else (), 0.0)
         self._penalty: list[float] = []
 
@@ -36,25 +39,26 @@ class StagedAccount(Account):
         """Enter the rows of a stage that are asked for, and keep what it has done in all."""
 
         def done(k: int) -> dict[str, float]:
-            return {
+            found = {
                 name: self._done[name] + float(getattr(ledger, column)[k])
                 for column, name in _DONE.items()
             }
+            return {**found, "projection": self._projection}
 
         for k in instants:
             state = {n: float(getattr(ledger, n)[k]) for n in ("kinetic", "strain", "gravity")}
             momenta = ledger.momentum[k], ledger.angular_momentum[k]
-            self.enter(state, done(k), *momenta, self._removed)
+            self.enter(state, done(k), *momenta, self._turned + ledger.cut_turn[k], self._removed)
             self._penalty.append(float(ledger.penalty[k]))
-        self._done = done(-1)
+        self._done, self._turned = done(-1), self._turned + ledger.cut_turn[-1]
 
     def open(
         self, body: DynamicBody, state: MotionState, further: DynamicBody, inherited: MotionState
     ) -> None:
         """Enter the energy that is lost where a body that is cut further takes over a state.
 
-        Nothing without a sliver policy and with masses of one part each; what EVS and GEVS gain or
-        lose is the scheme's, like what a step dissipates.
+        Nothing without a sliver policy and with masses of one part each. What a policy loses by
+        its projection has an entry of its own, and what EVS and GEVS gain or lose with it.
         What is removed takes its energy and its mass with it.
         """
         before, after = (
@@ -67,7 +71,7 @@ class StagedAccount(Account):
                 body.mass.weights.sum() - further.mass.weights.sum()
             )
         else:
-            self._done["algorithmic"] += before - after
+            self._projection += before - after
 
     def columns(self) -> dict[str, _Floats]:
         """All entries (t,) by name; with the share of a ghost penalty in the strain energy."""

@@ -12,6 +12,12 @@ from verify.scene import Scene, ToolPathCut
 from verify.scene.history import jumps
 
 Array = NDArray[np.float64]
+
+# A tool path opens a piece when the blade has passed all of it, and releases it at once; or as soon
+# as the blade sweeps a cut in the support of a node of it, against forces that fade with the swept
+# share (docs/theory/dynamics.md).
+OPENINGS = ("late", "swept")
+
 _ROUND_OFF = 1e-14  # of a time that steps have added up to
 _CLOSE = 1e-9  # of the duration: times that close are one, steps added up are off by less
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from reference.exact import exact_of
 from verify.accelerated import FAST
-from verify.errors import UnsupportedSceneError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, errors_of_scene
@@ -19,7 +19,7 @@ from verify.solvers.motion_of_scene import CutMotion, Marching
 from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import Record, check_steps, repeated
 from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.timeline import timeline_of
+from verify.solvers.timeline import OPENINGS, timeline_of
 from verify.solvers.xfem_answer import joined, solution_on, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
@@ -38,6 +38,7 @@ _CHOICES: Mapping[str, Collection[str]] = {
     "scheme": SCHEMES,
     "mass": MASSES,
     "kernels": _KERNELS,
+    "opening": OPENINGS,
 }
 
 
@@ -59,12 +60,18 @@ class _Parameters:
     step_factor: float = 0.9
     spectral_radius: float = 0.8
     kernels: str = "fast"
+    opening: str = "late"
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in _CHOICES}
         check_choices(XfemSolver.name, _CHOICES, given)
         check_steps(self.load_steps, self.step_factor)
         self.marching()  # it checks its own
+        if self.opening != "late" and self.slivers in ("merge", "drop"):
+            raise InputError(
+                f"opening = '{self.opening}' with slivers = '{self.slivers}', whose unknowns are "
+                "not those of before parted; expected slivers = 'keep' or 'penalise'"
+            )
 
     def cutting(self) -> Cutting:
         """Return those of a body that is cut on its way."""
@@ -112,6 +119,9 @@ class XfemSolver:
     step_factor : float
         Dynamics: share of the critical step that an explicit scheme takes at most, and an
         implicit one if the scene states no time step.
+    opening : {"late", "swept"}
+        Dynamics: when a blade opens an element, when it has passed all of it, or ahead of it
+        against forces that fade (docs/theory/dynamics.md).
     kernels : {"fast", "plain"}
         Operations of `verify.accelerated`, or those that `verify.xfem` does alone.
     """
@@ -210,7 +220,7 @@ def _run(
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
         timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline)
+        openings = openings_of(scene, size, timeline, given.opening)
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
         motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)

@@ -10,7 +10,8 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.cuts_of_scene import to_cut
-from verify.solvers.openings_of_scene import Openings
+from verify.solvers.motion_of_scene import Fade
+from verify.solvers.openings_of_scene import Opened, Openings
 from verify.solvers.supports_of_scene import motion_of_supports
 from verify.solvers.xfem_answer import penalised, treated
 from verify.solvers.xfem_system import elasticity_of, mass_of
@@ -24,6 +25,12 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 _Floats = NDArray[np.float64]
+
+
+RULES = {
+    "late": "elements as a whole, when the blade has crossed them through",
+    "swept": "elements ahead of the blade, held by forces that fade with what it has swept",
+}
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,6 @@ class XfemOpening:
     """
 
     removal = False
-    rule = "elements as a whole, when the blade has crossed them through"
     phase = "enrichment"
 
     def __init__(
@@ -58,21 +64,22 @@ class XfemOpening:
     ) -> None:
         self.scene, self.openings, self.exact = scene, openings, exact
         self.cutting, self.mass = cutting, cutting.mass
+        self.rule = RULES[openings.rule]
         self._to_cut = to_cut(mesh, openings.cuts, cutting.tip)
-        self._opening = np.empty((0, 0))
+        self._opened: Opened
         self._slivers: list[Regularisation] = []
         self._penalised: list[Regularisation] = []
 
     def events(self) -> _Floats:
         """Return the times at which something opens, s."""
         mesh, cuts, rule, _ = self._to_cut
-        self._opening = self.openings.of_cells(cut_mesh(mesh, cuts, rule))
-        return np.unique(self._opening[~np.isnan(self._opening)])
+        self._opened = self.openings.of_cells(cut_mesh(mesh, cuts, rule))
+        return self._opened.events()
 
-    def at(self, time: float) -> PhantomMesh:
+    def at(self, time: float, passed: bool = False) -> PhantomMesh:
         """Cut the mesh where the cuts have opened it at a time, and treat its slivers."""
         mesh, cuts, rule, _ = self._to_cut
-        phantom = cut_mesh(mesh, cuts, rule, self._opening <= time)
+        phantom = cut_mesh(mesh, cuts, rule, self._opened.until(time, passed))
         phantom, self._slivers = treated(
             phantom,
             self.cutting.slivers,
@@ -107,6 +114,10 @@ class XfemOpening:
     def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
         """Corner of an old body from which each corner of one that is cut further comes."""
         return ancestors(old, new)
+
+    def fading(self, new: PhantomMesh) -> Fade | None:
+        """Return the factors of the forces at dof nodes that are released."""
+        return self._opened.fade(new.node_parent)
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was done to ends of cuts and to slivers."""

@@ -117,6 +117,9 @@ class DynamicBody:
     supports : Supports or MovingSupports, optional
         Without it the body is free.
     damping : RayleighDamping
+    tie : callable, optional
+        Nodal forces (N, d) at a time that still hold what a cut has parted; see
+        `verify.xfem.release`. Their work has an entry of its own.
 
     Attributes
     ----------
@@ -152,6 +155,7 @@ class DynamicBody:
     load: Callable[[float], Floats] | None = None
     supports: Supports | MovingSupports | None = None
     damping: RayleighDamping = field(default_factory=RayleighDamping)
+    tie: Callable[[float], Floats] | None = None
 
     def __post_init__(self) -> None:
         phantom = self.force.phantom
@@ -229,7 +233,7 @@ class DynamicBody:
         return self.supports.values, np.zeros(self.shape)
 
     def external(self, time: float) -> Floats:
-        """Weight and load (N, d) at a time, in newtons.
+        """Weight, load and tie forces (N, d) at a time, in newtons.
 
         Raises
         ------
@@ -237,12 +241,15 @@ class DynamicBody:
             If the load has a wrong shape.
         """
         assert self.weight is not None
-        if self.load is None:
-            return self.weight
-        load = self.load(time)
-        if np.shape(load) != self.shape:
-            raise XfemError(f"load of shape {np.shape(load)} at t={time:g}; expected {self.shape}")
-        return self.weight + load
+        total = self.weight
+        if self.load is not None:
+            load = self.load(time)
+            if np.shape(load) != self.shape:
+                raise XfemError(
+                    f"load of shape {np.shape(load)} at t={time:g}; expected {self.shape}"
+                )
+            total = total + load
+        return total if self.tie is None else total + self.tie(time)
 
     def viscous(self, velocity: Floats, at: Configuration | None) -> Floats:
         """Damping force C v (N, d), K with the rotations of a configuration.
@@ -271,12 +278,16 @@ class StepForces:
     internal, external, viscous : (N, d) float array
     inertia : (N, d) float array, optional
         What the step has balanced with them, where that is not M (v₁ − v₀)/h.
+    loaded_at : tuple of (share, weight)
+        Instants of the step, as shares of it, at which the external forces are those of the body,
+        and the weight of each.
     """
 
     internal: Floats
     external: Floats
     viscous: Floats
     inertia: Floats | None = None
+    loaded_at: tuple[tuple[float, float], ...] = ((0.0, 0.5), (1.0, 0.5))
 
 
 class Integrator(Protocol):

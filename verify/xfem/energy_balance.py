@@ -34,11 +34,13 @@ class EnergyBalance:
     load_work, support_work : done on the body since the start, in J
     damping, algorithmic : dissipated since the start by C, and by the scheme, in J
     unbalanced : energy gained because steps were left unsolved, since the start, in J
+    cut_work : taken since the start by the tie forces of what a cut releases, in J
     momentum : (n + 1, d) linear momentum, in kg m/s
     angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
     impulse : (n + 1, d) of external, viscous and support forces since the start, in N s; by a
         scheme with an inertia p of its own the momentum differs from it by Σ (M Δv − h p)
     penalty : share of a ghost penalty in the strain energy, in J
+    cut_turn : (n + 1, 1 or 3) angular impulse of the tie forces since the start, in N m s
     """
 
     time: Floats
@@ -50,10 +52,12 @@ class EnergyBalance:
     damping: Floats
     algorithmic: Floats
     unbalanced: Floats
+    cut_work: Floats
     momentum: Floats
     angular_momentum: Floats
     impulse: Floats
     penalty: Floats
+    cut_turn: Floats
 
     @property
     def mechanical(self) -> Floats:
@@ -63,9 +67,8 @@ class EnergyBalance:
     @property
     def balance(self) -> Floats:
         """All other columns together: less `unbalanced`, constant to round-off for every scheme."""
-        return (
-            self.mechanical - self.load_work - self.support_work + self.damping + self.algorithmic
-        )
+        taken = self.damping + self.algorithmic + self.cut_work
+        return self.mechanical - self.load_work - self.support_work + taken
 
     @property
     def drift(self) -> float:
@@ -91,8 +94,9 @@ class BalanceRecorder:
         self._last = state.copy()
         self._strain, self._penalty = self._stored(state)
         space = body.shape[1]
-        self._work = np.zeros(5)  # load, support, damping, algorithmic, unbalanced
+        self._work = np.zeros(6)  # load, support, damping, algorithmic, unbalanced, cut
         self._impulse = np.zeros(space)
+        self._turn = np.zeros(1 if space == 2 else 3)
         self._rows = [self._row(state)]
 
     def record(self, state: MotionState, forces: StepForces) -> None:
@@ -121,12 +125,18 @@ class BalanceRecorder:
         if forces.inertia is not None:
             slip += np.sum(change * (inertia - gained / h))
         assert body.weight is not None
+        tie = np.zeros(body.shape)
+        if body.tie is not None:
+            tie = sum((w * body.tie(last.time + s * h) for s, w in forces.loaded_at), tie)
+            middle = 0.5 * (last.displacement + state.displacement)
+            self._turn = self._turn + h * _cross(body.force.phantom.node_points + middle, tie)
         self._work += [
-            np.sum(change * (forces.external - body.weight)),
+            np.sum(change * (forces.external - body.weight - tie)),
             np.sum(change * reaction) - taken,
             np.sum(change * forces.viscous),
             slip - taken + np.sum(change * forces.internal) - (strain - self._strain),
             np.sum(change * (residual - reaction)),
+            -np.sum(change * tie),
         ]
         self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(
             axis=0
@@ -153,15 +163,16 @@ class BalanceRecorder:
         ]
         angular = _cross(position, momenta)
         vectors = (momenta.sum(axis=0), angular, self._impulse)
-        return np.concatenate([energies, self._work, *vectors, [self._penalty]])
+        return np.concatenate([energies, self._work, *vectors, self._turn, [self._penalty]])
 
     def close(self) -> EnergyBalance:
         """Return the balance so far."""
         table = np.array(self._rows).T
         space = self.body.shape[1]
         turns = 1 if space == 2 else 3
-        momentum, angular, impulse = np.split(table[9:-1].T, [space, space + turns], axis=1)
-        return EnergyBalance(*[*table[:9], momentum, angular, impulse, table[-1]])
+        vectors = np.split(table[10:-1].T, np.cumsum([space, turns, space]), axis=1)
+        momentum, angular, impulse, turn = vectors
+        return EnergyBalance(*[*table[:10], momentum, angular, impulse, table[-1], turn])
 
 
 def _cross(position: Floats, momenta: Floats) -> Floats:

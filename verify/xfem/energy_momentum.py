@@ -289,7 +289,8 @@ class EnergyMomentum(NewtonIntegrator):
         middle = self._start.time + 0.5 * self.step_size
         mean = 0.5 * (self._start.velocity + velocity)
         viscous = self.body.viscous(mean, end.configuration)
-        return StepForces(end.force, self.body.external(middle), viscous)
+        external = self.body.external(middle)
+        return StepForces(end.force, external, viscous, loaded_at=((0.5, 1.0),))
 
     def _ends(self, after: Configuration) -> StepEnds:
         """Both ends of the step."""

@@ -401,7 +401,7 @@ class ImplicitEuler(NewtonIntegrator):
 
     def _forces(self, end: Resistance, velocity: Floats, time: float) -> StepForces:
         viscous = self.body.viscous(velocity, end.configuration)
-        return StepForces(end.force, self._load_at_end(time), viscous)
+        return StepForces(end.force, self._load_at_end(time), viscous, loaded_at=((1.0, 1.0),))
 
 
 class Trapezoidal(NewtonIntegrator):

@@ -73,7 +73,8 @@ class RealTimeEuler:
         force.add_tangent_product(at, change, 1.0, internal)
         if force.is_membrane:
             force.add_tension_product(at, state.velocity - before.velocity, h, internal)
-        return StepForces(internal, external, self.body.viscous(state.velocity, at))
+        viscous = self.body.viscous(state.velocity, at)
+        return StepForces(internal, external, viscous, loaded_at=((1.0, 1.0),))
 
     def advance(self, state: MotionState) -> None:
         """Advance by one step without accounting for the forces: the hot path.

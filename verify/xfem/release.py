@@ -1,0 +1,147 @@
+"""Release of dof nodes that a cut parts: the forces that held them together fade away.
+
+A dof node of the old body that several of the new one descend from is let go. Each of these is
+held on by a dead force r_i = M_i a + f_int + f_visc − f_ext with the acceleration of before, so
+that no acceleration jumps; Σ r_i = 0, as the old node was in balance. The force fades with a
+factor from 1 to 0 and takes the energy that the cut sets free (Menouillard & Belytschko, Int. J.
+Numer. Meth. Engng 81, 2010, for nodes of a mesh). Its couple δ × r turns a body; that is accounted
+for. Released at once (a factor of 0) the energy is left as waves of the length of an element.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from verify.xfem.arrays import Floats, Ints
+from verify.xfem.body import DynamicBody, FreeMass, MotionState
+from verify.xfem.errors import XfemError
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Dead forces of one release.
+
+    Attributes
+    ----------
+    nodes : (k,) int array
+        Dof nodes.
+    forces : (k, d) float array
+        At the release, in newtons.
+    factor : callable
+        Factors (k,) at a time, from 1 to 0.
+    """
+
+    nodes: Ints
+    forces: Floats
+    factor: Callable[[float], Floats]
+
+    def handed_on(self, source: Ints, weights: Floats, time: float) -> "Hold | None":
+        """Give the same of a body that is cut further; None if nothing is left of it.
+
+        Where a node is parted its force is, in proportion to masses: any parts will do, as what
+        the release of its own needs is found with these in place.
+
+        Parameters
+        ----------
+        source : (N,) int array
+            Old dof node of each new one.
+        weights : (N,) float array
+            Masses of the new ones.
+        time : float
+            In s.
+        """
+        left = self.factor(time) > 0.0
+        if not left.any():
+            return None
+        place = np.full(int(source.max(initial=-1)) + 1, -1)
+        place[self.nodes[left]] = np.flatnonzero(left)
+        nodes = np.flatnonzero(place[source] >= 0)
+        row = place[source[nodes]]
+        share = weights[nodes] / np.bincount(row, weights[nodes], len(left))[row]
+        return Hold(nodes, share[:, None] * self.forces[row], _Rows(self.factor, row))
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Some of the factors, in any order."""
+
+    factor: Callable[[float], Floats]
+    row: Ints
+
+    def __call__(self, time: float) -> Floats:
+        return self.factor(time)[self.row]
+
+
+@dataclass(frozen=True)
+class TieForces:
+    """Forces (N, d) of all that is being released, at a time.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (N, d).
+    holds : tuple of Hold
+    """
+
+    shape: tuple[int, int]
+    holds: tuple[Hold, ...]
+
+    def __call__(self, time: float) -> Floats:
+        """Sum the forces at a time."""
+        total = np.zeros(self.shape)
+        for hold in self.holds:
+            total[hold.nodes] += hold.factor(time)[:, None] * hold.forces
+        return total
+
+
+def hold_released(
+    old: DynamicBody,
+    state: MotionState,
+    new: DynamicBody,
+    inherited: MotionState,
+    source: Ints,
+    fading: Callable[[Ints, float], Callable[[float], Floats]],
+) -> None:
+    """Give a body that is cut further the forces that hold what has been released.
+
+    Parameters
+    ----------
+    old : DynamicBody
+    state : MotionState
+        Of it.
+    new : DynamicBody
+        Its tie forces are set.
+    inherited : MotionState
+        Of it.
+    source : (N,) int array
+        Old dof node of each new one.
+    fading : callable
+        Given some new dof nodes and the time, makes the factors of the forces that hold them.
+
+    Raises
+    ------
+    XfemError
+        If cells are aggregated: their space does not contain the old one.
+    """
+    if old.force.phantom.aggregation is not None or new.force.phantom.aggregation is not None:
+        raise XfemError("release of what is aggregated; expected cells with unknowns of their own")
+    time, holds = state.time, old.tie.holds if isinstance(old.tie, TieForces) else ()
+    kept = [hold.handed_on(source, new.mass.weights, time) for hold in holds]
+    carried = tuple(hold for hold in kept if hold is not None)
+    new.tie = TieForces(new.shape, carried) if carried else None
+    nodes = np.flatnonzero(np.bincount(source, minlength=old.shape[0])[source] > 1)
+    if not len(nodes):
+        return
+    acceleration = FreeMass(old).solve(-_resisting(old, state))
+    forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
+    forces[new.fixed] = 0.0
+    hold = Hold(nodes, forces[nodes], fading(nodes, time))
+    new.tie = TieForces(new.shape, (*carried, hold))
+
+
+def _resisting(body: DynamicBody, state: MotionState) -> Floats:
+    """Sum internal and viscous less external forces (N, d) of a state."""
+    at = body.force.configuration(state.displacement)
+    internal, _ = body.force.evaluate_at(at)
+    return internal + body.viscous(state.velocity, at) - body.external(state.time)
