@@ -56,7 +56,7 @@ def add_study_command(add: Add) -> None:
             )  # fmt: skip
         if name == "calibration":
             kind.add_argument(
-                "--seed", metavar="N", type=seed, default=29, help="of the scenes (default: 29)"
+                "--seed", metavar="N", type=seed, default=30, help="of the scenes (default: 30)"
             )
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")
         add_out(kind)

@@ -21,9 +21,6 @@ COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked
 WASTED = 10.0  # an error bar that is so many times the error judges little
 SIGNIFICANCE = 0.05  # of the binomial test that rejects a share
 FEWEST, FEWEST_SCENES = 60, 15  # triples and scenes of a family from which a share says something
-SEED = (
-    28  # of the judged run; the rules were made with seed 0, and 27 was judged by the ones before
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +48,7 @@ class CalibrationStudy(Study):
 
 
 def calibration_study(
-    quick: bool, announce: Callable[[str], None], seed: int = SEED, directory: Path | None = None
+    quick: bool, announce: Callable[[str], None], seed: int, directory: Path | None = None
 ) -> CalibrationStudy:
     """Have the reference state its uncertainty where its true error is known.
 
