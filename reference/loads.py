@@ -14,7 +14,7 @@ from reference.nodal_algebra import nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, faces_of, is_uniform
-from verify.scene.part_pieces import Pieces, pieces_on_part
+from verify.scene.parts import Pieces, pieces_on_part
 from verify.scene.physics import field_values
 
 Array = NDArray[np.float64]
@@ -208,7 +208,7 @@ def cut_facets_of(scene: Scene, space: ConformingSpace, load: CutFaces, key: str
     rest = np.array([[c for c in range(k + 1) if c != j] for j in range(k + 1)])
     corners = mesh.points[mesh.cells[cell[:, None], rest[opposite]]]
     middle = corners.mean(axis=1)
-    found = faces_of(scene, middle)
+    found = faces_of(scene.cuts, middle)
     mine = found.cut == next(i for i, cut in enumerate(scene.cuts) if cut.name == load.cut)
     if not mine.any() and scene.analysis.kind == "static":
         raise InputError(f"{key}: cut '{load.cut}' has no face in the body", str(scene.file or ""))

@@ -9,7 +9,7 @@ from reference.fracture.front import CircularFront, Front, StraightFront
 from verify.errors import InputError
 from verify.scene import Box, DiscCut, PolygonCut, Scene
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.cut_faces import distance_to_cuts
+from verify.scene.cuts import distance_to_cuts
 
 Array = NDArray[np.float64]
 # Radii of the domains, of the reach: a straight front has no axis that they must stay away from.

@@ -15,7 +15,7 @@ from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.cuts import Cut
+from verify.scene.tool_path import Cut
 
 Array = NDArray[np.float64]
 # of the body's longest side, which gmsh meshes as 1: below it runs out of digits, and loses facets

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Polygon, Rectangle, Scene, Traction
-from verify.scene.part_pieces import pieces_on_part
+from verify.scene.parts import pieces_on_part
 
 Array = NDArray[np.float64]
 _SAME = 1e-5  # of the body's size: an end closer than that to a corner counts as the corner

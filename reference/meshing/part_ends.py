@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from reference.meshing.edge_splitting import split_edges
 from reference.meshing.opening import cell_facets
 from verify.scene import Scene, Traction
-from verify.scene.part_pieces import pieces_on_part, size_of
+from verify.scene.parts import pieces_on_part, size_of
 from verify.scene.regions import is_affine
 
 Array = NDArray[np.float64]

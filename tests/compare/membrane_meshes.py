@@ -8,7 +8,7 @@ from cut_meshes import Map, grid, layered
 from numpy.typing import NDArray
 
 from verify.compare.membrane_body import MembraneBody, cut_membrane
-from verify.scene.spatial_cuts import PolygonCut
+from verify.scene.cuts import PolygonCut
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

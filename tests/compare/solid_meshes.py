@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from verify.compare.solid import SolidBody, solid_of
 from verify.scene import Scene
-from verify.scene.spatial_cuts import PolygonCut
+from verify.scene.cuts import PolygonCut
 
 Array = NDArray[np.float64]
 Height = Callable[[Array], Array]

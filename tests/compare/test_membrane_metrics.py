@@ -18,7 +18,7 @@ from verify.compare.membrane_body import cut_membrane
 from verify.compare.membrane_field import MembraneField
 from verify.compare.realised import field_of
 from verify.compare.strain_energy import field_strain_energy, strain_energy
-from verify.scene.spatial_cuts import SweptCut
+from verify.scene.cuts import SweptCut
 
 LAW = Sheet.law
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])

@@ -35,7 +35,7 @@ def test_the_nearest_points_of_a_cap_are_those_of_its_fine_triangulation():
         kind="sphere", centre=(0.1, 0.2, 0.3), radius=0.4, towards=(1.0, -1.0, 2.0), opening=65.0
     )
     (patch,) = cap.pieces()
-    vertices = cap.surface(0.004)[0]
+    vertices = cap.facets(0.004)[0]
     points = np.random.default_rng(4).uniform(-0.5, 0.9, (300, 3))
     foot, rim = patch.nearest(points)
     nearest = np.linalg.norm(points[:, None] - vertices, axis=2).min(axis=1)

@@ -50,13 +50,13 @@ def area_vectors(surface):
 def test_the_normal_of_every_cut_is_that_of_its_triangles():
     """A plane cut's points along its normal; a cylinder's towards its axis; a sweep's t × along."""
     disc = DiscCut(**DISC)
-    assert (area_vectors(disc.surface())[:, 2] > 0.0).all()
+    assert (area_vectors(disc.facets())[:, 2] > 0.0).all()
     polygon = PolygonCut(**SQUARE)
-    assert (area_vectors(polygon.surface())[:, 2] > 0.0).all()
-    pipe = CylinderCut(**PIPE).surface()
+    assert (area_vectors(polygon.facets())[:, 2] > 0.0).all()
+    pipe = CylinderCut(**PIPE).facets()
     middle = pipe[0][pipe[1]].mean(axis=1) - [0.5, 0.5, 0.0]
     assert ((area_vectors(pipe) * middle)[:, :2].sum(axis=1) < 0.0).all()
-    swept = SweptCut(**SWEPT).surface()
+    swept = SweptCut(**SWEPT).facets()
     wanted = np.cross([0.3, 0.2, 0.0], [0.0, 0.0, 0.5])
     np.testing.assert_allclose(area_vectors(swept)[0], 0.5 * wanted)
 
@@ -66,7 +66,7 @@ def test_areas_of_the_triangulations_are_those_of_the_cuts():
     step = (2 * np.pi / 64) ** 2
 
     def area(cut):
-        return np.linalg.norm(area_vectors(cut.surface()), axis=1).sum()
+        return np.linalg.norm(area_vectors(cut.facets()), axis=1).sum()
 
     assert area(DiscCut(**DISC)) == pytest.approx(np.pi * 0.09 * (1 - step / 6), rel=1e-4)
     ellipse = {**DISC, "radii": (0.3, 0.1), "axis": (0.0, 1.0, 0.0)}
@@ -98,14 +98,14 @@ def test_a_star_shaped_polygon_is_triangulated_without_overlap(seed, corners):
 def test_the_area_in_a_box_is_that_of_clipping():
     surface = PolygonCut(
         kind="polygon", points=[(-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5)]
-    ).surface()
+    ).facets()
     assert area_inside(surface, np.zeros(3), np.ones(3)) == pytest.approx(0.5)
     on_face = (surface[0] + [0.0, 0.0, 0.5], surface[1])
     assert area_inside(on_face, np.zeros(3), np.ones(3)) == 0.0
 
 
 def test_the_distance_to_a_cut_is_that_to_its_nearest_point():
-    surface = PolygonCut(**SQUARE).surface()
+    surface = PolygonCut(**SQUARE).facets()
     for point, distance in (((0.5, 0.4, 0.9), 0.4), ((0.9, 0.5, 0.5), 0.1), ((1.1, 1.2, 0.5), 0.5)):
         assert distance_to_triangles(np.array([point]), surface) == pytest.approx([distance])
 
@@ -138,7 +138,7 @@ def test_two_cuts_that_lie_on_each_other_are_named(tmp_path):
     load(tmp_path, DISC, beside)
     across = {**SWEPT, "name": "other"}
     load(tmp_path, DISC, across)
-    assert overlap_area(DiscCut(**DISC).surface(), SweptCut(**SWEPT).surface()) == 0.0
+    assert overlap_area(DiscCut(**DISC).facets(), SweptCut(**SWEPT).facets()) == 0.0
 
 
 @pytest.mark.parametrize("opening", [20.0, 90.0, 137.0, 180.0])
@@ -147,7 +147,7 @@ def test_a_cap_has_the_area_of_a_sphere_and_its_centre_on_the_positive_side(open
     cap = SphereCut(
         kind="sphere", centre=tuple(centre), radius=0.4, towards=tuple(3 * pole), opening=opening
     )
-    points, triangles = cap.surface(0.01)
+    points, triangles = cap.facets(0.01)
     away = points - centre
     np.testing.assert_allclose(np.linalg.norm(away, axis=1), 0.4, rtol=1e-12)
     angle = np.rad2deg(np.arccos(np.clip(away @ pole / 0.4, -1.0, 1.0)))

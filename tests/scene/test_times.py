@@ -156,7 +156,7 @@ def test_final_cut_has_the_positive_side_of_motion_times_blade() -> None:
     path = _path(
         points=[[0.0, 0.0, 1.0], [0.3, 1.0, 1.0]], direction=[0, 0.1, -1], depth=0.5, speed=1.0
     )
-    points, triangles = path.surface()
+    points, triangles = path.facets()
     a, b, c = points[triangles[0]]
     normal = np.cross(b - a, c - a)
     assert normal @ np.cross([0.3, 1.0, 0.0], path.blade[0]) > 0

@@ -171,7 +171,7 @@ def _with_free_faces(
     stress = np.zeros((d, d))
     for load in loads:
         factor = factor_at(load.history, time)
-        values = factor * load.given(np.zeros((1, d)), time)[0]
+        values = factor * load.values(np.zeros((1, d)), time)[0]
         if load.traction is None:
             stress += values[0] * np.eye(d)
         else:

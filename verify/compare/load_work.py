@@ -16,7 +16,7 @@ from verify.compare.simplices import EDGES
 from verify.compare.splitting import measures
 from verify.scene import BodyForce, Scene, Traction
 from verify.scene.history import factor_at
-from verify.scene.part_pieces import Pieces, pieces_on_part
+from verify.scene.parts import Pieces, pieces_on_part
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from verify.compare.simplices import simplices
 from verify.errors import UnsupportedSceneError
 from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
+from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.geometry import Box, MeshFile
 from verify.scene.mesh_file import read_mesh
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 
 Array = NDArray[np.float64]
 Inside = Callable[[Array], NDArray[np.bool_]]
@@ -67,7 +67,7 @@ def solid_of(scene: Scene) -> SolidBody:
         if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = cut.pieces()
-        fronts.append(_trimmed(rim_edges(cut.surface(size / _RIM)), inside, size))
+        fronts.append(_trimmed(rim_edges(cut.facets(size / _RIM)), inside, size))
     front = np.concatenate(fronts)
     return SolidBody(corners=corners, cuts=cuts, front=front, box=box, inside=inside)
 

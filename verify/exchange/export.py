@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.compare.hooke import hooke
 from verify.errors import InputError
@@ -27,7 +26,7 @@ from verify.exchange.layout import problem_of
 from verify.exchange.problem import HeldNodes, Load, Problem
 from verify.json_files import write_json
 from verify.runner.fingerprint import physics_digest
-from verify.scene import Scene, SpatialCut
+from verify.scene import Scene
 from verify.whole_files import asked_place, whole_file
 
 EXPORT_SCHEMA = 1
@@ -145,7 +144,7 @@ def _material(scene: Scene) -> dict[str, Any]:
 
 
 def _cut(cut: Any, asked: dict[str, Any]) -> dict[str, Any]:
-    points, facets = _facets(cut)
+    points, facets = cut.facets()
     content = {
         "name": cut.name,
         "kind": cut.kind,
@@ -154,15 +153,6 @@ def _cut(cut: Any, asked: dict[str, Any]) -> dict[str, Any]:
         "asked": asked,
     }
     return content if facets.shape[1] == 2 else {**content, "triangles": facets.tolist()}
-
-
-def _facets(cut: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the cut as asked: points, and lines (k, 2) in 2D or triangles (k, 3) in 3D."""
-    if isinstance(cut, SpatialCut):
-        return cut.surface()
-    points = np.asarray(cut.vertices(), dtype=float)
-    along = np.arange(len(points) - 1)
-    return points, np.column_stack([along, along + 1])
 
 
 def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
@@ -238,7 +228,7 @@ def _write_cuts(scene: Scene, path: Path) -> None:
 
     points, blocks, index, first = [], [], [], 0
     for i, cut in enumerate(scene.cuts):
-        vertices, facets = _facets(cut)
+        vertices, facets = cut.facets()
         blocks.append(({2: "line", 3: "triangle"}[facets.shape[1]], first + facets))
         index.append(np.full(len(facets), i, dtype=np.int32))
         points.append(np.pad(vertices, ((0, 0), (0, 3 - vertices.shape[1]))))

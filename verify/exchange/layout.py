@@ -21,8 +21,8 @@ from verify.scene import (
     Traction,
 )
 from verify.scene.held_facets import HeldFacets
-from verify.scene.part_pieces import Pieces, pieces_on_part
-from verify.scene.prescribed import PrescribedMotion
+from verify.scene.parts import Pieces, pieces_on_part
+from verify.scene.physics import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary
 from verify.solvers.loads_of_scene import ForceDensity, is_moving

@@ -22,6 +22,7 @@ class Segment:
 
     start: Array
     end: Array
+    curvature = 0.0  # 1/m
 
     @property
     def length(self) -> float:
@@ -37,6 +38,11 @@ class Segment:
         """Return unit tangents (n, 2)."""
         direction = (self.end - self.start) / self.length
         return np.tile(direction, (len(t), 1))
+
+    def facing(self, points: Array) -> Array:
+        """Return unit normals (n, 2), to the left, at points (n, 2) of it."""
+        x, y = (self.end - self.start) / self.length
+        return np.tile([-y, x], (len(points), 1))
 
     def nearest(self, points: Array) -> Array:
         """Parameters (n,) of the nearest points to `points` (n, 2)."""
@@ -75,6 +81,15 @@ class Arc:
     def closed(self) -> bool:
         """Whether it has no ends."""
         return self.sweep >= 2 * np.pi
+
+    @property
+    def curvature(self) -> float:
+        """One over the radius, 1/m."""
+        return 1.0 / self.radius
+
+    def facing(self, points: Array) -> Array:
+        """Return unit normals (n, 2), to the centre, at points (n, 2) of it."""
+        return np.asarray((self.centre - points) / self.radius)
 
     def point(self, t: Array) -> Array:
         """Points (n, 2) at parameters `t` (n,) in [0, 1]."""

@@ -31,6 +31,10 @@ class _Surface:
         """Nearest points (n, 3)."""
         return self.nearest(x)[0]
 
+    def facing(self, x: Array) -> Array:
+        """Return unit normals (n, 3), to the positive side, at points (n, 3) of it."""
+        raise NotImplementedError
+
     def depth(self, x: Array) -> Array:
         """Distance (n,) to the rim along the surface, m, negative beyond it."""
         raise NotImplementedError
@@ -45,6 +49,10 @@ class _Flat(_Surface):
     def normal(self, uv: Array) -> Array:
         """Return unit normals (n, 3)."""
         return np.tile(self.axes[2], (len(uv), 1))
+
+    def facing(self, x: Array) -> Array:
+        """Return unit normals (n, 3) at points (n, 3) of it."""
+        return self.normal(x)
 
     def level(self, x: Array) -> Array:
         """Distance (n,) from the plane, positive on the positive side."""
@@ -209,6 +217,10 @@ class CylinderPatch(_Surface):
         inward = (self.arc.centre - self.arc.point(uv[:, 0])) / self.arc.radius
         return np.asarray(inward @ self.axes[:2])
 
+    def facing(self, x: Array) -> Array:
+        """Return unit normals (n, 3), to the axis, at points (n, 3) of it."""
+        return np.asarray(self.arc.facing((x - self.origin) @ self.axes[:2].T) @ self.axes[:2])
+
     def stretch(self, uv: Array) -> Array:
         """Area (n,) per area of parameters."""
         return np.full(len(uv), self.arc.length)
@@ -288,6 +300,10 @@ class SpherePatch(_Surface):
     def normal(self, uv: Array) -> Array:
         """Return unit normals (n, 3)."""
         return -self._outward(uv)
+
+    def facing(self, x: Array) -> Array:
+        """Return unit normals (n, 3), to the centre, at points (n, 3) of it."""
+        return np.asarray((self.origin - x) / self.radius)
 
     def stretch(self, uv: Array) -> Array:
         """Area (n,) per area of parameters."""

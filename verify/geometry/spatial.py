@@ -28,6 +28,20 @@ def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
     return np.stack([first, np.cross(third, first), third])
 
 
+def measures(simplices: Array) -> Array:
+    """Lengths (m,) of segments (m, 2, d), or areas of triangles (m, 3, 3)."""
+    edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
+    across = 0.5 * np.cross(*edges) if len(edges) == 2 else edges[0]
+    return np.asarray(np.linalg.norm(across, axis=1))
+
+
+def unit_normals(simplices: Array) -> Array:
+    """Return unit normals (m, d) of segments (m, 2, 2), to the left, or of triangles (m, 3, 3)."""
+    edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
+    across = np.cross(*edges) if len(edges) == 2 else edges[0][:, ::-1] * [-1.0, 1.0]
+    return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+
+
 def ear_clipping(corners: Array) -> Ints:
     """Triangles (n - 2, 3) of a plane simple polygon (n, 3), turned as the polygon is."""
     spokes = corners - corners[0]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
-from verify.scene.material_regions import points_of_body
+from verify.scene.placement import points_of_body
 
 
 def volume_of(scene: Scene) -> float:
@@ -36,9 +36,8 @@ def body_text(scene: Scene) -> str:
         sides, places, volumes = np.ptp(grid.points, axis=0), grid.points[grid.cells], grid.measures
         places = places.mean(axis=1)
         mesh = f", {len(grid.points)} nodes, {len(grid.cells)} cells"
-    elif isinstance(body, Rectangle | Polygon | Box):
-        corners = [body.lower, body.upper] if isinstance(body, Box) else body.outline()
-        sides, places = np.ptp(corners, axis=0), points_of_body(scene)
+    elif len(ends := body.extremes()):
+        sides, places = np.ptp(ends, axis=0), points_of_body(scene)
         volumes = np.full(len(places), volume_of(scene) / len(places))
     else:
         return ""

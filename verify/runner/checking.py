@@ -6,9 +6,8 @@ from verify.errors import InputError
 from verify.runner.mesh_faults import check_overlaps
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.empty_parts import check_parts_of_mesh
-from verify.scene.material_regions import check_regions_of_mesh
-from verify.scene.nearest import nearest
+from verify.scene.messages import nearest
+from verify.scene.placement import empty_region, part_without_mesh
 from verify.solvers import solver_names
 from verify.solvers.named import parameters_in, solver_in
 
@@ -21,8 +20,10 @@ def check_scene(scene: Scene) -> None:
     if isinstance(scene.geometry, MeshFile):
         try:
             mesh = read_mesh(scene)
-            check_parts_of_mesh(scene, *mesh)
-            check_regions_of_mesh(scene, *mesh)
+            if fault := part_without_mesh(scene, *mesh) or empty_region(
+                scene, mesh[0][mesh[1]].mean(1)
+            ):
+                raise InputError(fault, where)
             check_overlaps(scene, *mesh)
         except InputError:
             raise

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.planar import overlap_length
-from verify.geometry.spatial import rim_edges
+from verify.geometry.spatial import measures, rim_edges
 from verify.runner.exact_samples import holds
-from verify.scene import Box, Polygon, PolylineCut, Rectangle, Scene
-from verify.scene.cut_placement import check_points
+from verify.scene import PolylineCut, Scene
+from verify.scene.placement import misplaced_point
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
@@ -31,9 +31,9 @@ def check_cuts_can_be_meshed(scene: Scene) -> None:
     them, and are not refused here.
     """
     body, where = scene.geometry, str(scene.file or scene.name)
-    if not isinstance(body, Rectangle | Polygon | Box):
+    corners = body.extremes()
+    if not len(corners):
         return
-    corners = np.array([body.lower, body.upper]) if isinstance(body, Box) else body.outline()
     size = float(np.ptp(corners, axis=0).max())
     for i, cut in enumerate(scene.final_cuts):
         place, extent = f"cuts[{i}] ('{cut.name}')", _extent(cut)
@@ -55,11 +55,8 @@ def check_cuts_can_be_meshed(scene: Scene) -> None:
 
 def _extent(cut: Any) -> float:
     """Length of a cut in the plane, or root of its area in space, m."""
-    if cut.dimension == 3:
-        corners = cut.surface()[0][cut.surface()[1]]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return float((0.5 * np.linalg.norm(normals, axis=1).sum()) ** 0.5)
-    return float(np.linalg.norm(np.diff(cut.vertices(), axis=0), axis=1).sum())
+    points, facets = cut.facets()
+    return float(measures(points[facets]).sum() ** (1.0 / (cut.dimension - 1)))
 
 
 def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
@@ -91,10 +88,9 @@ def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
             raise InputError(f"{place}: expected '{cut.expected}' but it is '{kind}'", where)
     if scene.cell_dimension == scene.dimension:
         steps = _NEAR * size * np.vstack([np.eye(mesh.space), -np.eye(mesh.space)])
-        try:
-            check_points(scene, size, lambda point: bool(holds(mesh, point + steps).any()))
-        except ValueError as error:
-            raise InputError(str(error), where) from None
+        fault = misplaced_point(scene, size, lambda at: bool(holds(mesh, at + steps).any()))
+        if fault:
+            raise InputError(fault, where)
 
 
 def _parts(mesh: SimplexMesh, scene: Scene, i: int) -> bool:
@@ -118,7 +114,7 @@ def _rim(cut: Any) -> tuple[Array, Array, bool]:
     The ends of a cut in the plane are points, its rim in space is made of lines.
     """
     if cut.dimension == 3:
-        surface = cut.surface()
+        surface = cut.facets()
         rim = rim_edges(surface)
         return rim, surface[0], len(rim) == 0
     line = cut.vertices()

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.runner import exact_samples as samples
-from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, ToolPathCut, Traction
-from verify.scene.cuts import whole_cut
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
 from verify.scene.history import factor_at
 from verify.scene.initial import AtRest, InitialField, Moving
 from verify.scene.parts import on_part
-from verify.scene.prescribed import PrescribedMotion
+from verify.scene.physics import PrescribedMotion
 from verify.solvers.loads_of_scene import ForceDensity
 from verify.xfem.mesh import SimplexMesh
 
@@ -61,7 +60,7 @@ class _Fit:
         self._scene, self._exact, self._mesh = scene, exact, mesh
         self._rng = np.random.default_rng(5)
         self._size = mesh.extent
-        self._cuts = [whole_cut(cut) for cut in scene.cuts]
+        self._cuts = [cut.whole() for cut in scene.cuts]
         self._times = [0.0]
         if scene.analysis.duration is not None:
             outputs = scene.analysis.output_times
@@ -154,9 +153,7 @@ class _Fit:
             points, normals, to_end = samples.on_cut(cut, steps, self._rng)
             inside = samples.holds(self._mesh, points)
             points, normals, to_end = points[inside], normals[inside], to_end[inside]
-            opens = np.full(len(points), getattr(asked, "opens_at", 0.0))
-            if isinstance(asked, ToolPathCut):
-                opens = asked.passed_at(points)
+            opens = asked.passed_at(points)
             off_tip = 1e-3 * self._times[-1]  # at the tip itself stresses are unbounded
             open_now = opens < time - off_tip if self._times[-1] else opens <= 0.0
             beside = 1e-6 * self._size * normals
@@ -188,7 +185,7 @@ class _Fit:
             given = np.zeros_like(true)
             for load in loads:
                 factor = factor_at(load.history, time)
-                given += factor * load.values(points, outward, normals, time)
+                given += factor * load.on_faces(points, outward, normals, time)
             local = np.abs(stress).max(axis=(1, 2), initial=0.0)
             close = np.where(to_end < 0.1 * self._size, _SAME_AT_ENDS * local, 0.0)
             bound = _SAME * max(level, np.abs(given).max(initial=0.0)) + close

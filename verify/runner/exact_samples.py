@@ -123,7 +123,7 @@ def end_points(cut: Any) -> tuple[Array, Array, Array]:
             along /= np.linalg.norm(along, axis=1)[:, None]
             left = np.column_stack([-along[:, 1], along[:, 0]]) * [[-1.0], [1.0]]
             return line[[0, -1]], along, left
-    points, triangles = cut.surface()
+    points, triangles = cut.facets()
     normals = _normals(points[triangles])
     if isinstance(cut, CylinderCut | SphereCut) or np.ptp(normals, axis=0).max() > 1e-9:
         return (np.zeros((0, 3)),) * 3
@@ -149,11 +149,11 @@ def _faces(cut: Any, rng: np.random.Generator) -> tuple[Array, Array]:
             away = np.column_stack([np.cos(angle), np.sin(angle)])
             return np.asarray(cut.centre) + cut.radius * away, -away
         case SphereCut():
-            points = cut.surface()[0]
+            points = cut.facets()[0]
             points = points[_some(len(points), _FACES, rng)]
             return points, (np.asarray(cut.centre) - points) / cut.radius
         case CylinderCut():
-            points, axes = cut.surface()[0], cut.axes()
+            points, axes = cut.facets()[0], cut.axes()
             points = points[_some(len(points), _FACES, rng)]
             return points, -((points - np.asarray(cut.base)) @ axes[:2].T @ axes[:2]) / cut.radius
         case _ if cut.dimension == 2:
@@ -164,7 +164,7 @@ def _faces(cut: Any, rng: np.random.Generator) -> tuple[Array, Array]:
             normals /= np.linalg.norm(along, axis=1)[:, None]
             sizes = np.linalg.norm(along, axis=1)
         case _:
-            points, triangles = cut.surface()
+            points, triangles = cut.facets()
             corners = points[triangles]
             normals = _normals(corners)
             sizes = np.linalg.norm(

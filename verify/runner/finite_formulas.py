@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.runner import exact_samples as samples
 from verify.scene import BodyForce, CutFaces, InitialField, Scene, Traction
-from verify.scene.cuts import whole_cut
 from verify.scene.parts import on_part
 from verify.scene.physics import field_values
 from verify.xfem.mesh import SimplexMesh
@@ -56,10 +55,10 @@ def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array
         elif isinstance(load, BodyForce) and not load.exact:
             yield f"loads[{i}].force", load.values, inside
         elif isinstance(load, CutFaces):
-            cut = whole_cut(next(cut for cut in scene.cuts if cut.name == load.cut))
+            cut = next(cut for cut in scene.final_cuts if cut.name == load.cut)
             on_cut = samples.on_cut(cut, np.zeros(0), rng).points
             if scene.cell_dimension == scene.dimension:
-                yield f"loads[{i}]", load.given, on_cut[samples.holds(mesh, on_cut)]
+                yield f"loads[{i}]", load.values, on_cut[samples.holds(mesh, on_cut)]
     if isinstance(scene.initial, InitialField):
         for key in ("displacement", "velocity"):
             given = getattr(scene.initial, key)

@@ -15,7 +15,7 @@ from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene
-from verify.scene.nearest import nearest
+from verify.scene.messages import nearest
 from verify.solvers.named import parameters_of
 
 

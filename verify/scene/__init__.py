@@ -13,9 +13,26 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
     ValueCheck,
 )
-from verify.scene.cut_faces import Faces, faces_of
-from verify.scene.cuts import ArcCut, PolylineCut
-from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
+from verify.scene.cuts import (
+    ArcCut,
+    CylinderCut,
+    DiscCut,
+    Faces,
+    PolygonCut,
+    PolylineCut,
+    SphereCut,
+    SweptCut,
+    faces_of,
+)
+from verify.scene.geometry import (
+    Box,
+    MeshFile,
+    MeshLevels,
+    Polygon,
+    Rectangle,
+    ReferenceLevels,
+    Skin,
+)
 from verify.scene.initial import AtRest, Equilibrium, InitialField, Moving
 from verify.scene.loading import (
     case_folder,
@@ -29,7 +46,6 @@ from verify.scene.loading import (
     scene_schema,
 )
 from verify.scene.materials import Material, MaterialRegion, Moduli, crossed_by_interfaces
-from verify.scene.mesh import MeshLevels, ReferenceLevels
 from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
     Analysis,
@@ -44,18 +60,9 @@ from verify.scene.physics import (
     is_uniform,
 )
 from verify.scene.regions import Region, parse_expression, parse_region
-from verify.scene.replay import Pull, Replay
 from verify.scene.scene import Scene
-from verify.scene.skin import Skin
-from verify.scene.spatial_cuts import (
-    CylinderCut,
-    DiscCut,
-    PolygonCut,
-    SpatialCut,
-    SphereCut,
-    SweptCut,
-)
-from verify.scene.tool_path import ToolPathCut
+from verify.scene.tables import Pull, Replay
+from verify.scene.tool_path import Cut, ToolPathCut
 
 __all__ = [
     "Analysis",
@@ -64,6 +71,7 @@ __all__ = [
     "BodyForce",
     "BoundCheck",
     "Box",
+    "Cut",
     "CutFaces",
     "CylinderCut",
     "DiscCut",
@@ -96,7 +104,6 @@ __all__ = [
     "Rotation",
     "Scene",
     "Skin",
-    "SpatialCut",
     "SphereCut",
     "StrainEnergyQuantity",
     "StressIntensityQuantity",

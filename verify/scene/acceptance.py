@@ -1,10 +1,21 @@
 """Quantities and acceptance checks of a scene."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
-from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict, Vector
+from verify.scene.strict import (
+    Finite,
+    Line,
+    NonNegative,
+    Point3,
+    Positive,
+    Rules,
+    Strict,
+    Vector,
+    none_or_both,
+    one_alone,
+)  # fmt: skip
 
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
 OVERLAP = "overlap_depth"  # m, largest over time: of itself the error of faces that must not meet
@@ -23,8 +34,7 @@ METRICS = tuple(dict.fromkeys((
     "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
     OVERLAP, *OF_MOTION,
 )))  # fmt: skip
-
-
+_DIRECTED = ("inertia", "linear_momentum", "angular_momentum")  # of a part, along an axis
 Time = Annotated[
     NonNegative | None, Field(description="dynamic: when, s; default the last output time")
 ]
@@ -35,10 +45,7 @@ class StrainEnergyQuantity(Strict):
 
     kind: Literal["strain_energy"]
 
-    @property
-    def name(self) -> str:
-        """Name under which it is reported."""
-        return "strain_energy"
+    name: ClassVar[str] = "strain_energy"  # under which it is reported
 
 
 class DisplacementQuantity(Strict):
@@ -98,15 +105,14 @@ class PartQuantity(Strict):
     )
     time: Time = None
 
-    @model_validator(mode="after")
-    def _components_belong(self) -> "PartQuantity":
-        directed = self.of in ("inertia", "linear_momentum", "angular_momentum")
-        if directed != (self.component is not None):
-            need = "needs one" if directed else "has none"
-            raise ValueError(f"component: the {self.of} of a part {need}")
-        if self.time is not None and self.of in ("mass", "inertia"):
-            raise ValueError(f"time: the {self.of} of a part is that of it undeformed")
-        return self
+    rules: ClassVar[Rules] = (
+        ("component", lambda p: p.of in _DIRECTED and p.component is None and p.of,
+         "the {} of a part needs one"),
+        ("component", lambda p: p.of not in _DIRECTED and p.component is not None and p.of,
+         "the {} of a part has none"),
+        ("time", lambda p: p.of in ("mass", "inertia") and p.time is not None and p.of,
+         "the {} of a part is that of it undeformed"),
+    )  # fmt: skip
 
 
 class StressIntensityQuantity(Strict):
@@ -126,19 +132,21 @@ class StressIntensityQuantity(Strict):
         default=None,
         description="mode III: how far behind the blade of a tool path in space the cut is read, m",
     )
-    time: Annotated[
-        NonNegative | None,
-        Field(description="dynamic: an output time, s; default the last"),
-    ] = None
+    time: NonNegative | None = Field(
+        default=None, description="dynamic: an output time, s; default the last"
+    )
 
-    @model_validator(mode="after")
-    def _radius_belongs(self) -> "StressIntensityQuantity":
-        blade = self.mode == "III" and self.point is None  # else it is a point of a front
-        if blade != (self.radius is not None):
-            raise ValueError("a radius belongs to mode III at a blade, which needs one")
-        if blade and self.end != "end":
-            raise ValueError("mode III is asked for at the blade: end = 'end'")
-        return self
+    @property
+    def at_blade(self) -> bool:
+        """Whether it is asked for at a blade, not at a point of a front."""
+        return self.mode == "III" and self.point is None
+
+    rules: ClassVar[Rules] = (
+        ("", lambda p: p.at_blade != (p.radius is not None),
+         "a radius belongs to mode III at a blade, which needs one"),
+        ("", lambda p: p.at_blade and p.end != "end",
+         "mode III is asked for at the blade: end = 'end'"),
+    )  # fmt: skip
 
 
 Quantity = Annotated[
@@ -182,13 +190,11 @@ class RateCheck(_Check):
     equals: Finite | None = None
     within: Positive | None = Field(default=None, description="tolerance of `equals`")
 
-    @model_validator(mode="after")
-    def _one_form(self) -> "RateCheck":
-        if (self.at_least is None) == (self.equals is None):
-            raise ValueError("a rate check has either at_least, or equals with within")
-        if (self.equals is None) != (self.within is None):
-            raise ValueError("equals and within go together")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", none_or_both("at_least", "equals"),
+         "a rate check has either at_least, or equals with within"),
+        ("", one_alone("equals", "within"), "equals and within go together"),
+    )  # fmt: skip
 
 
 class BoundCheck(_Check):
@@ -214,13 +220,11 @@ class RatioCheck(_Check):
     at_most: Positive | None = None
     within: Positive | None = Field(default=None, description="|ratio − 1| must not exceed it")
 
-    @model_validator(mode="after")
-    def _one_form(self) -> "RatioCheck":
-        if (self.at_most is None) == (self.within is None):
-            raise ValueError("a ratio check has either at_most or within")
-        if self.row is not None and self.to != "conforming":
-            raise ValueError("a ratio check is either to a solver or to a row")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", none_or_both("at_most", "within"), "a ratio check has either at_most or within"),
+        ("", lambda p: p.row is not None and p.to != "conforming",
+         "a ratio check is either to a solver or to a row"),
+    )  # fmt: skip
 
     @property
     def compared(self) -> str | None:

@@ -1,40 +1,103 @@
-"""The uncut body: a rectangle, a polygon, a box, or a mesh file, with named boundary parts."""
+"""The uncut body, with named boundary parts, and its mesh levels.
 
+A rectangle, a polygon, a box, a mesh file; or skin: a patch of body surface, made by formulas or
+from a surface file.
+"""
+
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from verify.geometry.planar import polygon_defect
-from verify.scene.skin import Skin
-from verify.scene.strict import Point2, Point3, Strict
+from verify.geometry.nearest import distance_to_outline, feet
+from verify.geometry.planar import inside_polygon, polygon_defect
+from verify.scene.strict import (
+    Count,
+    Point2,
+    Point3,
+    Positive,
+    Rules,
+    Strict,
+    none_or_both,
+    one_alone,
+)  # fmt: skip
 
-_SIDES = ("left", "right", "bottom", "top", "front", "back")
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_AXES = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
 
 
-class Rectangle(Strict):
+class _Body(Strict):
+    """A body that only its mesh knows, unless a kind of body says more."""
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether its elements are triangles in space."""
+        return False
+
+    def parts(self) -> tuple[str, ...]:
+        """Names of the boundary parts: none, use inequalities."""
+        return ()
+
+    def extremes(self) -> Array:
+        """Points (n, d) whose bounding box is that of the body; none where it is not known."""
+        return np.zeros((0, 3))
+
+    def holds(self, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, d) lie in it, or outside by no more than a tolerance, m."""
+        raise NotImplementedError
+
+    def on(self, part: str, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, d) lie on the boundary part of that name, to a tolerance, m."""
+        raise NotImplementedError
+
+
+class _PlaneBody(_Body):
+    """A body within an outline, of which each edge bears the name of a part."""
+
+    dimension: ClassVar[int] = 2
+
+    def outline(self) -> Array:
+        """Corners (n, 2) in order."""
+        raise NotImplementedError
+
+    def extremes(self) -> Array:
+        """Points (n, 2) whose bounding box is that of the body."""
+        return self.outline()
+
+    def holds(self, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, 2) lie in it, or outside by no more than a tolerance, m."""
+        outline = self.outline()
+        beside = distance_to_outline(points, outline) <= tolerance
+        return np.asarray(beside | inside_polygon(points, outline))
+
+    def on(self, part: str, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, 2) lie on the boundary part of that name, to a tolerance, m."""
+        outline, found = self.outline(), np.zeros(len(points), dtype=bool)
+        for edge, name in enumerate(self.parts()):  # a name may be given to several edges
+            if name == part:
+                foot = feet(points, outline[edge], outline[(edge + 1) % len(outline)])
+                found |= np.linalg.norm(points - foot, axis=1) <= tolerance
+        return found
+
+
+class Rectangle(_PlaneBody):
     """An axis-parallel rectangle; its parts are ``left``, ``right``, ``bottom``, ``top``."""
 
     kind: Literal["rectangle"]
     lower: Point2 = Field(description="lower left corner, m")
     upper: Point2 = Field(description="upper right corner, m")
 
-    @model_validator(mode="after")
-    def _has_area(self) -> "Rectangle":
-        if not all(b > a for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(
-                f"upper {self.upper} must exceed lower {self.lower} in both coordinates"
-            )
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda b: not np.greater(b.upper, b.lower).all() and (b.upper, b.lower),
+         "upper {} must exceed lower {} in both coordinates"),
+    )  # fmt: skip
 
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return 2
-
-    def outline(self) -> NDArray[np.float64]:
+    def outline(self) -> Array:
         """Corners (4, 2), counter-clockwise from the lower left."""
         (x0, y0), (x1, y1) = self.lower, self.upper
         return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
@@ -44,7 +107,7 @@ class Rectangle(Strict):
         return ("bottom", "right", "top", "left")
 
 
-class Polygon(Strict):
+class Polygon(_PlaneBody):
     """A simple polygon; edge i goes from corner i to corner i + 1 and bears the i-th name."""
 
     kind: Literal["polygon"]
@@ -53,20 +116,13 @@ class Polygon(Strict):
         default=None, description="a name per edge; default edge0, edge1, …"
     )
 
-    @model_validator(mode="after")
-    def _is_simple(self) -> "Polygon":
-        if self.names is not None and len(self.names) != len(self.corners):
-            raise ValueError(f"{len(self.names)} names for {len(self.corners)} edges")
-        if defect := polygon_defect(np.array(self.corners, dtype=float)):
-            raise ValueError(defect)
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda b: b.names is not None and len(b.names) != len(b.corners)
+         and (len(b.names), len(b.corners)), "{} names for {} edges"),
+        ("", lambda b: polygon_defect(b.outline()), "{}"),
+    )  # fmt: skip
 
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return 2
-
-    def outline(self) -> NDArray[np.float64]:
+    def outline(self) -> Array:
         """Corners (n, 2) in the order given."""
         return np.array(self.corners, dtype=float)
 
@@ -75,7 +131,7 @@ class Polygon(Strict):
         return tuple(self.names or (f"edge{i}" for i in range(len(self.corners))))
 
 
-class Box(Strict):
+class Box(_Body):
     """An axis-parallel box.
 
     Its parts are ``left``/``right`` (x), ``front``/``back`` (y) and ``bottom``/``top`` (z).
@@ -85,25 +141,33 @@ class Box(Strict):
     lower: Point3 = Field(description="lowest corner, m")
     upper: Point3 = Field(description="highest corner, m")
 
-    @model_validator(mode="after")
-    def _has_volume(self) -> "Box":
-        if not all(b > a for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(
-                f"upper {self.upper} must exceed lower {self.lower} in all coordinates"
-            )
-        return self
-
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return 3
+    dimension: ClassVar[int] = 3
+    rules: ClassVar[Rules] = (
+        ("", lambda b: not np.greater(b.upper, b.lower).all() and (b.upper, b.lower),
+         "upper {} must exceed lower {} in all coordinates"),
+    )  # fmt: skip
 
     def parts(self) -> tuple[str, ...]:
         """Names of the boundary parts."""
-        return _SIDES
+        return ("left", "right", "bottom", "top", "front", "back")
+
+    def extremes(self) -> Array:
+        """Lowest and highest corner (2, 3)."""
+        return np.array([self.lower, self.upper], dtype=float)
+
+    def holds(self, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, 3) lie in it, or outside by no more than a tolerance, m."""
+        low, high = self.extremes()
+        return np.asarray(((points >= low - tolerance) & (points <= high + tolerance)).all(axis=1))
+
+    def on(self, part: str, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, 3) lie on the boundary part of that name, to a tolerance, m."""
+        axis, low = _AXES[part], part in ("left", "front", "bottom")
+        end = (self.lower if low else self.upper)[axis]
+        return np.asarray(np.abs(points[:, axis] - end) <= tolerance)
 
 
-class MeshFile(Strict):
+class MeshFile(_Body):
     """A simplicial mesh in any format that meshio reads; parts are said by inequalities."""
 
     kind: Literal["file"]
@@ -113,20 +177,125 @@ class MeshFile(Strict):
         default="volume", description="surface: triangles in space, a membrane"
     )
 
-    @model_validator(mode="after")
-    def _surface_is_in_space(self) -> "MeshFile":
-        if self.cells == "surface" and self.dimension_ == 2:
-            raise ValueError("cells = 'surface' is a membrane in space: dimension = 3")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda b: b.cells == "surface" and b.dimension == 2,
+         "cells = 'surface' is a membrane in space: dimension = 3"),
+    )  # fmt: skip
 
     @property
     def dimension(self) -> int:
         """Space dimension."""
         return int(self.dimension_)
 
+    @property
+    def is_membrane(self) -> bool:
+        """Whether its elements are triangles in space."""
+        return self.cells == "surface"
+
+
+class Skin(_Body):
+    """A face or the back of a hand, or a surface file; its part ``rim`` is its outer border.
+
+    Coordinates of ``shape``: z out of the body; a face has x to its left and y up, a hand y
+    along its fingers; the origin is in the middle. The geometry brings its own mesh.
+    """
+
+    kind: Literal["skin"]
+    shape: Literal["face", "hand"] | None = Field(default=None, description="which patch; or file")
+    elements: Count | None = Field(
+        default=None, description="of a shape: about how many elements are wanted"
+    )
+    file: Path | None = Field(
+        default=None, description="triangulated surface (STL, OBJ, PLY, VTU …), taken as it is"
+    )
+    thickness: Positive | None = Field(
+        default=None, description="m; tetrahedra below the surface. Without it: a membrane"
+    )
+    layers: Count = Field(default=1, description="with a thickness: layers of elements")
+
+    dimension: ClassVar[int] = 3
+    rules: ClassVar[Rules] = (
+        ("", none_or_both("shape", "file"), "a skin has either a shape or a file"),
+        ("", one_alone("shape", "elements"), "elements belong to a shape, and a shape needs them"),
+        ("", lambda b: b.thickness is None and b.layers > 1,
+         "layers belong to a skin with a thickness"),
+    )  # fmt: skip
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether its elements are triangles in space."""
+        return self.thickness is None
+
     def parts(self) -> tuple[str, ...]:
-        """Names of the boundary parts: none, use inequalities."""
-        return ()
+        """Names of the boundary parts."""
+        return ("rim",)
 
 
 Geometry = Annotated[Rectangle | Polygon | Box | MeshFile | Skin, Field(discriminator="kind")]
+CellCounts = tuple[Count, ...]
+
+
+class MeshLevels(Strict):
+    """The background meshes on which the solvers are compared, coarse to fine."""
+
+    pattern: Literal["structured", "unstructured", "given"] = Field(
+        default="structured",
+        description="structured: squares split along the rising diagonal (rectangles only); "
+        "given: the mesh file of the geometry, as it is",
+    )
+    sizes: Annotated[list[Positive], Field(min_length=1)] | None = Field(
+        default=None, description="element sizes h, m"
+    )
+    cells: Annotated[list[CellCounts], Field(min_length=1)] | None = Field(
+        default=None, description="structured: numbers of cells per direction"
+    )
+
+    rules: ClassVar[Rules] = (
+        ("", lambda m: m.pattern == "given" and (m.sizes or m.cells),
+         "a given mesh has neither sizes nor cells"),
+        ("", lambda m: m.pattern != "given" and none_or_both("sizes", "cells")(m),
+         "a mesh has either sizes or cells"),
+        ("", lambda m: m.cells and m.pattern == "unstructured",
+         "cells belong to a structured mesh; give sizes"),
+        ("", lambda m: not all(_finer(b, a) for a, b in pairwise(m.cells or [])),
+         "cells must go from coarse to fine, no level twice"),
+        ("", lambda m: m.sizes and sorted(set(m.sizes), reverse=True) != m.sizes,
+         "sizes must descend from coarse to fine, none of them twice"),
+    )  # fmt: skip
+
+    @property
+    def count(self) -> int:
+        """Number of levels."""
+        return 1 if self.pattern == "given" else len(self.sizes or self.cells or [])
+
+
+class ReferenceLevels(Strict):
+    """The reference that judges when there is no exact solution, or beside it."""
+
+    kind: Literal["exact", "conforming"] | None = Field(
+        default=None, description="default: exact where the scene has an exact solution"
+    )
+    size: Positive | None = Field(
+        default=None, description="far element size of the coarsest level, m (default: chosen)"
+    )
+    levels: int = Field(
+        strict=True, default=3, ge=3, le=8, description="number of levels, each halving h"
+    )
+    max_levels: int | None = Field(
+        strict=True,
+        default=None,
+        ge=3,
+        le=8,
+        description="further levels are solved, up to that many, until the uncertainty is below "
+        "a tenth of every error that it judges (default: `levels`)",
+    )
+    degree: Literal[1, 2] = Field(default=2, description="polynomial order")
+
+    rules: ClassVar[Rules] = (
+        ("", lambda r: r.max_levels is not None and r.max_levels < r.levels
+         and (r.max_levels, r.levels), "max_levels {} is below levels {}"),
+    )  # fmt: skip
+
+
+def _finer(one: CellCounts, other: CellCounts) -> bool:
+    return one != other and all(i >= j for i, j in zip(one, other, strict=False))

@@ -1,4 +1,4 @@
-"""Facets of a boundary that a support on a part of it holds, and how far it reaches beyond.
+"""Facets and nodes of a boundary that a support on a part of it holds; how far it reaches beyond.
 
 A support cannot end inside a facet of linear elements. All solvers follow one rule: it holds every
 facet that its part meets with positive measure. As facets are divided what is held shrinks to the
@@ -12,10 +12,12 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.errors import InputError
 from verify.geometry.nearest import nearest_parts
 from verify.regularisation import Regularisation
 from verify.scene.geometry import Geometry
-from verify.scene.part_pieces import pieces_on_part, size_of
+from verify.scene.parts import on_part, pieces_on_part, size_of
+from verify.scene.tables import SceneTables
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -57,7 +59,7 @@ def held_facets(
     Parameters
     ----------
     geometry, where, corners, boundary
-        As of `verify.scene.part_pieces.pieces_on_part`.
+        As of `verify.scene.parts.pieces_on_part`.
     facet : (q,) int array, optional
         Where a cut divides facets, and `corners` are simplices in them: number of the facet, and
         of its side of the cut. What lies on each side is held for itself.
@@ -100,6 +102,62 @@ def shifted_ends(found: list[HeldFacets], size: float) -> list[Regularisation]:
         Regularisation(END_OF_SUPPORT, count, shift, "m"),
         Regularisation(END_OF_SUPPORT, count, shift / size, "h"),
     ]
+
+
+def held_nodes(
+    scene: SceneTables, where: str, places: Array, facets: tuple[Ints, Array], key: str
+) -> tuple[Ints, HeldFacets]:
+    """Find the nodes of the boundary that a support on the part `where` holds.
+
+    Those of the facets that it holds, each on its own side of the cuts; and those on the part at
+    whose place no facet is held: a part may be a corner or an edge of the body.
+
+    Parameters
+    ----------
+    scene : SceneTables
+    where : str
+        Name of a part, ``boundary``, or an inequality.
+    places : (n, d) array
+        Places of the nodes of the boundary, m; equal to the last bit for the copies of one.
+    facets : (q, j) int array and (q, k, d) array
+        Nodes of each facet, numbers in `places`, and its corners, m.
+    key : str
+        Key of the scene that names the part, for the message.
+
+    Returns
+    -------
+    nodes : (h,) int array
+        Ascending.
+    found : HeldFacets
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    found = held_facets(scene.geometry, where, facets[1])
+    mark = np.zeros(len(places), dtype=bool)
+    mark[facets[0][found.held]] = True
+    mark |= points_apart(scene, where, places, mark)
+    if not mark.any():
+        raise no_node(scene, where, key)
+    return np.flatnonzero(mark), found
+
+
+def no_node(scene: SceneTables, where: str, key: str) -> InputError:
+    """Error of a support on a part that holds nothing."""
+    return InputError(f"{key}: no node of the boundary lies in '{where}'", str(scene.file or ""))
+
+
+def points_apart(
+    scene: SceneTables, where: str, places: Array, held: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Tell which nodes (n,) of the boundary lie on a part where it holds none (n,) by a facet."""
+    _, place = np.unique(places, axis=0, return_inverse=True)
+    taken = np.zeros(len(places), dtype=bool)
+    taken[place.ravel()[held]] = True
+    size = float(np.ptp(places, axis=0).max(initial=0.0))
+    return np.asarray(on_part(scene.geometry, where, places, size) & ~taken[place.ravel()])
 
 
 def _reach(corners: Array, pieces: Array) -> float:

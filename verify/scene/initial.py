@@ -1,14 +1,14 @@
 """The state in which a dynamic analysis begins."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from verify.errors import InputError
 from verify.scene.physics import field_values
-from verify.scene.strict import Components, Finite, Point3, Strict, Vector
+from verify.scene.strict import Components, Finite, Point3, Rules, Strict, Vector
 
 _LARGEST = 30.0  # of a velocity like r^-½: a tip less than 1/1000 of a cell away
 
@@ -42,13 +42,11 @@ class Moving(Strict):
         default=None, description="point about which it spins, m; default the origin"
     )
 
-    @model_validator(mode="after")
-    def _moves(self) -> "Moving":
-        if self.velocity is None and self.spin is None:
-            raise ValueError("a moving body needs a velocity, a spin, or both")
-        if self.centre is not None and self.spin is None:
-            raise ValueError("centre belongs to a spin")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda m: m.velocity is None and m.spin is None,
+         "a moving body needs a velocity, a spin, or both"),
+        ("", lambda m: m.centre is not None and m.spin is None, "centre belongs to a spin"),
+    )  # fmt: skip
 
     def velocities(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Velocity (n, d) of points (n, d), m/s."""
@@ -73,11 +71,10 @@ class InitialField(Strict):
         default=None, description="m/s, a number or a formula in x, y, z per component; or 'exact'"
     )
 
-    @model_validator(mode="after")
-    def _says_something(self) -> "InitialField":
-        if self.displacement is None and self.velocity is None:
-            raise ValueError("an initial field needs a displacement, a velocity, or both")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda f: f.displacement is None and f.velocity is None,
+         "an initial field needs a displacement, a velocity, or both"),
+    )  # fmt: skip
 
     def state(
         self, points: NDArray[np.float64], near: NDArray[np.float64], exact: Any

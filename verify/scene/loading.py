@@ -19,8 +19,7 @@ from verify.printable import one_line, words_of
 from verify.scene.acceptance import RatioCheck
 from verify.scene.family import Row, expand_rows, row_asked, rows_schema
 from verify.scene.geometry import MeshFile
-from verify.scene.messages import first_fault
-from verify.scene.nearest import nearest
+from verify.scene.messages import first_fault, nearest
 from verify.scene.scene import Scene
 from verify.whole_files import read_bounded
 

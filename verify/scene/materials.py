@@ -1,13 +1,13 @@
 """Elasticity and density of a scene, which may differ by region."""
 
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from verify.scene.regions import parse_region
-from verify.scene.strict import Positive, Strict
+from verify.scene.strict import Positive, Rules, Strict
 
 Array = NDArray[np.float64]
 
@@ -35,11 +35,10 @@ class MaterialRegion(Strict):
     )
     density: Positive | None = Field(default=None, description="density, kg/m³")
 
-    @model_validator(mode="after")
-    def _differs(self) -> "MaterialRegion":
-        if self.young is None and self.poisson is None and self.density is None:
-            raise ValueError("expected young, poisson or density of the region")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda r: r.young is None and r.poisson is None and r.density is None,
+         "expected young, poisson or density of the region"),
+    )  # fmt: skip
 
 
 class Material(Strict):

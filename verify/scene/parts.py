@@ -1,18 +1,37 @@
-"""Parts of the boundary of a body, as a scene names them."""
+"""Parts of the boundary of a body: which points lie on them, and which pieces of facets.
+
+A facet is divided where a comparison of the part's formula changes: where that is affine, exactly;
+else by bisection, until its chords are within a tolerance. Loads and supports of every solver rest
+on these pieces, so that a part is the same for all of them, whatever the mesh.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.geometry.nearest import feet
-from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
-from verify.scene.regions import parse_region
+from verify.scene.geometry import Geometry
+from verify.scene.regions import Side, comparisons, is_affine, parse_region
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
+_SAME = 1e-12  # of the body: a node closer than that to the end of a part is on it
+# of the body, for segments and triangles: how far a chord of a curved end may be off it, and the
+# smallest simplex that is divided for that
+_CHORD = {2: 1e-13, 3: 1e-6}
+_SMALLEST = {2: 1e-13, 3: 2e-4}
+# of the body: the largest simplex on which a comparison that is not affine is tried
+_LARGEST = {2: 1 / 256, 3: 1 / 64}
+_STRIP = 1e-5  # of the body: a narrower strip beside an edge belongs to what is next to it
+_STRAIGHT = 1e-6  # of 1 − cos of an angle: a boundary that turns less has no edge
 
 
-def on_part(
-    geometry: Geometry, where: str, points: NDArray[np.float64], size: float
-) -> NDArray[np.bool_]:
+def on_part(geometry: Geometry, where: str, points: Array, size: float) -> NDArray[np.bool_]:
     """Tell which points (n, d) of the boundary lie on the part `where`, its ends included.
 
     `size` is that of the body, m: within 1e-9 of it a point is on a part; so the node at the end
@@ -20,55 +39,256 @@ def on_part(
     """
     if where == "boundary":
         return np.ones(len(points), dtype=bool)
-    tolerance = _TOLERANCE * size
     if where in geometry.parts():
-        return _on_named(geometry, where, points, tolerance)
-    dimension = geometry.dimension
-    region = parse_region(where, dimension)
+        return geometry.on(where, points, _TOLERANCE * size)
+    steps = _TOLERANCE * size * np.eye(geometry.dimension)
+    return _in_or_beside(where, points, [*steps, *-steps])
+
+
+def _in_or_beside(where: str, points: Array, steps: list[Array]) -> NDArray[np.bool_]:
+    """Whether points (n, d), or what some steps (d,) or (n, d) lead to, lie in an inequality."""
+    region = parse_region(where, points.shape[1])
     found = region(points)
-    for step in tolerance * np.vstack([np.eye(dimension), -np.eye(dimension)]):
+    for step in steps:
         found |= region(points + step)
     return found
 
 
-def on_formula(
-    where: str,
-    points: NDArray[np.float64],
-    away: NDArray[np.float64],
-    size: float,
-) -> NDArray[np.bool_]:
-    """Tell which points (n, d) of facets lie on the part of an inequality, or 1e-9 beside them do.
+@dataclass(frozen=True)
+class Pieces:
+    """Simplices that make up what some facets have in common with a part of the boundary.
 
-    `away` (n, d, d) projects onto what is normal to the facet of each: there alone a part is met
-    by points that are not on it, so that ``x < 0`` is a face.
+    Attributes
+    ----------
+    facet : (r,) int array
+        Facet of each.
+    barycentric : (r, k, k) array
+        Barycentric coordinates of its corners (second axis) in the facet.
     """
-    region = parse_region(where, points.shape[1])
-    found = region(points)
-    for step in np.moveaxis(_TOLERANCE * size * away, 1, 0):
-        found |= region(points + step) | region(points - step)
-    return found
+
+    facet: Ints
+    barycentric: Array
+
+    @property
+    def share(self) -> Array:
+        """(r,) measure of each over that of its facet."""
+        return np.abs(np.linalg.det(self.barycentric))
+
+    def covered(self, count: int) -> Array:
+        """Share (count,) of each facet that lies on the part."""
+        return np.bincount(self.facet, self.share, minlength=count)
+
+    def places(self, corners: Array) -> Array:
+        """Corners (r, k, d) of the pieces of facets (q, k, d), m."""
+        return np.asarray(self.barycentric @ corners[self.facet])
+
+    def __getitem__(self, rows: NDArray) -> "Pieces":
+        """Return some of them."""
+        return Pieces(self.facet[rows], self.barycentric[rows])
+
+    def __add__(self, other: "Pieces") -> "Pieces":
+        """Return them and others."""
+        both = np.concatenate([self.barycentric, other.barycentric])
+        return Pieces(np.concatenate([self.facet, other.facet]), both)
+
+    @staticmethod
+    def whole(facets: Ints, k: int) -> "Pieces":
+        """Facets (q,) with k corners as they are."""
+        return Pieces(facets, np.broadcast_to(np.eye(k), (len(facets), k, k)))
 
 
-def on_named(
-    geometry: Geometry, where: str, points: NDArray[np.float64], size: float
-) -> NDArray[np.bool_]:
-    """Tell which points (n, d) lie on the part of that name, of a body of a size, m."""
-    return _on_named(geometry, where, points, _TOLERANCE * size)
+def size_of(boundary: Array) -> float:
+    """Size of a body by the facets (b, k, d) of its boundary: the longest side of its box, m."""
+    return float(np.ptp(boundary.reshape(-1, boundary.shape[2]), axis=0).max(initial=0.0))
 
 
-def _on_named(
-    geometry: Geometry, where: str, points: NDArray[np.float64], tolerance: float
-) -> NDArray[np.bool_]:
-    if isinstance(geometry, Box):
-        axis = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}[where]
-        end = geometry.lower if where in ("left", "front", "bottom") else geometry.upper
-        on_plane: NDArray[np.bool_] = np.abs(points[:, axis] - end[axis]) <= tolerance
-        return on_plane
-    assert isinstance(geometry, Rectangle | Polygon)
-    outline = geometry.outline()
-    found = np.zeros(len(points), dtype=bool)
-    for edge, name in enumerate(geometry.parts()):  # a name may be given to several edges
-        if name == where:
-            foot = feet(points, outline[edge], outline[(edge + 1) % len(outline)])
-            found |= np.linalg.norm(points - foot, axis=1) <= tolerance
-    return found
+def pieces_on_part(
+    geometry: Geometry, where: str, corners: Array, boundary: Array | None = None
+) -> Pieces:
+    """Divide facets by a part of the boundary and return what lies on it; it may be nothing.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Names parts.
+    where : str
+        Name of a part, ``boundary``, or an inequality.
+    corners : (q, k, d) array
+        Facets, or simplices in them: segments (k = 2) or triangles (k = 3), m.
+    boundary : (b, k, d) array, optional
+        All facets of the boundary, if these are not all.
+
+    Notes
+    -----
+    A strip beside an edge of the body (where its boundary turns) that is narrower than 1e-5 of the
+    body belongs to what is next to it: ``x > 0.999999`` means a face, and nothing of the faces
+    beside it. A curved end is followed to 1e-6 of the body in space, to round-off in the plane.
+    """
+    count, k, d = corners.shape
+    boundary = corners if boundary is None else boundary
+    if where == "boundary":
+        return Pieces.whole(np.arange(count), k)
+    if where in geometry.parts():
+        on = geometry.on(where, corners.reshape(-1, d), _TOLERANCE * size_of(boundary))
+        return Pieces.whole(np.flatnonzero(on.reshape(count, k).all(axis=1)), k)
+    return _of_formula(where, k, d, *(x.astype(float).tobytes() for x in (corners, boundary)))
+
+
+@lru_cache(maxsize=16)
+def _of_formula(where: str, k: int, d: int, facets: bytes, every: bytes) -> Pieces:
+    """Pieces on the part of an inequality; kept, as loads that change in time ask at each step."""
+    corners, boundary = (np.frombuffer(x).reshape(-1, k, d) for x in (facets, every))
+    count, size = len(corners), size_of(boundary)
+    pieces = Pieces.whole(np.arange(count), k)
+    largest = np.inf if is_affine(where) else _LARGEST[k] * size
+    for sides in comparisons(where, d):
+        pieces, values = _refined(pieces, corners, sides, size, largest)
+        pieces = _clipped(pieces, values)
+    points = _off_ridges(pieces.places(corners), boundary, size)
+    # only along its normal is a facet on a part that it does not meet, so that x < 0 is a face
+    away = _TOLERANCE * size * _normal_projections(corners)[pieces.facet]
+    steps = [sign * step for step in np.moveaxis(away, 1, 0) for sign in (1.0, -1.0)]
+    return _joined(pieces, _in_or_beside(where, points, steps), count)
+
+
+def _refined(
+    pieces: Pieces, corners: Array, sides: tuple[Side, Side], size: float, largest: float
+) -> tuple[Pieces, Array]:
+    """Bisect simplices until a comparison is affine on each, or cannot change there.
+
+    Returns
+    -------
+    pieces : Pieces
+    values : (r, k) array
+        Difference of the sides at the corners; 0 where the part ends within round-off.
+    """
+    k = corners.shape[1]
+    i, j = np.array(list(combinations(range(k), 2))).T
+    done, found = [], []
+    while len(pieces.facet):
+        at = pieces.places(corners)
+        ends = at[:, i] - at[:, j]
+        lengths = np.linalg.norm(ends, axis=2)
+        nodes = np.concatenate([at, 0.5 * (at[:, i] + at[:, j])], axis=1)
+        one, other = (side(nodes.reshape(-1, nodes.shape[2])) for side in sides)
+        given = (one - other).reshape(nodes.shape[:2])
+        noise = 1e-14 * np.abs([one, other]).max(axis=0).reshape(given.shape).max(axis=1)
+        values = given[:, :k]
+        off = np.abs(given[:, k:] - 0.5 * (values[:, i] + values[:, j])).max(axis=1)
+        rise = np.abs(values[:, i] - values[:, j])
+        slope = (rise / np.where(lengths > 0.0, lengths, np.inf)).max(axis=1)
+        flat = off <= np.maximum(4.0 * noise, _CHORD[k] * size * slope)
+        far = (np.abs(given).min(axis=1) > 4.0 * off) & (np.ptp(np.sign(given), axis=1) == 0.0)
+        far |= np.isnan(given).all(axis=1)
+        diameter = lengths.max(axis=1)
+        ready = ((flat | far) & (diameter <= largest)) | (diameter <= _SMALLEST[k] * size)
+        near = np.maximum(noise, _SAME * size * slope)[:, None]
+        done.append(pieces[ready])
+        found.append(np.where(np.abs(values) <= near, 0.0, values)[ready])
+        pieces, longest = pieces[~ready], lengths[~ready].argmax(axis=1)
+        share = np.full(len(longest), 0.5)
+        pieces = _bisected(pieces, i[longest], j[longest], share)
+    return sum(done[1:], done[0]), np.concatenate(found)
+
+
+def _clipped(pieces: Pieces, values: Array) -> Pieces:
+    """Divide simplices along the zeros of functions that are affine on each (r, k)."""
+    pairs = np.array(list(combinations(range(values.shape[1]), 2)))
+    done: list[Pieces] = []
+    while len(pieces.facet):
+        with np.errstate(invalid="ignore"):
+            crossed = values[:, pairs[:, 0]] * values[:, pairs[:, 1]] < 0.0
+        some = crossed.any(axis=1)
+        done.append(pieces[~some])
+        pieces, values = pieces[some], values[some]
+        i, j = pairs[crossed[some].argmax(axis=1)].T
+        row = np.arange(len(i))
+        a, b = values[row, i], values[row, j]
+        pieces = _bisected(pieces, i, j, a / (a - b))
+        values = np.concatenate([values, values])
+        values[row, j] = values[len(row) + row, i] = 0.0
+    return sum(done[1:], done[0]) if done else pieces
+
+
+def _bisected(pieces: Pieces, i: Ints, j: Ints, share: Array) -> Pieces:
+    """Halves of simplices at a share of their edges ij; the first have corner i, in order."""
+    row = np.arange(len(i))
+    near, far = pieces.barycentric.copy(), pieces.barycentric.copy()
+    middle = (1.0 - share)[:, None] * near[row, i] + share[:, None] * near[row, j]
+    near[row, j], far[row, i] = middle, middle
+    return Pieces(pieces.facet, near) + Pieces(pieces.facet, far)
+
+
+def _normal_projections(corners: Array) -> Array:
+    """Projections (q, d, d) onto what is normal to simplices (q, k, d)."""
+    along = np.linalg.qr(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))[0]
+    projections: Array = np.eye(corners.shape[2]) - along @ np.swapaxes(along, 1, 2)
+    return projections
+
+
+def _joined(pieces: Pieces, on: NDArray[np.bool_], count: int) -> Pieces:
+    """Take those that are on the part; where that are all of a facet, the facet itself."""
+    full = np.bincount(pieces.facet, ~on, minlength=count) == 0
+    whole = Pieces.whole(np.flatnonzero(full), pieces.barycentric.shape[1])
+    return whole + pieces[on & ~full[pieces.facet]]
+
+
+def _off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
+    """Return the centroids (r, d) of simplices, moved out of the strips beside edges.
+
+    Parameters
+    ----------
+    simplices : (r, k, d) array
+        Segments (k = 2) or triangles (k = 3) in facets of the boundary, m.
+    boundary : (b, k, d) array
+        All facets of the boundary, m.
+    size : float
+        Size of the body, m.
+    """
+    points = simplices.mean(axis=1)
+    corners = simplices.shape[1]
+    pairs = combinations(range(corners), 2)
+    lengths = [np.linalg.norm(simplices[:, i] - simplices[:, j], axis=1) for i, j in pairs]
+    width = lengths[0] if corners == 2 else _double_areas(simplices) / np.max(lengths, axis=0)
+    narrow = np.flatnonzero(width <= _STRIP * size)
+    if not len(narrow):
+        return points
+    edges = _ridges(boundary)
+    for row in narrow:
+        own = simplices[row][:, None]
+        away = own - feet(own, edges[:, 0], edges[:, -1])
+        beside = (np.linalg.norm(away, axis=2) <= _STRIP * size).all(axis=0)
+        if not beside.any():
+            continue
+        ways = away[:, beside].mean(axis=0)
+        lengths_of = np.linalg.norm(ways, axis=1)
+        ways = ways[lengths_of > 0.0] / lengths_of[lengths_of > 0.0, None]
+        distinct = np.unique(np.round(ways, 6), axis=0)
+        points[row] += 2.0 * _STRIP * size * distinct.sum(axis=0)
+    return points
+
+
+def _double_areas(triangles: Array) -> Array:
+    one, other = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    gram = np.sum(one**2, axis=1) * np.sum(other**2, axis=1) - np.sum(one * other, axis=1) ** 2
+    return np.sqrt(np.maximum(gram, 0.0))
+
+
+def _ridges(boundary: Array) -> Array:
+    """Where facets (b, k, d) of different directions meet: points (e, 1, d), segments (e, 2, d)."""
+    count, k, d = boundary.shape
+    if k == 2:
+        directions = boundary[:, 1] - boundary[:, 0]
+        ends = boundary[:, :, None]
+    else:
+        directions = np.cross(boundary[:, 1] - boundary[:, 0], boundary[:, 2] - boundary[:, 0])
+        ends = boundary[:, [[0, 1], [0, 2], [1, 2]]]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ends = ends.reshape(-1, k - 1, d)
+    _, node = np.unique(ends.reshape(-1, d), axis=0, return_inverse=True)
+    keys = np.sort(node.reshape(-1, k - 1), axis=1)
+    _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    facet = np.repeat(np.arange(count), k)
+    turn = 1.0 - np.abs(np.sum(directions[facet] * directions[facet[first[place.ravel()]]], axis=1))
+    edges: Array = ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
+    return edges

@@ -1,14 +1,15 @@
 """Supports, loads and the analysis of a scene. SI units."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import ceil
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from verify.scene.history import History
+from verify.scene.history import History, factor_at, slope_at
 from verify.scene.regions import parse_expression
 from verify.scene.strict import (
     Components,
@@ -18,9 +19,13 @@ from verify.scene.strict import (
     NonNegative,
     Point3,
     Positive,
+    Rules,
     Strict,
     Vector,
-)
+    none_or_both,
+)  # fmt: skip
+
+Array = NDArray[np.float64]
 
 _OUTPUTS = 11
 
@@ -36,9 +41,7 @@ def is_timed(components: Sequence[float | str]) -> bool:
     return any(isinstance(one, str) and parse_expression(one, 3, True).timed for one in components)
 
 
-def field_values(
-    components: Sequence[float | str], points: NDArray[np.float64], time: float = 0.0
-) -> NDArray[np.float64]:
+def field_values(components: Sequence[float | str], points: Array, time: float = 0.0) -> Array:
     """Values (n, components) of numbers and formulas at points (n, d) and a time, s."""
     if is_uniform(components):
         return np.tile(np.asarray(components, dtype=float), (len(points), 1))
@@ -51,9 +54,7 @@ def field_values(
     return np.column_stack(columns)
 
 
-def field_rates(
-    components: Sequence[float | str], points: NDArray[np.float64], time: float
-) -> NDArray[np.float64]:
+def field_rates(components: Sequence[float | str], points: Array, time: float) -> Array:
     """Return the derivatives (n, components) of `field_values` by the time, 1/s."""
     rates = np.zeros((len(points), len(components)))
     for k, one in enumerate(components):
@@ -69,17 +70,17 @@ class Rotation(Strict):
     centre: Vector = Field(description="a point that it leaves where it is, m")
     axis: Point3 | None = Field(default=None, description="3D: its direction; of any length")
 
-    def matrix(self, factor: float = 1.0) -> NDArray[np.float64]:
+    def matrix(self, factor: float = 1.0) -> Array:
         """Rotation matrix (d, d) of the angle times a factor."""
         angle, n = np.deg2rad(self.angle) * factor, self._spin()
         turn = np.eye(len(n)) + np.sin(angle) * n + (1.0 - np.cos(angle)) * n @ n
         return np.asarray(turn)
 
-    def matrix_rate(self, factor: float = 1.0) -> NDArray[np.float64]:
+    def matrix_rate(self, factor: float = 1.0) -> Array:
         """Return the derivative (d, d) of the matrix by the factor."""
         return np.asarray(np.deg2rad(self.angle) * self._spin() @ self.matrix(factor))
 
-    def _spin(self) -> NDArray[np.float64]:
+    def _spin(self) -> Array:
         """Skew-symmetric matrix of the unit axis."""
         if self.axis is None:
             return np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -103,23 +104,16 @@ class Support(Strict):
     )
     history: History | None = None
 
-    @model_validator(mode="after")
-    def _turns_all_of_it(self) -> "Support":
-        if self.rotation is not None and (self.components or self.displacement == "exact"):
-            raise ValueError("a rotation goes with a displacement of all components")
-        return self
-
-    @model_validator(mode="after")
-    def _lengths_agree(self) -> "Support":
-        if self.components is not None:
-            if len(set(self.components)) != len(self.components) or not self.components:
-                raise ValueError(f"components {self.components} must name each component once")
-            if self.displacement != "exact" and len(self.displacement) != len(self.components):
-                raise ValueError(
-                    f"displacement has {len(self.displacement)} values for components "
-                    f"{self.components}; expected one per component"
-                )
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda p: p.rotation is not None and (p.components or p.displacement == "exact"),
+         "a rotation goes with a displacement of all components"),
+        ("", lambda p: p.components is not None
+         and (not p.components or len(set(p.components)) < len(p.components)) and (p.components,),
+         "components {} must name each component once"),
+        ("", lambda p: p.components is not None and p.displacement != "exact"
+         and len(p.displacement) != len(p.components) and (len(p.displacement), p.components),
+         "displacement has {} values for components {}; expected one per component"),
+    )  # fmt: skip
 
     @property
     def timed(self) -> bool:
@@ -132,9 +126,7 @@ class Support(Strict):
             return tuple(range(dimension))
         return tuple("xyz".index(name) for name in self.components)
 
-    def values(
-        self, points: NDArray[np.float64], factor: float = 1.0, time: float = 0.0
-    ) -> NDArray[np.float64]:
+    def values(self, points: Array, factor: float = 1.0, time: float = 0.0) -> Array:
         """Prescribed displacement (k, held) of points (k, d), m, unless it is ``"exact"``.
 
         A history's factor multiplies the displacement and the angle of a rotation; `time` (s) is
@@ -147,9 +139,7 @@ class Support(Strict):
             moved += (points - np.asarray(self.rotation.centre)) @ turn.T
         return moved
 
-    def velocities(
-        self, points: NDArray[np.float64], factor: float, slope: float, time: float
-    ) -> NDArray[np.float64]:
+    def velocities(self, points: Array, factor: float, slope: float, time: float) -> Array:
         """Velocity (k, held), m/s: of `values`, with the factor's `slope` (1/s)."""
         assert self.displacement != "exact"
         speed = slope * field_values(self.displacement, points, time)
@@ -160,14 +150,92 @@ class Support(Strict):
         return speed
 
 
-class Gravity(Strict):
+@dataclass(frozen=True)
+class PrescribedMotion:
+    """Prescribed motion of the points that a support holds, by its own values or an exact field.
+
+    Attributes
+    ----------
+    support : Support
+    points : (k, d) array
+        In m.
+    near : (k, d) array or None
+        Points of the material that the points move, which say on which side of a cut they are, m;
+        None: the points themselves say it.
+    exact : object or None
+        The exact solution, where the support says ``"exact"``.
+    """
+
+    support: Support
+    points: Array
+    near: Array | None
+    exact: Any
+
+    @property
+    def moves(self) -> bool:
+        """Whether the values change in time."""
+        timed = self.support.timed if self.exact is None else self.exact.moves
+        return bool(timed or self.support.history)
+
+    def values(self, factor: float, time: float = 0.0) -> Array:
+        """Prescribed displacement (k, held), m, of a factor of the history at a time in s."""
+        if self.exact is None:
+            return self.support.values(self.points, factor, time)
+        return factor * self._held(self.exact.at(time).displacement(self.points, self.near))
+
+    def velocities(self, time: float) -> Array:
+        """Prescribed velocity (k, held), m/s, at a time in s; after a kink there."""
+        history = self.support.history
+        factor, slope = factor_at(history, time), slope_at(history, time)
+        if self.exact is None:
+            return self.support.velocities(self.points, factor, slope, time)
+        field = self.exact.at(time)
+        speed = factor * field.velocity(self.points, self.near)
+        if slope:
+            speed = speed + slope * field.displacement(self.points, self.near)
+        return self._held(speed)
+
+    def _held(self, values: Array) -> Array:
+        return np.asarray(values[:, list(self.support.held(values.shape[1]))])
+
+
+class _Load(Strict):
+    """A load with numbers or formulas, one per component, or that of the exact solution."""
+
+    @property
+    def components(self) -> Sequence[float | str] | Literal["exact"]:
+        """The numbers and formulas given, or ``"exact"``."""
+        raise NotImplementedError
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is that of the exact solution."""
+        return self.components == "exact"
+
+    @property
+    def timed(self) -> bool:
+        """Whether a formula names the time."""
+        return self.components != "exact" and is_timed(self.components)
+
+    def values(self, points: Array, time: float = 0.0) -> Array:
+        """Values (n, components) at points (n, d) and a time, s, unless it is ``"exact"``."""
+        assert self.components != "exact"
+        return field_values(self.components, points, time)
+
+
+class Gravity(_Load):
     """Acceleration acting on the density."""
 
     kind: Literal["gravity"]
     acceleration: Vector = Field(description="m/s²")
 
+    @property
+    def components(self) -> Sequence[float | str]:
+        """Acceleration, m/s²."""
+        return self.acceleration
 
-class BodyForce(Strict):
+
+class BodyForce(_Load):
     """Force per volume, or that of the exact solution."""
 
     kind: Literal["body_force"]
@@ -177,22 +245,12 @@ class BodyForce(Strict):
     history: History | None = None
 
     @property
-    def exact(self) -> bool:
-        """Whether it is that of the exact solution."""
-        return self.force == "exact"
-
-    @property
-    def timed(self) -> bool:
-        """Whether a formula names the time."""
-        return self.force != "exact" and is_timed(self.force)
-
-    def values(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
-        """Force per volume (n, d) in N/m³ at points (n, d), unless it is ``"exact"``."""
-        assert self.force != "exact"
-        return field_values(self.force, points, time)
+    def components(self) -> Sequence[float | str] | Literal["exact"]:
+        """Force per volume, N/m³."""
+        return self.force
 
 
-class Traction(Strict):
+class Traction(_Load):
     """Force per area on a part of the boundary (dead load)."""
 
     kind: Literal["traction"]
@@ -203,22 +261,12 @@ class Traction(Strict):
     history: History | None = None
 
     @property
-    def exact(self) -> bool:
-        """Whether it is that of the exact solution."""
-        return self.traction == "exact"
-
-    @property
-    def timed(self) -> bool:
-        """Whether a formula names the time."""
-        return self.traction != "exact" and is_timed(self.traction)
-
-    def values(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
-        """Traction (n, d) in Pa at points (n, d), unless it is ``"exact"``."""
-        assert self.traction != "exact"
-        return field_values(self.traction, points, time)
+    def components(self) -> Sequence[float | str] | Literal["exact"]:
+        """Force per area, Pa."""
+        return self.traction
 
 
-class CutFaces(Strict):
+class CutFaces(_Load):
     """A load on both faces of a cut that is in balance, per area of the undeformed faces.
 
     It is a dead load: its direction stays what it is when the faces turn.
@@ -237,40 +285,25 @@ class CutFaces(Strict):
     )
     history: History | None = None
 
-    @model_validator(mode="after")
-    def _one_form(self) -> "CutFaces":
-        if (self.pressure is None) == (self.traction is None):
-            raise ValueError("a load on the faces of a cut has either a pressure or a traction")
-        return self
-
-    @property
-    def exact(self) -> bool:
-        """Whether an exact solution says it: no."""
-        return False
-
-    @property
-    def timed(self) -> bool:
-        """Whether a formula names the time."""
-        return is_timed(self.components)
+    rules: ClassVar[Rules] = (
+        ("", none_or_both("pressure", "traction"),
+         "a load on the faces of a cut has either a pressure or a traction"),
+    )  # fmt: skip
 
     @property
     def components(self) -> Sequence[float | str]:
-        """The numbers and formulas given."""
+        """Pressure, or traction on the face of the positive side, Pa."""
         if self.traction is not None:
             return self.traction
         return [] if self.pressure is None else [self.pressure]
 
-    def given(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
-        """Pressure (n, 1), or traction (n, d) on the positive side's face, at points (n, d), Pa."""
-        return field_values(self.components, points, time)
-
-    def values(
+    def on_faces(
         self,
-        points: NDArray[np.float64],
-        outward: NDArray[np.float64],
-        normals: NDArray[np.float64],
+        points: Array,
+        outward: Array,
+        normals: Array,
         time: float = 0.0,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Traction (n, d) in Pa at points (n, d) of faces.
 
         Parameters
@@ -284,7 +317,7 @@ class CutFaces(Strict):
         time : float
             s.
         """
-        given = self.given(points, time)
+        given = self.values(points, time)
         if self.traction is None:
             return np.asarray(-given * outward)
         # the material on the positive side ends where its outward normal points to the other
@@ -334,15 +367,14 @@ class Analysis(Strict):
         default=(0.0, 0.0), description="Rayleigh: mass (1/s) and stiffness (s) factors"
     )
 
-    @model_validator(mode="after")
-    def _times_belong(self) -> "Analysis":
-        if self.kind == "dynamic" and self.duration is None:
-            raise ValueError("a dynamic analysis needs a duration")
-        if self.kind == "static" and (self.duration or self.time_step or self.outputs):
-            raise ValueError("duration, time_step and outputs belong to a dynamic analysis")
-        if self.kind == "static" and any(self.damping):
-            raise ValueError("damping belongs to a dynamic analysis")
-        return self
+    rules: ClassVar[Rules] = (
+        ("", lambda a: a.kind == "dynamic" and a.duration is None,
+         "a dynamic analysis needs a duration"),
+        ("", lambda a: a.kind == "static" and (a.duration or a.time_step or a.outputs),
+         "duration, time_step and outputs belong to a dynamic analysis"),
+        ("", lambda a: a.kind == "static" and any(a.damping),
+         "damping belongs to a dynamic analysis"),
+    )  # fmt: skip
 
     @property
     def output_times(self) -> tuple[float, ...]:

@@ -1,397 +1,271 @@
-"""Checks that take more than one part of a scene: dimensions, names, times."""
+"""Placement in the body: of cuts, and of the points, parts and regions that a scene names.
 
+Each function says in words what is wrong, key first, or nothing.
+"""
+
+from collections.abc import Callable
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.geometry.nearest import feet
-from verify.scene.acceptance import (
-    METRICS,
-    OF_CUTS,
-    OF_MOTION,
-    OVERLAP,
-    PartQuantity,
-    StressIntensityQuantity,
-)  # fmt: skip
-from verify.scene.cut_placement import check_cuts, check_points
+from verify.errors import InputError
+from verify.geometry.nearest import distance_to_outline, distance_to_pieces
+from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
+from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
 from verify.scene.cuts import ArcCut
-from verify.scene.empty_parts import check_parts_act
-from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
-from verify.scene.initial import InitialField, Moving
-from verify.scene.material_regions import check_material_regions
-from verify.scene.nearest import nearest
-from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
-from verify.scene.regions import parse_expression, parse_region
-from verify.scene.skin import Skin
-from verify.scene.spatial_cuts import DiscCut, PolygonCut
+from verify.scene.geometry import Box, Polygon, Rectangle
+from verify.scene.held_facets import held_facets
+from verify.scene.parts import on_part, pieces_on_part
+from verify.scene.physics import Traction
 from verify.scene.tables import SceneTables
-from verify.scene.tool_path import ToolPathCut
 
-_MOST = 1e10  # nodes of a mesh (25 TB in the plane), and time steps
-_ON_FRONT = 1e-3  # of the radius or the edge: what is given in a few digits is on the front
-# quantities that need no name of their own
-_QUANTITIES = ("strain_energy", "maximum_displacement")
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-
-def check_placement(scene: SceneTables) -> None:
-    """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
-    _check_dimensions(scene)
-    _check_counts(scene)
-    _check_regions(scene)
-    check_material_regions(scene)
-    _check_formulas(scene)
-    _check_exact(scene)
-    _check_names(scene)
-    _check_acceptance(scene)
-    _check_known_findings(scene)
-    _check_adequacy(scene)
-    check_parts_act(scene)
-    _check_times(scene)
-    check_cuts(scene)
-    check_points(scene)
+_TOLERANCE = 1e-9  # of the size of what is compared
+_ON_CUT = 1e-3  # of the body: the cut that a point is held against is triangulated
+_SAMPLES = 2**16  # of the body: a region of less than about 1e-4 of it may be missed
+# steps of an additive recurrence that fills a square or a cube evenly (Roberts 2018)
+_STEPS = {2: (0.75487766625, 0.56984029100), 3: (0.81917251340, 0.67104360670, 0.54970047790)}
 
 
-def boundary_condition_names(scene: SceneTables) -> tuple[str, ...]:
-    """Names that `where` may use: the boundary parts, and ``boundary`` for all of it."""
-    return (*scene.geometry.parts(), "boundary")
+# -------------------------------------------------------------------------------------- materials
+def points_of_body(scene: SceneTables) -> Array:
+    """Points (n, d) all over the body; none of a body that only its mesh file knows."""
+    body, d = scene.geometry, scene.dimension
+    ends = body.extremes()
+    if not len(ends):
+        return np.zeros((0, d))
+    share = np.mod(0.5 + np.outer(np.arange(1, _SAMPLES + 1), _STEPS[d]), 1.0)
+    points: Array = ends.min(axis=0) + share * np.ptp(ends, axis=0)
+    return points[inside_polygon(points, ends)] if isinstance(body, Polygon) else points
 
 
-def _check_dimensions(scene: SceneTables) -> None:
-    d = scene.dimension
-    if d == 2 and scene.material.plane is None:
-        raise ValueError("material.plane: a 2D scene needs plane = 'strain' or 'stress'")
-    if d == 3 and scene.material.plane is not None:
-        raise ValueError("material.plane: belongs to 2D scenes")
-    for cells in scene.mesh.cells or []:
-        if len(cells) != d:
-            raise ValueError(f"mesh.cells: {list(cells)} has {len(cells)} numbers; expected {d}")
-    if isinstance(scene.geometry, MeshFile | Skin) != (scene.mesh.pattern == "given"):
-        raise ValueError(
-            "mesh.pattern: 'given' and a geometry of kind 'file' or 'skin' belong together"
-        )
-    if scene.mesh.pattern == "structured" and isinstance(scene.geometry, Polygon):
-        raise ValueError(
-            "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"
-        )
-    if not scene.supports and scene.analysis.kind == "static":
-        raise ValueError("supports: a static scene needs at least one")
-    for i, support in enumerate(scene.supports):
-        if any(c >= d for c in support.held(d)):
-            raise ValueError(f"supports[{i}].components: z in a 2D scene")
-        if support.displacement != "exact" and len(support.displacement) != len(support.held(d)):
-            raise ValueError(
-                f"supports[{i}].displacement: {len(support.displacement)} values; "
-                f"expected {len(support.held(d))}"
+def empty_region(scene: SceneTables, points: Array) -> str | None:
+    """Which material is that of none of the points (n, d) of the body."""
+    regions = scene.material.regions
+    if not regions or not len(points):
+        return None
+    found = np.bincount(scene.material.number_at(points), minlength=len(regions) + 1)
+    for i, region in enumerate(regions):
+        if not found[i + 1]:
+            return (
+                f"material.regions[{i}].where: no part of the body lies in '{region.where}' alone; "
+                "of regions that overlap, the last one counts"
             )
-        if support.rotation is not None:
-            _check_rotation(support.rotation, d, f"supports[{i}].rotation")
-    for i, load in enumerate(scene.loads):
-        if isinstance(load, CutFaces):
-            _check_faces(scene, load, f"loads[{i}]")
-            continue
-        vector = {"gravity": "acceleration", "body_force": "force", "traction": "traction"}
-        value = getattr(load, vector[load.kind])
-        if value != "exact" and len(value) != d:
-            raise ValueError(f"loads[{i}].{vector[load.kind]}: {len(value)} values; expected {d}")
-        if isinstance(load, Gravity) and scene.material.density is None:
-            raise ValueError(f"loads[{i}]: gravity needs material.density")
-    for i, cut in enumerate(scene.cuts):
-        if cut.dimension != d:
-            raise ValueError(f"cuts[{i}]: a {cut.kind} cut in a {d}D scene")
-    membrane = scene.cell_dimension < d
-    if membrane != (scene.material.thickness is not None):
-        need = "a membrane needs it" if membrane else "belongs to membranes (cells = 'surface')"
-        raise ValueError(f"material.thickness: {need}")
-    if membrane and scene.analysis.kinematics == "linear":
-        raise ValueError(
-            "analysis.kinematics: a membrane has no stiffness across itself but by its rotation; "
-            "expected 'corotational'"
-        )
-    if scene.analysis.kind == "dynamic" and scene.material.density is None:
-        raise ValueError("material.density: a dynamic analysis needs it")
+    if not found[0]:
+        return "material.regions: they cover the body; [material] is that of no part"
+    return None
 
 
-def _check_counts(scene: SceneTables) -> None:
-    """Refuse meshes and steps of which there would be more than any machine holds."""
-    body, analysis = scene.geometry, scene.analysis
-    if isinstance(body, Rectangle | Polygon | Box):
-        ends = [body.lower, body.upper] if isinstance(body, Box) else body.outline()
-        sides = np.ptp(ends, axis=0)
-        levels = [sides / size for size in scene.mesh.sizes or []]
-        levels += [np.array(cells, dtype=float) for cells in scene.mesh.cells or []]
-        for i, counts in enumerate(levels):
-            if (nodes := np.prod(counts + 1.0)) > _MOST:
-                key = "sizes" if scene.mesh.sizes else "cells"
-                extent = " × ".join(f"{side:.3g}" for side in sides)
-                raise ValueError(
-                    f"mesh.{key}[{i}]: about {nodes:.0e} nodes in a body of {extent} m; expected "
-                    f"at most {_MOST:.0e}"
-                )
-    if analysis.duration and analysis.time_step:
-        steps = analysis.duration / analysis.time_step
-        if steps > _MOST:
-            raise ValueError(
-                f"analysis.time_step: {steps:.0e} steps to the end at {analysis.duration:g} s; "
-                f"expected at most {_MOST:.0e}"
-            )
+# ---------------------------------------------------------------------------- parts of the boundary
+def part_without_facets(scene: SceneTables) -> str | None:
+    """Which support or traction would act nowhere, as far as the scene alone tells.
+
+    A traction needs a part of the boundary's facets; a support that, or a node of the structured
+    meshes of the scene. Of other meshes nothing is known but that they have nodes at the corners.
+    """
+    for level, facets in enumerate(_boundary(scene) if _inequalities(scene) else []):
+        where_it_is = f" on mesh level {level}" if scene.mesh.count > 1 else ""
+        if found := _without_facets(scene, facets, where_it_is):
+            return found
+    return None
 
 
-def _check_faces(scene: SceneTables, load: CutFaces, place: str) -> None:
-    names = [cut.name for cut in scene.cuts]
-    if load.cut not in names:
-        raise ValueError(f"{place}.cut: no cut '{load.cut}'{nearest(load.cut, names)}")
-    if scene.cell_dimension < scene.dimension:
-        raise ValueError(f"{place}: the cuts of a membrane have no faces that a load acts on")
-    if next(cut for cut in scene.cuts if cut.name == load.cut).kind == "tool_path":
-        raise ValueError(f"{place}.cut: '{load.cut}' is opened on the way; its faces bear no load")
-    if load.traction is not None and len(load.traction) != scene.dimension:
-        given = len(load.traction)
-        raise ValueError(f"{place}.traction: {given} values; expected {scene.dimension}")
+def part_without_mesh(scene: SceneTables, points: Array, cells: Ints) -> str | None:
+    """Which support or traction acts on no node or facet of a given mesh, (n, d) and (m, k)."""
+    corners = cells.shape[1]
+    rest = [[j for j in range(corners) if j != k] for k in range(corners)]
+    facets = np.sort(cells[:, rest].reshape(-1, corners - 1), axis=1)
+    distinct, count = np.unique(facets, axis=0, return_counts=True)
+    return _without_facets(scene, points[distinct[count == 1]], "")
 
 
-def _check_rotation(rotation: Rotation, dimension: int, place: str) -> None:
-    if len(rotation.centre) != dimension:
-        raise ValueError(f"{place}.centre: expected {dimension} coordinates")
-    if (rotation.axis is not None) != (dimension == 3):
-        need = "3D needs one" if dimension == 3 else "belongs to 3D scenes"
-        raise ValueError(f"{place}.axis: {need}")
-    if rotation.axis is not None and not any(rotation.axis):
-        raise ValueError(f"{place}.axis: is zero")
-
-
-def _check_regions(scene: SceneTables) -> None:
-    names = boundary_condition_names(scene)
-    places = [(f"supports[{i}].where", s.where) for i, s in enumerate(scene.supports)]
-    places += [
-        (f"loads[{i}].where", load.where)
+def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:
+    """Key, inequality, and whether more than a node is needed, of supports and tractions."""
+    parts = [(f"supports[{i}].where", s.where, False) for i, s in enumerate(scene.supports)]
+    parts += [
+        (f"loads[{i}].where", load.where, True)
         for i, load in enumerate(scene.loads)
         if isinstance(load, Traction)
     ]
-    for place, where in places:
-        if where in names:
-            continue
-        if where.replace("_", "").isalnum():
-            raise ValueError(f"{place}: no part '{where}'{nearest(where, names)}")
+    return [part for part in parts if part[1] not in (*scene.geometry.parts(), "boundary")]
+
+
+def _without_facets(scene: SceneTables, facets: Array, where_it_is: str) -> str | None:
+    """Which part has nothing of facets (k, corners, d), and for a support no node."""
+    points = facets.reshape(-1, scene.dimension)
+    for key, where, area in _inequalities(scene):
+        if area:
+            acts = len(pieces_on_part(scene.geometry, where, facets).facet) > 0
+        else:
+            size = float(np.ptp(points, axis=0).max())
+            touched = on_part(scene.geometry, where, points, size)
+            acts = bool(touched.any() or held_facets(scene.geometry, where, facets).held.any())
+        if not acts:
+            what = "facet" if area else "node"
+            return f"{key}: no {what} of the boundary lies in '{where}'{where_it_is}"
+    return None
+
+
+def _boundary(scene: SceneTables) -> list[Array]:
+    """Facets (k, corners, d) of the boundary of each level, or pieces in their place."""
+    body, mesh = scene.geometry, scene.mesh
+    if isinstance(body, Rectangle | Box) and mesh.pattern == "structured":
+        lower, upper = np.array(body.lower), np.array(body.upper)
+        sizes = [np.ceil((upper - lower) / h * (1 - 1e-9)).astype(int) for h in mesh.sizes or []]
+        return [_faces(lower, upper, np.array(counts)) for counts in mesh.cells or sizes]
+    if isinstance(body, Rectangle | Polygon):
+        outline = body.outline()
+        return [np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)]
+    return []  # known from its mesh alone, or meshed by nobody
+
+
+def _faces(lower: Array, upper: Array, counts: Ints) -> Array:
+    """Edges (k, 2, 2) of a divided rectangle, or half squares (k, 3, 3) of a divided box."""
+    dimension = len(counts)
+    axes = [np.linspace(a, b, n + 1) for a, b, n in zip(lower, upper, counts, strict=True)]
+    found = []
+    for normal, end in product(range(dimension), (0, -1)):
+        others = [k for k in range(dimension) if k != normal]
+        first = np.meshgrid(*[np.arange(counts[k]) for k in others], indexing="ij")
+        corners = []
+        for step in product((0, 1), repeat=dimension - 1):
+            point = np.empty((first[0].size, dimension))
+            point[:, normal] = axes[normal][end]
+            for k, index, s in zip(others, first, step, strict=True):
+                point[:, k] = axes[k][index.ravel() + s]
+            corners.append(point)
+        square = np.stack(corners, axis=1)
+        found += [square] if dimension == 2 else [square[:, :3], square[:, 1:]]
+    return np.concatenate(found)
+
+
+# ------------------------------------------------------------------------------------------- cuts
+def misplaced_cut(scene: SceneTables) -> str | None:
+    """Which cut lies outside the body, other than expected, or on another one."""
+    cuts = _known(scene)
+    for i, cut in enumerate(cuts):
+        if found := _misplaced(scene, cut):
+            return f"cuts[{i}] ('{cut.name}'): {found}"
+    for a, b in combinations(cuts, 2):
+        if common := _common(a, b):
+            return f"cuts: '{a.name}' and '{b.name}' lie on each other over {common}"
+    return None
+
+
+def _known(scene: SceneTables) -> list[Any]:
+    """Return the final cuts; a blade that sweeps no known surface stays a tool path."""
+    known: list[Any] = []
+    for cut in scene.cuts:
         try:
-            parse_region(where, scene.dimension)
-        except ValueError as error:
-            raise ValueError(f"{place}: {error}") from None
+            known.append(cut.whole())
+        except InputError:  # played only: the solvers say so
+            known.append(cut)
+    return known
 
 
-def _check_formulas(scene: SceneTables) -> None:
-    """Refuse formulas that cannot be read; where they are no finite number is found on meshes."""
-    given = {f"supports[{i}].displacement": s.displacement for i, s in enumerate(scene.supports)}
-    for i, load in enumerate(scene.loads):
-        if isinstance(load, BodyForce):
-            given[f"loads[{i}].force"] = load.force
-        elif isinstance(load, Traction):
-            given[f"loads[{i}].traction"] = load.traction
-        elif isinstance(load, CutFaces):
-            key = "pressure" if load.traction is None else "traction"
-            given[f"loads[{i}].{key}"] = list(load.components)
-    dynamic = scene.analysis.kind == "dynamic"
-    for place, components in given.items():
-        _check_components(components, scene.dimension, dynamic, place)
-    if isinstance(scene.initial, InitialField):
-        for key in ("displacement", "velocity"):
-            components = getattr(scene.initial, key)
-            _check_components(components or [], scene.dimension, False, f"initial.{key}")
-
-
-def _check_components(components: Any, dimension: int, timed: bool, place: str) -> None:
-    for text in [] if components == "exact" else components:
-        if isinstance(text, str):
-            try:
-                parse_expression(text, dimension, timed)
-            except ValueError as error:
-                raise ValueError(f"{place}: {error}") from None
-
-
-def _check_exact(scene: SceneTables) -> None:
-    wants = [f"supports[{i}]" for i, s in enumerate(scene.supports) if s.displacement == "exact"]
-    wants += [
-        f"loads[{i}]"
-        for i, load in enumerate(scene.loads)
-        if (isinstance(load, BodyForce) and load.force == "exact")
-        or (isinstance(load, Traction) and load.traction == "exact")
-    ]
-    if isinstance(scene.initial, InitialField):
-        own = ("displacement", "velocity")
-        wants += [f"initial.{key}" for key in own if getattr(scene.initial, key) == "exact"]
-    if scene.reference.kind == "exact":
-        wants.append("reference.kind")
-    if wants and scene.exact is None:
-        raise ValueError(f"{wants[0]}: 'exact' needs an [exact] solution")
-
-
-def _check_tip(scene: SceneTables, asked: StressIntensityQuantity, place: str) -> None:
-    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
-    blade = isinstance(cut, ToolPathCut) and cut.dimension == 3
-    if asked.mode == "III" and cut.dimension == 2:
-        raise ValueError(f"{place}.mode: III belongs to 3D scenes")
-    if blade and asked.mode != "III":
-        raise ValueError(f"{place}.mode: III alone is measured behind the blade of a tool_path")
-    key, other = ("end", "point") if cut.dimension == 2 or blade else ("point", "end")
-    if getattr(asked, key) is None or getattr(asked, other) is not None:
-        raise ValueError(f"{place}.{key}: a factor in {cut.dimension}D is at '{key} = …'")
-    if isinstance(cut, ArcCut) and cut.sweep == 360.0:
-        raise ValueError(f"{place}.cut: '{asked.cut}' is closed and has no end")
-    if cut.dimension == 3 and not blade:
-        _check_front(cut, np.asarray(asked.point), place)
-
-
-def _check_front(cut: Any, point: NDArray[np.float64], place: str) -> None:
-    """Refuse a point that is neither on the rim of a round disc nor on an edge of a polygon."""
-    if isinstance(cut, DiscCut) and cut.radius is not None:
-        spoke, size = point - np.asarray(cut.centre), cut.radius
-        height = float(spoke @ cut.axes()[2])
-        off = float(np.hypot(np.linalg.norm(spoke - height * cut.axes()[2]) - size, height))
-    elif isinstance(cut, PolygonCut):
-        start, end = cut.edge_of(point)
-        size = float(np.linalg.norm(end - start))
-        off = float(np.linalg.norm(point - feet(point, start, end)))
+def _misplaced(scene: SceneTables, cut: Any) -> str | None:
+    body = scene.geometry
+    if isinstance(body, Rectangle | Polygon) and cut.dimension == 2:
+        outline, vertices = body.outline(), cut.vertices()
+        cuts_it = bool(inner_parts(vertices, outline))
+        closed = np.array_equal(vertices[0], vertices[-1])
+        ends = vertices[[0, -1]]
+        inside = inside_polygon(ends, outline)
+        inside &= distance_to_outline(ends, outline) > _TOLERANCE * np.ptp(outline, axis=0).max()
+        kind = ("through", "edge", "inner")[int(inside.sum())]
+    elif isinstance(body, Box) and cut.dimension == 3 and not cut.on_the_way:
+        surface, (lower, upper) = cut.facets(), body.extremes()
+        cuts_it = area_inside(surface, lower, upper) > 0.0
+        rim = rim_edges(surface)
+        closed = len(rim) == 0
+        length = float(np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1).sum())
+        share = length_inside(rim, lower, upper) / length if length else 0.0
+        kind = "through" if share == 0.0 else "inner" if share > 1 - _TOLERANCE else "edge"
     else:
-        raise ValueError(
-            f"{place}.cut: factors in 3D are known along the fronts of round discs and of polygons"
-        )
-    if off > _ON_FRONT * size:
-        raise ValueError(f"{place}.point: is {off:.3g} m away from the front of '{cut.name}'")
+        return None  # known to the mesh only: checked by the solvers
+    if not cuts_it:
+        return "lies outside the body or along its boundary; it cuts nothing"
+    if cut.expected and cut.expected != kind and not closed:
+        return f"expected '{cut.expected}' but it is '{kind}'"
+    return None
 
 
-def _check_times(scene: SceneTables) -> None:
-    """Refuse times in a static scene, and times after the end."""
-    duration = scene.analysis.duration
-    times: dict[str, float | None] = {
-        f"quantities[{i}].time": getattr(quantity, "time", None)
-        for i, quantity in enumerate(scene.quantities)
+def _common(a: Any, b: Any) -> str | None:
+    """How much of two cuts lies on each other, with its unit, or None."""
+    if a.dimension != b.dimension:
+        return None
+    if a.dimension == 3:
+        area = 0.0 if a.on_the_way or b.on_the_way else overlap_area(a.facets(), b.facets())
+        return f"{area:.3g} m²" if area else None
+    if isinstance(a, ArcCut) and isinstance(b, ArcCut):
+        length = _common_arc(a, b)
+    else:  # an arc has no straight part
+        length = overlap_length(a.vertices(), b.vertices()) if a.faceted and b.faceted else 0.0
+    return f"{length:.3g} m" if length else None
+
+
+def _common_arc(a: ArcCut, b: ArcCut) -> float:
+    """Length that two arcs have in common: they touch at points, unless their circle is one."""
+    tolerance = _TOLERANCE * max(a.radius, b.radius)
+    apart = float(np.hypot(a.centre[0] - b.centre[0], a.centre[1] - b.centre[1]))
+    if apart > tolerance or abs(a.radius - b.radius) > tolerance:
+        return 0.0
+    first = (b.start - a.start) % 360.0
+    covered = 0.0
+    for begin in (first - 360.0, first):
+        covered += max(0.0, min(a.sweep, begin + b.sweep) - max(0.0, begin))
+    length = float(np.deg2rad(covered)) * a.radius
+    return length if length > tolerance else 0.0
+
+
+# ----------------------------------------------------------------------------------------- points
+def misplaced_point(
+    scene: SceneTables, size: float | None = None, holds: Callable[[Array], bool] | None = None
+) -> str | None:
+    """Which quantity is asked for where there is no material, or two values.
+
+    Of a body from a mesh file its `size`, m, must be given, and whether it `holds` a point (d,).
+    """
+    ends = scene.geometry.extremes()
+    if size is None and not len(ends):
+        return None
+    size = float(np.ptp(ends, axis=0).max()) if size is None else size
+    for i, asked in enumerate(scene.quantities):
+        place, point = f"quantities[{i}].point:", getattr(asked, "point", None)
+        if asked.kind == "opening" and scene.dimension == 2:
+            cut = next(cut for cut in _known(scene) if cut.name == asked.cut)
+            place = f"quantities[{i}].at: {asked.at} of cut '{asked.cut}' is at"
+            point = point_along(cut.vertices(), asked.at or 0.0)
+        if point is None or asked.kind == "stress_intensity":
+            continue
+        at = np.array(point, dtype=float)
+        where = f"{place} ({', '.join(f'{x:.6g}' for x in at)})"
+        if not (holds(at) if holds else scene.geometry.holds(at[None], _TOLERANCE * size)[0]):
+            return f"{where}, which is not in the body"
+        if found := _at_a_cut(scene, asked, at, size):
+            return f"{where} {found}"
+    return None
+
+
+def _at_a_cut(scene: SceneTables, asked: Any, point: Array, size: float) -> str | None:
+    """Say that a quantity has two values at a point of a cut, or that an opening has none there."""
+    away = {
+        cut.name: float(distance_to_pieces(point[None], cut.pieces())[0])
+        for cut in _known(scene)
+        if cut.dimension == 2 or not cut.on_the_way
     }
-    times |= {
-        f"cuts[{i}].opens_at": getattr(cut, "opens_at", None) or None
-        for i, cut in enumerate(scene.cuts)
-    }
-    for place, time in times.items():
-        if time is not None and duration is None:
-            raise ValueError(f"{place}: belongs to a dynamic analysis")
-        if time is not None and duration is not None and time > duration:
-            raise ValueError(f"{place}: {time:g} s is after the end, {duration:g} s")
-    if duration is None:
-        entries = {f"supports[{i}]": entry.history for i, entry in enumerate(scene.supports)}
-        entries |= {
-            f"loads[{i}]": getattr(load, "history", None) for i, load in enumerate(scene.loads)
-        }
-        for place, history in entries.items():
-            if history is not None:
-                raise ValueError(f"{place}.history: belongs to a dynamic analysis")
-        if scene.initial.kind != "rest":
-            raise ValueError("initial: belongs to a dynamic analysis")
-    if isinstance(scene.initial, Moving):
-        _check_motion(scene, scene.initial)
-    if isinstance(scene.initial, InitialField):
-        for key in ("displacement", "velocity"):
-            given = getattr(scene.initial, key)
-            if given not in (None, "exact") and len(given) != scene.dimension:
-                raise ValueError(f"initial.{key}: {len(given)} values; expected {scene.dimension}")
-
-
-def _check_motion(scene: SceneTables, motion: Moving) -> None:
-    d = scene.dimension
-    for key in ("velocity", "centre"):
-        vector = getattr(motion, key)
-        if vector is not None and len(vector) != d:
-            raise ValueError(f"initial.{key}: {len(vector)} values; expected {d}")
-    if motion.spin is not None and isinstance(motion.spin, tuple) != (d == 3):
-        raise ValueError(f"initial.spin: expected {'a number' if d == 2 else 'three numbers'}")
-
-
-def _check_names(scene: SceneTables) -> None:
-    cuts = [cut.name for cut in scene.cuts]
-    if len(set(cuts)) != len(cuts):
-        raise ValueError(f"cuts: names must differ, got {cuts}")
-    quantities = [quantity.name for quantity in scene.quantities]
-    if len(set(quantities)) != len(quantities):
-        raise ValueError(f"quantities: names must differ, got {quantities}")
-    for i, quantity in enumerate(scene.quantities):
-        if quantity.kind in ("opening", "stress_intensity") and quantity.cut not in cuts:
-            raise ValueError(
-                f"quantities[{i}].cut: no cut '{quantity.cut}'{nearest(quantity.cut, cuts)}"
+    if asked.kind == "opening":
+        off = away.get(asked.cut, 0.0) if scene.dimension == 3 else 0.0
+        return f"is {off:.3g} m away from cut '{asked.cut}'" if off > _ON_CUT * size else None
+    for name, off in away.items():
+        if off <= _TOLERANCE * size and asked.kind == "part":
+            return f"lies on cut '{name}', between two parts"
+        if off <= _TOLERANCE * size:
+            return (
+                f"lies on cut '{name}', where the displacement has two values; ask for an opening"
             )
-        if quantity.kind == "displacement" and len(quantity.point) != scene.dimension:
-            raise ValueError(f"quantities[{i}].point: expected {scene.dimension} coordinates")
-        if quantity.kind == "displacement" and "xyz".index(quantity.component) >= scene.dimension:
-            raise ValueError(f"quantities[{i}].component: z in a 2D scene")
-        if quantity.kind == "part":
-            _check_part(scene, quantity, f"quantities[{i}]")
-        if quantity.kind == "opening":
-            key, other = ("at", "point") if scene.dimension == 2 else ("point", "at")
-            if getattr(quantity, key) is None or getattr(quantity, other) is not None:
-                raise ValueError(
-                    f"quantities[{i}].{key}: an opening in {scene.dimension}D is at '{key} = …'"
-                )
-        if quantity.kind == "stress_intensity":
-            _check_tip(scene, quantity, f"quantities[{i}]")
-    for i, name in enumerate(quantities):
-        if name in METRICS:
-            raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")
-
-
-def _check_part(scene: SceneTables, asked: PartQuantity, place: str) -> None:
-    d = scene.dimension
-    if asked.point is not None and len(asked.point) != d:
-        raise ValueError(f"{place}.point: expected {d} coordinates")
-    if d == 2 and asked.component is not None:
-        axes = ("x", "y") if asked.of == "linear_momentum" else ("z",)
-        if asked.component not in axes:
-            expected = " or ".join(axes)
-            raise ValueError(f"{place}.component: {asked.of} in a 2D scene has {expected}")
-    if asked.of != "strain_energy" and scene.material.density is None:
-        raise ValueError(f"{place}: the {asked.of} of a part needs material.density")
-    moves = asked.of in ("linear_momentum", "angular_momentum", "kinetic_energy")
-    if moves and scene.analysis.duration is None:
-        raise ValueError(f"{place}: {asked.of} belongs to a dynamic analysis")
-    if asked.time is not None and scene.analysis.duration is not None:
-        times = np.array(scene.analysis.output_times)
-        if np.abs(times - asked.time).min() > 1e-9 * times[-1]:
-            raise ValueError(f"{place}.time: {asked.time:g} s is no output time")
-
-
-def _check_acceptance(scene: SceneTables) -> None:
-    """Refuse checks of what is not measured in this scene."""
-    known = dict.fromkeys((*METRICS, *(quantity.name for quantity in scene.quantities)))
-    for i, check in enumerate(scene.acceptance):
-        place = f"acceptance[{i}].metric"
-        if check.metric not in known:
-            asked = nearest(check.metric, known)
-            if check.metric in _QUANTITIES:
-                asked = f"; ask for it: [[quantities]] kind = '{check.metric}'"
-            raise ValueError(f"{place}: no '{check.metric}'{asked}")
-        if check.metric in OF_CUTS and not scene.cuts:
-            raise ValueError(f"{place}: {check.metric} needs a cut")
-        if check.metric == OVERLAP and check.check in ("rate", "ratio"):
-            expected = "expected a check 'error' (at most, m) or 'value'"
-            raise ValueError(f"{place}: {OVERLAP} has no {check.check}; {expected}")
-        if check.metric in OF_MOTION and scene.analysis.duration is None:
-            raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
-        if check.check == "rate" and scene.mesh.count < 3:
-            raise ValueError(f"acceptance[{i}]: a rate needs at least three mesh levels")
-
-
-def _check_adequacy(scene: SceneTables) -> None:
-    """Refuse models that the scene has no other one of."""
-    if scene.adequacy.motion and scene.analysis.kind == "static":
-        raise ValueError("adequacy.motion: belongs to a dynamic analysis")
-    if scene.adequacy.kinematics and scene.cell_dimension < scene.dimension:
-        raise ValueError("adequacy.kinematics: a membrane has no linear kinematics")
-    if scene.adequacy.models and scene.played_only:
-        raise ValueError(f"adequacy: {scene.played_only}")
-
-
-def _check_known_findings(scene: SceneTables) -> None:
-    made = [f"{check.check} of {check.metric}" for check in scene.acceptance]
-    for i, finding in enumerate(scene.known_findings):
-        if not any(map(finding.concerns, scene.acceptance)):
-            own = ", ".join(dict.fromkeys(made)) or "none"
-            raise ValueError(
-                f"known_findings[{i}]: no check '{finding.check} of {finding.metric}' is made of "
-                f"'{finding.solver}'; the case makes {own}"
-            )
+    return None

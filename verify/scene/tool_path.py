@@ -7,7 +7,7 @@ the start.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,18 @@ from verify.errors import InputError
 from verify.geometry.curves import Piece
 from verify.geometry.patches import Patch
 from verify.geometry.planar import polyline_defect
-from verify.scene.plane_cuts import PolylineCut
-from verify.scene.spatial_cuts import PolygonCut, SweptCut
-from verify.scene.strict import Finite, Line, Point3, Positive, Strict, Vector
-
-Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
+from verify.scene.cuts import (
+    ArcCut,
+    CutShape,
+    CylinderCut,
+    DiscCut,
+    Facets,
+    PolygonCut,
+    PolylineCut,
+    SphereCut,
+    SweptCut,
+)  # fmt: skip
+from verify.scene.strict import Finite, Point3, Positive, Vector
 
 _SAME = 1e-9  # of a length: two this close are one
 _SEARCHES = 20  # Newton steps to a place that a turning blade sweeps
@@ -29,7 +36,7 @@ _SEARCHES = 20  # Newton steps to a place that a turning blade sweeps
 Directions = Annotated[list[Point3], Field(min_length=1)]
 
 
-class ToolPathCut(Strict):
+class ToolPathCut(CutShape):
     """Points of the tool's tip in order, with times or a speed; in space a blade of some depth.
 
     In the plane what lies left of the path is its positive side; in space the positive side is
@@ -37,7 +44,6 @@ class ToolPathCut(Strict):
     """
 
     kind: Literal["tool_path"]
-    name: Line = "cut"
     points: list[Vector] = Field(min_length=2, description="points of the tip in order, m")
     times: list[Finite] | None = Field(
         default=None, description="when the tip is at each point, s, before 0 too; or a speed"
@@ -53,6 +59,8 @@ class ToolPathCut(Strict):
         description="3D: where the blade points from the tip; one direction, or one per point",
     )
     expected: Literal["through", "edge", "inner"] | None = None
+
+    on_the_way: ClassVar[bool] = True
 
     @model_validator(mode="after")
     def _is_a_path(self) -> "ToolPathCut":
@@ -135,11 +143,9 @@ class ToolPathCut(Strict):
         moves = np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.0
         return tips[np.concatenate([[True], moves])]
 
-    def surface(self, spacing: float | None = None) -> Surface:
-        """Triangulate what the blade sweeps; as of `verify.scene.spatial_cuts`."""
-        whole = self.whole()
-        assert not isinstance(whole, PolylineCut)
-        return whole.surface(spacing)
+    def facets(self, spacing: float | None = None) -> Facets:
+        """Divide what the blade sweeps into segments or triangles."""
+        return self.whole().facets(spacing)
 
     def pieces(self) -> Sequence[Piece | Patch]:
         """Return the pieces of what the blade sweeps."""
@@ -238,3 +244,9 @@ def _distinct(points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
     """Leave out points that repeat the one before them, round and round."""
     pairs = zip(points, [points[-1], *points], strict=False)
     return [point for point, before in pairs if (point != before).any()]
+
+
+Cut = Annotated[
+    PolylineCut | ArcCut | PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut | ToolPathCut,
+    Field(discriminator="kind"),
+]

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Gravity, Scene, Skin, ToolPathCut, is_uniform
-from verify.scene.replay import Pull
+from verify.scene import Gravity, Pull, Scene, Skin, ToolPathCut, is_uniform
 from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.body_surface import BodySurface

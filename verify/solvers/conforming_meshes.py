@@ -38,7 +38,7 @@ from verify.scene import (
     read_mesh,
 )
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.cuts import Cut
+from verify.scene.tool_path import Cut
 from verify.solvers.cells_of_scene import grid_of
 
 Array = NDArray[np.float64]

@@ -66,7 +66,7 @@ def _cut(cut: Any, size: float) -> Cut:
             (surface,) = cut.pieces()
             return ImplicitCut(surface.level, None if surface.closed else surface.depth)
         case SweptCut():  # plane facets: the triangulation is the cut
-            return TriangulatedSurface(*cut.surface())
+            return TriangulatedSurface(*cut.facets())
         case ToolPathCut() if cut.dimension == 3:
             return ToolPath.of_tip(cut.points, cut.moments, cut.blade).sweep
         case ArcCut(sweep=360.0):

@@ -15,7 +15,7 @@ from verify.errors import InputError
 from verify.printable import one_line, shown, words_of
 from verify.removed import instead
 from verify.scene import Scene
-from verify.scene.nearest import nearest
+from verify.scene.messages import nearest
 from verify.solution import Solution
 from verify.solvers.named import solver_in
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, faces_of, is_uniform
-from verify.scene.part_pieces import pieces_on_part
+from verify.scene.parts import pieces_on_part
 from verify.scene.physics import Load
 from verify.solvers.body_of_scene import volumetric_mass
 from verify.solvers.boundary_of_scene import Boundary, no_facet
@@ -168,7 +168,7 @@ def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Fl
     facets, outward = _faces(body)
     corners = body.points[facets]
     place = next(k for k, cut in enumerate(scene.cuts) if cut.name == load.cut)
-    found = faces_of(scene, corners.mean(axis=1))
+    found = faces_of(scene.cuts, corners.mean(axis=1))
     mine = found.cut == place
     if not mine.any() and scene.analysis.kind == "static":
         raise UnsupportedSceneError(f"{key}: cut '{load.cut}' as realised has no faces to bear it")
@@ -180,7 +180,7 @@ def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Fl
     for shares, weight in zip(*simplex_rule(d - 1, _DEGREE), strict=True):
         points = np.einsum("i,kij->kj", shares, corners)
         try:
-            traction = load.values(points, outward, normals, time)
+            traction = load.on_faces(points, outward, normals, time)
         except InputError as error:
             raise InputError(f"{key}: {error}", str(scene.file or "")) from None
         given = (weight * area)[:, None] * traction

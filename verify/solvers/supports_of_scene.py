@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import PolygonCut, PolylineCut, Scene, SweptCut
-from verify.scene.cuts import Cut
-from verify.scene.held_facets import HeldFacets, held_facets, shifted_ends
-from verify.scene.held_nodes import no_node, points_apart
+from verify.scene.held_facets import HeldFacets, held_facets, no_node, points_apart, shifted_ends
 from verify.scene.history import factor_at, first_factor
-from verify.scene.prescribed import PrescribedMotion
+from verify.scene.physics import PrescribedMotion
+from verify.scene.tool_path import Cut
 from verify.solution import Regularisation
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.body import MovingSupports
