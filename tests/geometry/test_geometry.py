@@ -6,7 +6,7 @@ import pytest
 from verify.geometry.curves import Arc, Segment
 from verify.geometry.nearest import distance_to_pieces, feet, nearest_parts
 from verify.geometry.patches import CylinderPatch, DiscPatch, PlanePatch, SpherePatch
-from verify.geometry.spatial import ear_clipping, frame
+from verify.geometry.spatial import ear_clipping, frame, measures, unit_normals
 
 AXES = frame(np.array([0.3, -0.5, 0.8]), np.array([1.0, 0.4, 0.0]))
 ORIGIN = np.array([0.2, -0.1, 0.4])
@@ -72,6 +72,7 @@ def test_the_level_is_the_signed_distance_along_the_normal(name):
     else:
         on = (uv := piece.cells.mean(axis=1), piece.point(uv))[1]
         normal = piece.normal(uv)
+    assert piece.facing(on) == pytest.approx(normal, abs=1e-14)
     for height in (-0.1, 0.0, 0.2):
         assert piece.level(on + height * normal) == pytest.approx(height, abs=1e-14)
         # the foot is where it started: the normal is square to the piece, and of length one
@@ -97,6 +98,36 @@ def test_the_depth_is_the_distance_to_the_rim_along_the_surface(name):
         if name == "sector":
             exact = np.minimum(exact, piece.arc.length * np.minimum(s, 1.0 - s))
     assert piece.depth(on) == pytest.approx(exact, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["polygon", "disc", "ellipse"])
+def test_a_step_over_the_rim_of_a_flat_piece_leaves_it_and_one_back_does_not(name):
+    """At a reentrant corner too, where outward is not away from the middle."""
+    piece, step = PIECES[name], 1e-6
+    ends, outward = piece.rim()
+    assert np.linalg.norm(outward, axis=1) == pytest.approx(1.0)
+    assert outward @ AXES[2] == pytest.approx(0.0, abs=1e-14)
+    for way, off in ((step, step), (-step, 0.0)):
+        points = ends + way * outward
+        assert np.linalg.norm(points - piece.foot(points), axis=1) == pytest.approx(off, abs=1e-10)
+    assert len(ends) == (len(HOOK) if name == "polygon" else 8)
+
+
+@pytest.mark.parametrize("corners, space", [(2, 2), (2, 3), (3, 3)])
+def test_the_measure_of_a_simplex_is_that_of_gram_and_its_normal_is_square_to_its_edges(
+    corners, space
+):
+    simplices = np.random.default_rng(corners + space).uniform(-1.0, 1.0, (20, corners, space))
+    edges = simplices[:, 1:] - simplices[:, :1]
+    gram = np.sqrt(np.linalg.det(edges @ np.swapaxes(edges, 1, 2)))
+    assert measures(simplices) == pytest.approx(gram / (corners - 1), rel=1e-9)
+    if corners == space:
+        normals = unit_normals(simplices)
+        assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0)
+        assert np.einsum("mkd,md->mk", edges, normals) == pytest.approx(0.0, abs=1e-12)
+        # edges and normal are a right-handed frame in space, in the plane the normal is left
+        frames = np.concatenate([edges, normals[:, None]], axis=1)
+        assert (np.linalg.det(frames) > 0.0).all()
 
 
 def test_the_depth_of_an_ellipse_is_that_beyond_its_rim_to_first_order():

@@ -109,6 +109,17 @@ class PlanePatch(_Flat):
             foot[inside], best[inside], rim[inside] = uv[inside], 0.0, False
         return self.point(foot), rim
 
+    def rim(self) -> tuple[Array, Array]:
+        """Middles (k, 3) of the edges around it, and unit vectors (k, 3) that leave it there."""
+        edges = self.cells[:, [[0, 1], [1, 2], [2, 0]]]
+        outward = (edges[:, :, 1] - edges[:, :, 0])[:, :, ::-1] * [1.0, -1.0]
+        outward *= np.sign(np.linalg.det(self.cells[:, 1:] - self.cells[:, :1]))[:, None, None]
+        outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+        middles = edges.mean(axis=2).reshape(-1, 2)
+        apart = np.linalg.norm(middles[:, None] - middles, axis=2)
+        own = (apart <= 1e-9 * np.ptp(middles)).sum(axis=1) == 1  # another triangle has it not
+        return self.point(middles[own]), outward.reshape(-1, 2)[own] @ self.axes[:2]
+
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
         corners = self.point(self.cells.reshape(-1, 2))
@@ -171,6 +182,13 @@ class DiscPatch(_Flat):
         inner = share > 1e-12
         off = np.divide((1.0 - share) * share, steepness, where=inner, out=np.zeros_like(share))
         return np.where(inner, off, min(self.semi_axes))
+
+    def rim(self) -> tuple[Array, Array]:
+        """Eight points (8, 3) of the rim, and unit vectors (8, 3) that leave the disc there."""
+        angle = np.linspace(0.3, 0.3 + 2 * np.pi, 8, endpoint=False)
+        outward = np.column_stack([np.cos(angle), np.sin(angle)]) / self.semi_axes
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        return self.point(np.column_stack([np.ones(8), angle])), outward @ self.axes[:2]
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""

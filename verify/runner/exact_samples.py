@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.geometry.nearest import distance_to_pieces
-from verify.geometry.spatial import rim_edges
-from verify.scene import ArcCut, CylinderCut, DiscCut, SphereCut
+from verify.geometry.spatial import measures, unit_normals
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.mesh import SimplexMesh
 
@@ -81,7 +80,7 @@ def on_cut(cut: Any, steps: Array, rng: np.random.Generator) -> OnCut:
     ends, outward, of_ends = end_points(cut)
     if len(ends):
         inner = ends[:, None] - steps[:, None] * outward[:, None]
-        if not isinstance(cut, ArcCut):  # whose tangent leaves it
+        if cut.dimension == 3 or cut.faceted:  # the tangent of an arc leaves it
             points = np.concatenate([points, inner.reshape(-1, points.shape[1])])
             normals = np.concatenate([normals, np.repeat(of_ends, len(steps), axis=0)])
     far = np.full(len(points), np.inf)
@@ -96,43 +95,18 @@ def end_points(cut: Any) -> tuple[Array, Array, Array]:
     In space the middles of the edges of a plane patch, and points of the rim of a disc; none of
     surfaces that are curved or kinked.
     """
-    match cut:
-        case DiscCut():
-            plane, (a, b) = cut.axes(), cut.semi_axes
-            angle = np.linspace(0.3, 0.3 + 2 * np.pi, 8, endpoint=False)
-            ring = np.column_stack([np.cos(angle), np.sin(angle)])
-            outward = ring / [a, b] @ plane[:2]
-            outward /= np.linalg.norm(outward, axis=1)[:, None]
-            return (
-                np.asarray(cut.centre) + ring * [a, b] @ plane[:2],
-                outward,
-                np.tile(plane[2], (len(ring), 1)),
-            )
-        case ArcCut():
-            if cut.sweep == 360.0:
-                return (np.zeros((0, 2)),) * 3
-            angle = np.deg2rad([cut.start, cut.start + cut.sweep])
-            away = np.column_stack([np.cos(angle), np.sin(angle)])
-            along = np.column_stack([-away[:, 1], away[:, 0]]) * [[-1.0], [1.0]]
-            return np.asarray(cut.centre) + cut.radius * away, along, -away
-        case _ if cut.dimension == 2:
-            line = cut.vertices()
-            if np.array_equal(line[0], line[-1]):
-                return (np.zeros((0, 2)),) * 3
-            along = np.array([line[0] - line[1], line[-1] - line[-2]])
-            along /= np.linalg.norm(along, axis=1)[:, None]
-            left = np.column_stack([-along[:, 1], along[:, 0]]) * [[-1.0], [1.0]]
-            return line[[0, -1]], along, left
-    points, triangles = cut.facets()
-    normals = _normals(points[triangles])
-    if isinstance(cut, CylinderCut | SphereCut) or np.ptp(normals, axis=0).max() > 1e-9:
+    pieces = cut.pieces()
+    if cut.dimension == 2:
+        first, last = pieces[0], pieces[-1]
+        ends = np.concatenate([first.point([0.0]), last.point([1.0])])
+        along = np.concatenate([first.tangent([0.0]), last.tangent([1.0])])
+        outward, normals = along * [[-1.0], [1.0]], along[:, ::-1] * [-1.0, 1.0]
+        closed = np.linalg.norm(ends[1] - ends[0]) <= 1e-12 * np.abs(ends).max()
+        return (np.zeros((0, 2)),) * 3 if closed else (ends, outward, normals)
+    if cut.plane_normal is None:
         return (np.zeros((0, 3)),) * 3
-    rim, centre = rim_edges((points, triangles)), points[triangles].mean(axis=(0, 1))
-    outward = np.cross(normals[:1], rim[:, 1] - rim[:, 0])
-    outward /= np.linalg.norm(outward, axis=1)[:, None]
-    middle = rim.mean(axis=1)
-    outward *= np.sign(np.einsum("kc,kc->k", outward, middle - centre))[:, None]
-    return middle, outward, np.tile(normals[0], (len(rim), 1))
+    ends, outward = pieces[0].rim()
+    return ends, outward, np.tile(cut.plane_normal, (len(ends), 1))
 
 
 def distances(cuts: Sequence[Any], points: Array) -> Array:
@@ -143,41 +117,16 @@ def distances(cuts: Sequence[Any], points: Array) -> Array:
 
 def _faces(cut: Any, rng: np.random.Generator) -> tuple[Array, Array]:
     """Points (n, d) all over a cut, and unit normals there, to its positive side."""
-    match cut:
-        case ArcCut():
-            angle = np.deg2rad(cut.start + cut.sweep * rng.uniform(0.02, 0.98, _FACES))
-            away = np.column_stack([np.cos(angle), np.sin(angle)])
-            return np.asarray(cut.centre) + cut.radius * away, -away
-        case SphereCut():
-            points = cut.facets()[0]
-            points = points[_some(len(points), _FACES, rng)]
-            return points, (np.asarray(cut.centre) - points) / cut.radius
-        case CylinderCut():
-            points, axes = cut.facets()[0], cut.axes()
-            points = points[_some(len(points), _FACES, rng)]
-            return points, -((points - np.asarray(cut.base)) @ axes[:2].T @ axes[:2]) / cut.radius
-        case _ if cut.dimension == 2:
-            line = cut.vertices()
-            corners = np.stack([line[:-1], line[1:]], axis=1)
-            along = corners[:, 1] - corners[:, 0]
-            normals = np.column_stack([-along[:, 1], along[:, 0]])
-            normals /= np.linalg.norm(along, axis=1)[:, None]
-            sizes = np.linalg.norm(along, axis=1)
-        case _:
-            points, triangles = cut.facets()
-            corners = points[triangles]
-            normals = _normals(corners)
-            sizes = np.linalg.norm(
-                np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-            )
+    points, facets = cut.facets()
+    corners = points[facets]
+    sizes = measures(corners)
     part = rng.choice(len(corners), _FACES, p=sizes / sizes.sum())
-    return _inside(corners[part], rng), normals[part]
-
-
-def _normals(corners: Array) -> Array:
-    """Return the unit normals (m, 3) of triangles (m, 3, 3)."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+    drawn = _inside(corners[part], rng)
+    if cut.faceted:
+        return drawn, unit_normals(corners)[part]
+    (piece,) = cut.pieces()
+    feet = piece.foot(drawn)
+    return feet, piece.facing(feet)
 
 
 def _inside(corners: Array, rng: np.random.Generator) -> Array:

@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
 Side = Callable[[Array], Array]
 _Variables = Mapping[str, Array]
+_Term = Callable[[_Variables], tuple[Any, Any]]  # the value, and its derivative by the time
 
 _LONGEST = 2000  # characters
 _COORDINATES = ("x", "y", "z")
@@ -72,19 +73,15 @@ def parse_region(text: str, dimension: int) -> Region:
     A comparison holds at no point where one of its sides is no finite number: 1/x > 10 not at
     x = 0, sqrt(x - 0.5) >= 0 not at x < 0.5. Such a number without x, y, z is an error.
     """
-    _check_length(text)
+    tree = _parsed(text, _MEANING)
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise InputError(f"'{text}' is not {_MEANING}") from None
-    try:
-        _check_condition(tree, text, _COORDINATES[:dimension])
+        condition = _condition(tree, _Language(text, _COORDINATES[:dimension], _MEANING))
     except RecursionError:
         raise InputError(f"the inequality is nested too deep; expected {_MEANING}") from None
 
     def region(points: Array) -> NDArray[np.bool_]:
         with np.errstate(all="ignore"):
-            values = _condition(tree, _variables(points, 0.0))
+            values = condition(_variables(points, 0.0))
         return np.broadcast_to(values, (len(points),)).astype(bool)
 
     return region
@@ -97,10 +94,11 @@ def comparisons(text: str, dimension: int) -> list[tuple[Side, Side]]:
     finite number, it is not a number.
     """
     parse_region(text, dimension)
+    language = _Language(text, _COORDINATES[:dimension], _MEANING)
     found = []
-    for node in ast.walk(ast.parse(text.strip(), mode="eval").body):
+    for node in ast.walk(_parsed(text, _MEANING)):
         if isinstance(node, ast.Compare):
-            sides = [_side(term) for term in (node.left, *node.comparators)]
+            sides = [_side(_number(term, language)) for term in (node.left, *node.comparators)]
             found += list(pairwise(sides))
     return found
 
@@ -121,13 +119,13 @@ def is_affine(text: str) -> bool:
                 return varies(right)
         return False
 
-    return not any(bends(node) for node in ast.walk(ast.parse(text.strip(), mode="eval")))
+    return not any(bends(node) for node in ast.walk(_parsed(text, _MEANING)))
 
 
-def _side(node: ast.AST) -> Side:
+def _side(term: _Term) -> Side:
     def side(points: Array) -> Array:
         with np.errstate(all="ignore"):
-            values = np.broadcast_to(_number(node, _variables(points, 0.0)), (len(points),))
+            values = np.broadcast_to(term(_variables(points, 0.0))[0], (len(points),))
         return np.where(np.isfinite(values), values, np.nan)
 
     return side
@@ -155,14 +153,10 @@ class Expression:
         names = (*_COORDINATES[:dimension], *((_TIME,) if timed else ()))
         example = "1e3 * (y - 0.5) * t" if timed else "1e3 * (y - 0.5)"
         meaning = _FORMULA.format(variables=", ".join(names), example=example)
-        _check_length(text)
+        self._tree = _parsed(text, meaning)
         try:
-            self._tree = ast.parse(text.strip(), mode="eval").body
-            _check_number(self._tree, text, names, meaning)
-            _check_constants(self._tree, text)
-        except InputError:
-            raise
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            self._term = _term(self._tree, _Language(text, names, meaning))
+        except RecursionError:
             raise InputError(f"'{text}' is not {meaning}") from None
         self.text = text
 
@@ -181,7 +175,7 @@ class Expression:
             Where a value is no finite number; the message names the place.
         """
         with np.errstate(all="ignore"):
-            values = _number(self._tree, _variables(points, time))
+            values = self._term(_variables(points, time))[0]
         return self._finite(values, points, "is no finite number")
 
     def rate(self, points: Array, time: float) -> Array:
@@ -193,7 +187,7 @@ class Expression:
             Where it is no finite number.
         """
         with np.errstate(all="ignore"):
-            rates = _dual(self._tree, _variables(points, time))[1]
+            rates = self._term(_variables(points, time))[1]
         return self._finite(rates, points, f"has no finite rate at {time:.6g} s")
 
     def _finite(self, values: Array, points: Array, what: str) -> Array:
@@ -216,116 +210,127 @@ def _variables(points: Array, time: float) -> dict[str, Array]:
     return {**named, _TIME: np.float64(time)}
 
 
-def _check_length(text: str) -> None:
+class _Language(NamedTuple):
+    """What a text may say: it, the variables that it may name, and what it is meant to be."""
+
+    text: str
+    names: tuple[str, ...]
+    meaning: str
+
+    def fault(self, node: ast.AST) -> InputError:
+        """Error of a part of the text that is not allowed."""
+        return InputError(
+            f"'{ast.unparse(node)}' in '{self.text}' is not allowed; expected {self.meaning}"
+        )
+
+
+def _parsed(text: str, meaning: str) -> ast.expr:
+    """Read a text into a syntax tree, of which nothing is known yet."""
     if len(text) > _LONGEST:
         raise InputError(f"has {len(text)} characters; expected at most {_LONGEST}")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError(f"'{text}' is not {meaning}") from None
 
 
-def _reject(node: ast.AST, text: str, meaning: str = _MEANING) -> InputError:
-    return InputError(f"'{ast.unparse(node)}' in '{text}' is not allowed; expected {meaning}")
-
-
-def _check_condition(node: ast.AST, text: str, names: tuple[str, ...]) -> None:
+def _condition(node: ast.AST, language: _Language) -> Callable[[_Variables], NDArray[np.bool_]]:
+    """Turn a condition into a function of the variables, or refuse it."""
     match node:
-        case ast.BoolOp(values=values):
-            for value in values:
-                _check_condition(value, text, names)
+        case ast.BoolOp(op=op, values=values):
+            parts = [_condition(value, language) for value in values]
+            combine = np.logical_and if isinstance(op, ast.And) else np.logical_or
+            return lambda at: reduce(combine, [part(at) for part in parts])
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            _check_condition(operand, text, names)
+            inner = _condition(operand, language)
+            return lambda at: np.logical_not(inner(at))
         case ast.Compare(left=left, ops=ops, comparators=comparators) if all(
             type(op) in _COMPARISONS for op in ops
         ):
-            for value in (left, *comparators):
-                _check_number(value, text, names)
-                _check_constants(value, text)
-        case _:
-            raise _reject(node, text)
+            terms = [_term(value, language) for value in (left, *comparators)]
+
+            def holds(at: _Variables) -> NDArray[np.bool_]:
+                values = [term(at)[0] for term in terms]
+                steps = zip(ops, pairwise(values), strict=True)
+                compared = [_COMPARISONS[type(op)](a, b) for op, (a, b) in steps]
+                return reduce(np.logical_and, compared + [np.isfinite(one) for one in values])
+
+            return holds
+    raise language.fault(node)
 
 
-def _check_constants(node: ast.AST, text: str) -> None:
+def _term(node: ast.AST, language: _Language) -> _Term:
+    """Turn a number into a function of the variables; what has none must be finite."""
+    term = _number(node, language)
+    _check_constants(node, language)
+    return term
+
+
+def _check_constants(node: ast.AST, language: _Language) -> None:
     """Refuse 1/0, sqrt(-1), 10**999: what holds no variable must be a finite number."""
     variable = (*_COORDINATES, _TIME)
     if any(isinstance(part, ast.Name) and part.id in variable for part in ast.walk(node)):
         for part in node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node):
             if isinstance(part, ast.expr):
-                _check_constants(part, text)
+                _check_constants(part, language)
         return
     with np.errstate(all="ignore"):
-        finite = np.isfinite(_number(node, {}))
+        finite = np.isfinite(_number(node, language)({})[0])
     if not finite:
-        raise InputError(f"'{ast.unparse(node)}' in '{text}' is no finite number")
+        raise InputError(f"'{ast.unparse(node)}' in '{language.text}' is no finite number")
 
 
-def _check_number(
-    node: ast.AST, text: str, names: tuple[str, ...], meaning: str = _MEANING
-) -> None:
-    match node:
-        case ast.Constant(value=bool()):
-            raise _reject(node, text, meaning)
-        case ast.Constant(value=int() | float() as value) if abs(value) <= 1e300:
-            pass
-        case ast.Name(id=name) if name in (*names, "pi"):
-            pass
-        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            _check_number(operand, text, names, meaning)
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
-            _check_number(left, text, names, meaning)
-            _check_number(right, text, names, meaning)
-        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if (
-            name in _FUNCTIONS and len(arguments) == (2 if name == "hypot" else 1)
-        ):
-            for argument in arguments:
-                _check_number(argument, text, names, meaning)
-        case _:
-            raise _reject(node, text, meaning)
+def _number(node: ast.AST, language: _Language) -> _Term:
+    """Turn a number into a function of the variables, or refuse it.
 
-
-def _condition(node: ast.AST, at: _Variables) -> NDArray[np.bool_]:
-    match node:
-        case ast.BoolOp(op=op, values=values):
-            combine = np.logical_and if isinstance(op, ast.And) else np.logical_or
-            return reduce(combine, (_condition(value, at) for value in values))
-        case ast.UnaryOp(operand=operand):
-            return np.logical_not(_condition(operand, at))
-        case ast.Compare(left=left, ops=ops, comparators=comparators):
-            terms = [_number(value, at) for value in (left, *comparators)]
-            steps = zip(ops, terms[:-1], terms[1:], strict=True)
-            holds = [_COMPARISONS[type(op)](a, b) for op, a, b in steps]
-            return reduce(np.logical_and, holds + [np.isfinite(term) for term in terms])
-    raise AssertionError(ast.dump(node))  # _check_condition lets nothing else through
-
-
-def _number(node: ast.AST, at: _Variables) -> Array:
-    value: Array = _dual(node, at)[0]
-    return value
-
-
-def _dual(node: ast.AST, at: _Variables) -> tuple[Any, Any]:
-    """Return the value, and its derivative by the time (forward differentiation)."""
+    The function gives the value, and its derivative by the time (forward differentiation).
+    """
     still = np.float64(0.0)
-    pair: Any
     match node:
-        case ast.Constant(value=value):
-            pair = np.float64(value), still  # type: ignore[arg-type]
+        case ast.Constant(value=int() | float() as value) if (
+            not isinstance(value, bool) and abs(value) <= 1e300
+        ):
+            return lambda at: (np.float64(value), still)
         case ast.Name(id="pi"):
-            pair = np.float64(np.pi), still
-        case ast.Name(id=name):
-            pair = at[name], np.float64(name == _TIME)
-        case ast.UnaryOp(op=op, operand=operand):
-            a, da = _dual(operand, at)
-            pair = (-a, -da) if isinstance(op, ast.USub) else (a, da)
-        case ast.BinOp(left=left, op=op, right=right):
-            (a, da), (b, db) = _dual(left, at), _dual(right, at)
-            pair = _ARITHMETIC[type(op)](a, b), _RATES[type(op)](a, da, b, db)
-        case ast.Call(func=ast.Name(id="hypot"), args=[one, other]):
-            (a, da), (b, db) = _dual(one, at), _dual(other, at)
-            pair = np.hypot(a, b), _product(1 / np.hypot(a, b), a * da + b * db)
-        case ast.Call(func=ast.Name(id=name), args=[argument]):
-            a, da = _dual(argument, at)
-            pair = _FUNCTIONS[name](a), _product(_SLOPES[name](a), da)
-        case _:
-            raise AssertionError(ast.dump(node))  # _check_number lets nothing else through
-    return pair
+            return lambda at: (np.float64(np.pi), still)
+        case ast.Name(id=name) if name in language.names:
+            return lambda at: (at[name], np.float64(name == _TIME))
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _number(operand, language)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            inner = _number(operand, language)
+
+            def negative(at: _Variables) -> tuple[Any, Any]:
+                a, da = inner(at)
+                return -a, -da
+
+            return negative
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
+            one, other = _number(left, language), _number(right, language)
+            value_of, rate_of = _ARITHMETIC[type(op)], _RATES[type(op)]
+
+            def combined(at: _Variables) -> tuple[Any, Any]:
+                (a, da), (b, db) = one(at), other(at)
+                return value_of(a, b), rate_of(a, da, b, db)
+
+            return combined
+        case ast.Call(func=ast.Name(id="hypot"), args=[left, right], keywords=[]):
+            one, other = _number(left, language), _number(right, language)
+
+            def length(at: _Variables) -> tuple[Any, Any]:
+                (a, da), (b, db) = one(at), other(at)
+                return np.hypot(a, b), _product(1 / np.hypot(a, b), a * da + b * db)
+
+            return length
+        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in _SLOPES:
+            inner, slope = _number(argument, language), _SLOPES[name]
+
+            def applied(at: _Variables) -> tuple[Any, Any]:
+                a, da = inner(at)
+                return _FUNCTIONS[name](a), _product(slope(a), da)
+
+            return applied
+    raise language.fault(node)
 
 
 def _product(slope: Any, rate: Any) -> Any:
