@@ -89,7 +89,7 @@ class _Runs:
 
     def check_names(self, source: str) -> list[str]:
         """Names of the checks of a case, one per solver; a case without any has one."""
-        from verify.applied_checks import judged_by
+        from verify.judge.checks import judged_by
         from verify.runner.plan import solvers_of
         from verify.scene import load_scene
 

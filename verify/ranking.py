@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from verify.result import CaseResult
-
-_REFERENCE = "reference"
+from verify.result import REFERENCE, CaseResult
 
 
 @dataclass(frozen=True)
@@ -172,4 +170,4 @@ class Ranking:
 def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:
     """Return the solvers of a run that can be ranked: all but the reference."""
     names = dict.fromkeys(solve.solver for result in results for solve in result.solves)
-    return [name for name in names if name != _REFERENCE]
+    return [name for name in names if name != REFERENCE]

@@ -15,6 +15,7 @@ from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 
 SCHEMA_VERSION = 1
+REFERENCE = "reference"  #: solver that judges the others, where no exact solution does
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
@@ -65,7 +66,8 @@ class Metric:
     ----------
     name : str
         A relative error (``displacement_l2``, ``energy_norm``, ``jump_l2`` … see
-        `verify.verdict.ERROR_METRICS`), ``strain_energy`` or the name of a quantity of interest.
+        `verify.judge.intervals.ERROR_METRICS`), ``strain_energy`` or the name of a quantity of
+        interest.
     value : float
     unit : str
         ``"1"`` for relative errors.

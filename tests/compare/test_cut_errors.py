@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from cut_meshes import scene
 
-from verify.assess.cut_errors import are_mixed, measured_cut, with_cut, with_other_errors
-from verify.assess.error_history import error_history
-from verify.assess.quantities import Measured
 from verify.compare.body import body_of
+from verify.compare.error_history import error_history
 from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.compare.integration import spread_of
 from verify.compare.motion import ExactMotion
 from verify.geometry.planar import inside_polygon
+from verify.judge.cut_errors import are_mixed, measured_cut, with_cut, with_other_errors
+from verify.judge.quantities import Measured
 from verify.reference_record import ReferenceRecord
 from verify.report.tables import cuts_table
 from verify.result import CUT, CaseResult, SolveRecord, Status

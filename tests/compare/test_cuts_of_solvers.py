@@ -8,11 +8,11 @@ from cut_meshes import scene
 from scipy.spatial import cKDTree
 from solid_meshes import solid_scene
 
-from verify.assess.cut_errors import measured_cut, with_cut
-from verify.assess.quantities import Measured
 from verify.compare.body import body_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
+from verify.judge.cut_errors import measured_cut, with_cut
+from verify.judge.quantities import Measured
 from verify.result import SolveRecord, Status
 from verify.solvers.interface import find_solver
 

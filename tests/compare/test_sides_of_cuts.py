@@ -6,10 +6,10 @@ from cut_meshes import scene as plane_scene
 from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, random_square
 
 from verify.compare.body import body_of
+from verify.compare.error_field import nodal_error
 from verify.compare.error_norm import displacement_jump
 from verify.compare.integration import cut_rules, rules
 from verify.compare.realised import cut_deviation, field_of
-from verify.runner.error_field import nodal_error
 from verify.scene import load_scene
 
 _MOVED = 1e-9  # parts are moved by whole numbers

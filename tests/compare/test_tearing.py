@@ -5,10 +5,10 @@ import pytest
 import scenes
 
 from reference.exact import exact_solution
-from verify.assess.blade_intensity import blade_front, blade_intensity
-from verify.assess.stress_intensity import intensity_defect
+from verify.compare.blade_intensity import blade_front, blade_intensity
 from verify.compare.body import body_of
 from verify.compare.motion import ExactMotion
+from verify.judge.stress_intensity import intensity_defect
 from verify.scene.acceptance import StressIntensityQuantity
 
 

@@ -6,7 +6,7 @@ from reference_scenes import needs_fenicsx, square
 
 from reference.exact import exact_solution
 from reference.fracture import no_tip, stress_intensity, tips
-from verify.assess.stress_intensity import exact_intensity
+from verify.judge.stress_intensity import exact_intensity
 from verify.solvers import find_solver
 
 

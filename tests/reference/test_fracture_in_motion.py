@@ -10,10 +10,10 @@ from test_front_fracture import FRONT, prism
 
 from reference.exact.hooke import hooke
 from reference.fracture import front_intensity, stress_intensity, tips
-from verify.assess.quantities import Measured
-from verify.assess.reference import known_quantity, size_of
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
+from verify.judge.quantities import Measured
+from verify.judge.reference import known_quantity, size_of
 from verify.scene import Material
 from verify.solvers import find_solver
 

@@ -3,10 +3,10 @@
 import pytest
 from reference_scenes import needs_fenicsx
 
-from verify.assess.quantities import Measured
-from verify.assess.reference import known_quantity, size_of
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
+from verify.judge.quantities import Measured
+from verify.judge.reference import known_quantity, size_of
 from verify.scene import list_cases, load_scene, load_scenes
 from verify.solvers import find_solver
 

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 from reference.law import law_of as law_of_material
 from reference.meshing import imprint_polygons, open_cut
 from reference.space import conforming_space
-from verify.assess.quantities import Measured
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.compare.kinetic import kinetic
+from verify.judge.quantities import Measured
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
 from verify.xfem.structured_meshes import rectangle_mesh

@@ -9,9 +9,9 @@ import pytest
 import scenes
 from reference_scenes import needs_fenicsx
 
-from verify.assess.rates import shifted_ends
 from verify.exchange import export_case, problem_of
 from verify.foreign.records import PROGRAMS
+from verify.judge.rates import shifted_ends
 from verify.methods.catalogue import METHODS
 from verify.regularisation import Regularisation
 from verify.result import SolveRecord, Status

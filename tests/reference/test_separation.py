@@ -5,8 +5,8 @@ import pytest
 from reference_scenes import arc, areas, energy_of, needs_fenicsx, polyline, square
 
 from reference.meshing import Grading, conforming_mesh, singular_points
-from verify.assess.richardson import extrapolate
 from verify.errors import InputError
+from verify.judge.richardson import extrapolate
 from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx

@@ -8,12 +8,12 @@ from reference_scenes import needs_fenicsx
 
 from reference.exact.hooke import Hooke, hooke
 from reference.exact.moving_cracks import sudden_intensity, sudden_slip
-from verify.assess.quantities import Measured
-from verify.assess.reference import known_quantity, size_of
-from verify.assess.richardson import extrapolate
-from verify.assess.ringing import ringing_factors
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
+from verify.judge.quantities import Measured
+from verify.judge.reference import known_quantity, size_of
+from verify.judge.richardson import extrapolate
+from verify.judge.ringing import ringing_factors
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.conforming import _RADIUS_OF_JUMPS

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
-from verify.assess.sufficiency import sufficiency
+from verify.judge.sufficiency import sufficiency
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.deepening import further_level, levels_in_vain

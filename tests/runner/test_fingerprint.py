@@ -15,7 +15,7 @@ from verify.source_digest import ROOT, Sources, modules_in
 SOLVING = "verify.runner.solve"
 ROOTS = [
     "verify.solvers.conforming", "verify.solvers.xfem", "verify.solvers.methods_adapter",
-    "verify.runner.assess", "verify.conformance.suite", "verify.report.drawing",
+    "verify.runner.judging", "verify.conformance.suite", "verify.report.drawing",
     "verify.xfem.statics",
 ]  # fmt: skip
 
@@ -70,7 +70,7 @@ def test_a_statement_changes_a_digest_and_a_comment_or_docstring_does_not(module
     assert source_digest._parsed(f"{text}\n_new = 1\n".encode(), package).digest != digest
 
 
-@pytest.mark.parametrize("module", ["reference.law", "verify.applied_checks", "verify.xfem.clip"])
+@pytest.mark.parametrize("module", ["reference.law", "verify.judge.checks", "verify.xfem.clip"])
 def test_what_imports_a_changed_module_has_another_digest_and_nothing_else(
     module, copied, store, sources
 ):
@@ -93,8 +93,8 @@ def test_what_imports_a_changed_module_has_another_digest_and_nothing_else(
 
 def test_a_verdict_depends_on_who_is_judged(sources):
     """Shown once: `judged_by` judged nobody, and stored verdicts were still two PASS."""
-    assert "verify.applied_checks" in sources.closure("verify.runner.assess")
-    assert "verify.verdict" in sources.closure("verify.runner.assess")
+    assert "verify.judge.checks" in sources.closure("verify.runner.judging")
+    assert "verify.judge.verdict" in sources.closure("verify.runner.judging")
 
 
 def test_a_reference_depends_on_no_method_and_no_comparison(sources):

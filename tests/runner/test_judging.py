@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from verify.compare.error_field import nodal_error
 from verify.compare.locate import SolutionField
 from verify.reference_record import ReferenceRecord
 from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner import exit_code
-from verify.runner.error_field import nodal_error
 from verify.runner.solve import solve_job
 from verify.scene import load_scene, scene_content
 from verify.solution import Solution

@@ -16,7 +16,7 @@ from tool_path_scenes import (
     UNSTRUCTURED,
 )
 
-from verify.assess.released import advance
+from verify.compare.released import advance
 from verify.errors import InputError
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import load_scene

@@ -7,11 +7,11 @@ import numpy as np
 from tip_advance import tip_advances
 
 from reference.exact import exact_solution
-from verify.assess.quantities import Measured
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.compare.integration import rules
 from verify.compare.realised import field_of
+from verify.judge.quantities import Measured
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh

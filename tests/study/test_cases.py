@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from reference.exact import exact_solution
-from verify.assess.reference import exact_reference
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError
+from verify.judge.reference import exact_reference
 from verify.runner.checking import check_scene
 from verify.scene import Scene, list_cases, load_scene, load_scenes
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from verify.judge.work import pareto_front, time_at, work_points
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
@@ -19,7 +20,6 @@ from verify.study.calibration.series import series_families
 from verify.study.calibration.study import binomial_tail, calibration_findings
 from verify.study.calibration.trial import Trial, trials
 from verify.study.cost import cost_study, growing_scenes
-from verify.study.cost.work import pareto_front, time_at, work_points
 from verify.study.in_processes import in_processes
 
 STRIP = "statics/tissue_strip"

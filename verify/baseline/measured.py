@@ -5,9 +5,9 @@ from math import isfinite
 from statistics import median
 from typing import Any
 
-from verify.assess.intervals import ERROR_METRICS
 from verify.baseline.record import Independent, Own, Quantity, Speed
 from verify.calibration import KERNEL, seconds_of_note
+from verify.judge.intervals import ERROR_METRICS
 from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of
 
 # errors below this are round-off; how large round-off is says nothing

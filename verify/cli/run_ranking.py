@@ -59,7 +59,7 @@ def rank_run(
     if len(solvers) < 2:
         target.unlink(missing_ok=True)
         return None
-    from verify.study.ranking import rank_solvers  # a run of one solver does not wait for it
+    from verify.judge.ranks import rank_solvers  # a run of one solver does not wait for it
 
     wanted = len(solvers) > _UNASKED if conformance is None else conformance
     before = _stored(target)

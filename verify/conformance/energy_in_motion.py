@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from verify.assess.motion_account import MotionAccount, motion_account
 from verify.compare.hooke import law_of
 from verify.compare.ledger import energy_scale, total_energy
+from verify.compare.motion_account import MotionAccount, motion_account
 from verify.conformance import scenes
 from verify.conformance.check import Check, Finding
 from verify.conformance.trials import Trial

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import body_of
+from verify.compare.error_field import Truth, nodal_differences, truth_of
 from verify.compare.locate import SolutionField
 from verify.compare.stress import strain_and_stress
 from verify.cut_record import CutRecord
@@ -27,7 +28,6 @@ from verify.report.bodies import read_stored
 from verify.report.run_directory import CaseEntry, load_run
 from verify.result import SolveRecord, Status
 from verify.runner.directory import folder_name
-from verify.runner.error_field import Truth, nodal_differences, truth_of
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution
 from verify.whole_files import asked_place, whole_file, write_whole
@@ -63,7 +63,7 @@ def export_fields(
         Mesh level; default the finest of each solver.
     with_reference : bool
         Whether point data ``reference`` and ``error`` (m) are added: displacement less error, and
-        the error as `verify.runner.error_field` takes it.
+        the error as `verify.compare.error_field` takes it.
 
     Returns
     -------

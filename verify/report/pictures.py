@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.applied_checks import REFERENCE
 from verify.errors import InputError
 from verify.geometry.nearest import distance_to_outline, distance_to_polyline
 from verify.geometry.planar import inside_polygon
@@ -27,7 +26,7 @@ from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry
 from verify.report.turntable import packed
-from verify.result import CaseResult, SolveRecord, Status, error_picture, finest_of
+from verify.result import REFERENCE, CaseResult, SolveRecord, Status, error_picture, finest_of
 from verify.solution import Solution
 
 _OF_BODIES, _OF_ERRORS = "cividis", "YlOrBr"  # colours

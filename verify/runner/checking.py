@@ -77,7 +77,7 @@ def _exact_of(scene: Scene, where: str) -> Any:
 
 def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a stress-intensity factor cannot be had from any solution, or None."""
-    from verify.assess.stress_intensity import intensity_defect
+    from verify.judge.stress_intensity import intensity_defect
 
     return intensity_defect(scene, asked)
 

@@ -93,7 +93,7 @@ class Comparison:
         question = self._folder / "judge.json"
         write_json(self._question, question)
         log = self._folder / "judge-log.txt"
-        return Child("verify.runner.assess", question, log, self._timeout, self._memory, own=True)
+        return Child("verify.runner.judging", question, log, self._timeout, self._memory, own=True)
 
     def _without_result(self, ending: Ending) -> CaseResult | None:
         _, why = death(self._child.log, ending, self._timeout, self._memory)

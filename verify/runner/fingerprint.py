@@ -12,7 +12,7 @@ from verify.solvers.interface import module_of, program_of
 from verify.source_digest import code_digest, modules_in
 
 # what solves in a process of its own, and what judges in one
-_SOLVING, _COMPARING = "verify.runner.solve", "verify.runner.assess"
+_SOLVING, _COMPARING = "verify.runner.solve", "verify.runner.judging"
 # what a solver of somebody else may be built on
 _OFFERED = ("solvers", "xfem", "accelerated", "methods", "exchange")
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from verify.assess.adequacy import other_scene
 from verify.errors import UnsupportedSceneError
+from verify.judge.adequacy import other_scene
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.job import Job
 from verify.runner.reference_cache import REFERENCE

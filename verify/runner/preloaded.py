@@ -24,7 +24,7 @@ from verify.processes import PARENT_VARIABLE, die_with_parent
 
 _NEEDED = (
     "numpy.random", "verify.calibration", "verify.solvers.xfem", "verify.solvers.methods_adapter",
-    "verify.runner.solve", "meshio", "reference.exact", "verify.runner.assess",
+    "verify.runner.solve", "meshio", "reference.exact", "verify.runner.judging",
 )  # fmt: skip
 _IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")
 _PR_SET_CHILD_SUBREAPER = 36

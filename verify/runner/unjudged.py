@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from verify.applied_checks import applied_checks, unjudged
+from verify.judge.checks import applied_checks, unjudged
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Verdict
 from verify.runner.job import load_record

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.assess.accuracy import assess_accuracy
 from verify.errors import InputError
+from verify.judge.accuracy import assess_accuracy
 from verify.result import SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution, handed_over

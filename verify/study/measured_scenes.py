@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from verify.assess.accuracy import assess_accuracy
-from verify.assess.intervals import NotMeasuredError, error_interval
 from verify.errors import UnsupportedSceneError
+from verify.judge.accuracy import assess_accuracy
+from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene, ValueCheck, restore_scene

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.assess.error_history import mean_over
-from verify.assess.intervals import quotient_half_width
 from verify.compare.body import AnyBody
+from verify.compare.error_history import mean_over
 from verify.compare.error_norm import ErrorNorm, displacement_error, energy_error
 from verify.compare.hooke import Hooke, Law
 from verify.compare.integration import rules
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
+from verify.judge.intervals import quotient_half_width
 
 Array = NDArray[np.float64]
 Times = Sequence[float | None]

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from verify.assess.changed_scenes import at_rest, with_kinematics
-from verify.assess.quantities import Measured
-from verify.assess.reference import Reference, size_of
 from verify.compare.body import AnyBody
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.hooke import Law, hooke, law_of
 from verify.compare.integration import rules, spread_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.changed_scenes import at_rest, with_kinematics
+from verify.judge.quantities import Measured
+from verify.judge.reference import Reference, size_of
 from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene
 from verify.solution import Solution

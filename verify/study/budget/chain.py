@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from verify.assess.changed_scenes import (
+from verify.compare.body import body_of
+from verify.compare.hooke import hooke
+from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.changed_scenes import (
     on_one_level,
     on_realised_cut,
     with_kinematics,
     with_time_step,
 )
-from verify.assess.reference import (
+from verify.judge.reference import (
     ExactField,
     Reference,
     exact_reference,
     size_of,
 )
-from verify.compare.body import body_of
-from verify.compare.hooke import hooke
-from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.crossing_delay import mean_wait

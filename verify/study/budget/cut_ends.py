@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.assess.realised_cut import polylines_of
 from verify.compare.body import Body
+from verify.compare.realised_geometry import polylines_of
 from verify.geometry.nearest import feet
 
 Array = NDArray[np.float64]

@@ -6,13 +6,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from verify.assess.changed_scenes import with_kinematics
-from verify.assess.quantities import Measured
-from verify.assess.reference import Reference, conforming_reference
 from verify.compare.body import AnyBody, Body, body_of
 from verify.compare.hooke import law_of
 from verify.compare.realised import cut_deviation
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.changed_scenes import with_kinematics
+from verify.judge.quantities import Measured
+from verify.judge.reference import Reference, conforming_reference
 from verify.result import CaseResult
 from verify.scene import Scene
 from verify.solution import Solution

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-from verify.assess.changed_scenes import coarsest
-from verify.assess.quantities import unit_of
-from verify.assess.reference import ExactField
 from verify.compare.body import Body
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.changed_scenes import coarsest
+from verify.judge.quantities import unit_of
+from verify.judge.reference import ExactField
 from verify.result import Verdict
 from verify.scene import Scene
 from verify.solvers.body_of_scene import background_mesh

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verify.assess.richardson import extrapolate
+from verify.judge.richardson import extrapolate
 from verify.study.calibration.trial import Trial
 
 _LIMIT = 1.0

@@ -4,15 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from reference.exact import ExactSolution, exact_of
-from verify.assess.quantities import Measured
-from verify.assess.reference import (
+from verify.compare.body import AnyBody, body_of
+from verify.compare.errors import Rules
+from verify.compare.hooke import Law, law_of
+from verify.judge.quantities import Measured
+from verify.judge.reference import (
     conforming_reference,
     exact_reference,
     size_of,
 )
-from verify.compare.body import AnyBody, body_of
-from verify.compare.errors import Rules
-from verify.compare.hooke import Law, law_of
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.judge.work import WorkPoint, pareto_front, time_at, work_points
 from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.scene import PolylineCut, Scene
-from verify.study.cost.work import WorkPoint, pareto_front, time_at, work_points
 from verify.study.record import Finding, Study
 
 REFERENCE = "reference"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from verify.assess.system_numbers import (
+from verify.compare.system_numbers import (
     CONDITION,
     FREQUENCY,
     SCALED,

@@ -1,0 +1,77 @@
+"""Cost of a model in error: it is said beside the verdict, by the run, and does not move it."""
+
+import re
+
+import pytest
+import scenes
+from pydantic import ValidationError
+
+from verify.compare.hooke import law_of
+from verify.compare.strain_energy import strain_energy
+from verify.judge.accuracy import assess_accuracy
+from verify.judge.adequacy import adequacy_notice, other_scene
+from verify.result import NoticeKind, SolveRecord, Status
+from verify.runner.fingerprint import physics_digest
+from verify.scene import Scene, scene_hash
+from verify.solvers import find_solver
+
+CASE = {
+    "geometry": scenes.box([0.4, 0.1]),
+    "mesh": {"cells": [[4, 2]]},
+    "material": {"young": 1e3, "poisson": 0.3, "plane": "strain", "density": 100.0},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
+    "loads": [{"kind": "gravity", "acceleration": [0.0, -0.13]}],
+    "reference": {"size": 0.03},
+    "quantities": [
+        {"kind": "strain_energy"},
+        {"kind": "displacement", "name": "sag", "point": [0.4, 0.05], "component": "y"},
+    ],
+}
+
+
+def scene(**changes) -> Scene:
+    return scenes.scene(**CASE | changes)
+
+
+def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:
+    """The difference that is said is that of the energies of both references by themselves."""
+    one = scene(adequacy={"kinematics": True})
+    other = other_scene(one, "kinematics")
+    reference = find_solver("reference")
+    own, beside = ({k: reference.solve(s, k, 0) for k in range(3)} for s in (one, other))
+    judged = find_solver("conforming").solve(one, 0, 0)
+    record = _record(judged)
+    result = assess_accuracy(one, [record], {"conforming": {0: judged}, "reference": own})
+    notice = adequacy_notice(one, "kinematics", beside, result)
+    assert notice.kind is NoticeKind.ADEQUACY
+    rich = strain_energy(beside[2], law_of(other))
+    poor = strain_energy(own[2], law_of(one))
+    assert "in strain_energy" in notice.text, notice.text
+    said = float(re.search(r"([\d.]+) % \(± [^)]*\) in strain_energy", notice.text)[1])  # type: ignore[index]
+    assert said == pytest.approx(100 * abs(poor / rich - 1), rel=0.06)  # two digits
+    assert said > 0.5
+    assert notice.text.startswith("linear kinematics against finite rotation: ")
+
+
+def _record(solution):
+    return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
+
+
+def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
+    """References stay in the cache; the other scene asks nothing further."""
+    asked, plain = scene(adequacy={"kinematics": True}), scene()
+    assert physics_digest(asked) == physics_digest(plain)
+    assert scene_hash(asked) == scene_hash(plain)
+    other = other_scene(asked, "kinematics")
+    assert not other.adequacy.models
+    assert other.analysis.kinematics == "corotational"
+    assert other.reference.levels == 3
+
+
+def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
+    moving = scene(
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1}, adequacy={"motion": True}
+    )
+    assert other_scene(moving, "motion").analysis.kind == "static"
+    with pytest.raises(ValidationError, match="dynamic"):
+        scene(adequacy={"motion": True})

@@ -1,0 +1,185 @@
+"""Closing cuts: overlaps stand in the record, warn unless they are meant, and are drawn."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pressed_halves import normal, pressed
+
+from verify.judge.closing import with_openings
+from verify.reference_record import ReferenceRecord
+from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.scene import load_scene
+from verify.solvers import find_solver
+
+SHARED = """
+title = "A square, cut through"
+requirement = "Nothing shall overlap."
+
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+
+[mesh]
+cells = [[4, 4]]
+
+[material]
+young = 1.0
+poisson = 0.3
+density = 1.0
+plane = "strain"
+
+[[supports]]
+where = "boundary"
+displacement = [0.0, 0.0]
+
+[[cuts]]
+kind = "polyline"
+name = "through"
+points = [[{0[0]}, {0[1]}], [{1[0]}, {1[1]}]]
+"""
+ALONG = np.array([normal(2)[1], -normal(2)[0]])
+STILL = np.eye(2), np.zeros(2)
+
+
+def scene(folder, more=""):
+    file = folder / "square.toml"
+    ends = [(0.5 + s * ALONG).tolist() for s in (-0.8, 0.8)]
+    file.write_text(SHARED.format(*ends) + more)
+    return load_scene(file)
+
+
+def moved(shift, n=5, seed=0, **more):
+    return replace(pressed(2, n, [STILL, (np.eye(2), np.asarray(shift))], seed=seed), **more)
+
+
+def examined(asked, solutions, exact=None):
+    """Result of a case whose solutions are given."""
+    solves = [
+        SolveRecord(asked.name, name, level, Status.SOLVED, metrics=[Metric("one", 1.0, "1")])
+        for name, own in solutions.items()
+        for level in own
+    ]
+    blank = CaseResult(asked.name, "", "", "", {}, ReferenceRecord(), solves, [], [])
+    return with_openings(blank, asked, solutions, exact)
+
+
+def levels(shift):
+    return {k: moved(shift, 4 + k, k, size=0.25 / 2**k) for k in range(3)}
+
+
+def test_an_overlap_stands_in_the_record_of_every_solve_and_warns_for_each_solver(tmp_path):
+    shift = -0.0185 * normal(2) + 0.1 * ALONG
+    solutions = {"xfem": {0: moved(shift, 5, 7)}, "reference": levels(shift)}
+    result = examined(scene(tmp_path), solutions)
+    for solve in result.solves:
+        assert solve.metric("overlap_depth").value == pytest.approx(0.0185, rel=1e-6)
+        assert "deformed (" in solve.notes["overlap_depth"]
+    assert sorted(warned.solver for warned in result.warnings) == ["reference", "xfem"]
+    assert all("0.0185 m at (" in warned.text for warned in result.warnings)
+
+
+def test_profiles_hold_both_parts_of_the_jump_with_the_band_of_the_reference(tmp_path):
+    shift = -0.0185 * normal(2) + 0.1 * ALONG
+    solutions = {"xfem": {0: moved(shift, 5, 7)}, "reference": levels(shift)}
+    (profile,) = examined(scene(tmp_path), solutions).openings
+    assert [curve.solver for curve in profile.curves] == ["reference", "xfem"]
+    assert profile.arc == sorted(profile.arc)
+    # from mouth to mouth: a line at the angle of the cut through a square of side 1
+    assert profile.arc[-1] - profile.arc[0] == pytest.approx(1 / ALONG[0], rel=1e-3)
+    for curve in profile.curves:
+        assert curve.normal == pytest.approx([-0.0185] * len(profile.arc), abs=1e-12)
+        assert curve.tangential == pytest.approx([0.1] * len(profile.arc), abs=1e-12)
+    assert max(profile.curves[0].normal_band) < 1e-12  # all levels are exact here
+    assert profile.curves[1].normal_band == []
+
+
+@pytest.mark.parametrize("shift", [0.02 * normal(2), 0.1 * ALONG, 0.0 * ALONG])
+def test_what_opens_slides_or_stays_does_not_warn(tmp_path, shift):
+    result = examined(scene(tmp_path), {"xfem": {0: moved(shift)}, "reference": levels(shift)})
+    assert not result.warnings
+    assert [s.metric("overlap_depth").value for s in result.solves] == [0.0] * 4
+
+
+# the faces of a sheared cut stay closed; a solver that is off by a hundredth of the slip overlaps
+# by that, which is its error; one that is off by half of the slip gives another answer
+@pytest.mark.parametrize(("off", "warns"), [(0.001, False), (0.05, True)])
+def test_an_error_of_the_opening_is_no_overlap_unless_it_is_another_answer(tmp_path, off, warns):
+    slip = 0.1 * ALONG
+    solutions = {"xfem": {0: moved(slip - off * normal(2))}, "reference": levels(slip)}
+    result = examined(scene(tmp_path), solutions)
+    assert result.solves[0].metric("overlap_depth").value == pytest.approx(off, rel=1e-6)
+    assert bool(result.warnings) == warns
+
+
+def test_the_deepest_overlap_of_a_motion_is_found_at_its_time(tmp_path):
+    asked = scene(tmp_path, '\n[analysis]\nkind = "dynamic"\nduration = 1.0\n')
+    shifts = [0.0, 0.04, -0.03, 0.01]
+    frames = [moved(s * normal(2)) for s in shifts]
+    motion = replace(
+        frames[0], displacement=np.concatenate([f.displacement for f in frames]),
+        times=np.linspace(0.0, 1.0, 4),
+    )  # fmt: skip
+    result = examined(asked, {"xfem": {0: motion}})
+    assert result.solves[0].metric("overlap_depth").value == pytest.approx(0.03, rel=1e-6)
+    assert "at 0.6667 s" in result.warnings[0].text
+    shown = {profile.why: profile.curves[0].normal[5] for profile in result.openings}
+    assert shown == pytest.approx(
+        {"last output time": 0.01, "largest opening": 0.04, "deepest overlap of xfem": -0.03}
+    )
+
+
+PLATE = """
+title = "A plate pressed across its slit"
+requirement = "It shall be warned of."
+
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [0.1, 0.1]
+
+[mesh]
+cells = [[16, 16]]
+
+[material]
+young = 1.0e4
+poisson = 0.3
+plane = "strain"
+
+[[supports]]
+where = "bottom"
+displacement = [0.0, 0.0]
+
+[[supports]]
+where = "top"
+displacement = [0.0, {}]
+
+[[cuts]]
+kind = "polyline"
+points = [[0.021, 0.0437], [0.0763, 0.0569]]
+"""
+
+
+# both supports turn as one, so that the answer is the same one, turned; equilibrium is found to
+# 1e-9 of the forces
+def test_a_plate_that_closes_its_slit_overlaps_as_much_after_a_turn_by_125_degrees(tmp_path):
+    found = []
+    for degrees in (0.0, 125.0):
+        spin = f"rotation = {{ angle = {degrees}, centre = [0.05, 0.05] }}\n"
+        down = turned(degrees) @ [0.0, -0.01]
+        text = PLATE.format("UP").replace("[0.0, UP]", f"{down.tolist()}\n{spin}")
+        text = text.replace("displacement = [0.0, 0.0]\n", f"displacement = [0.0, 0.0]\n{spin}")
+        file = tmp_path / "turned.toml"
+        file.write_text(text + '\n[analysis]\nkinematics = "finite_rotation"\n')
+        asked = load_scene(file)
+        result = examined(asked, {"xfem": {0: find_solver("xfem").solve(asked, 0)}})
+        assert len(result.warnings) == 1
+        found.append([m.value for m in result.solves[0].metrics if m.name.startswith("overlap")])
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+    assert found[0][0] > 0.005
+
+
+def turned(degrees):
+    a = np.deg2rad(degrees)
+    return np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])

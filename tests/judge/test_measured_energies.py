@@ -1,0 +1,345 @@
+"""Energies are measured: whoever lies about them is found out, and an honest lumped mass is not."""
+
+from dataclasses import replace
+from itertools import product
+from math import factorial, prod
+
+import numpy as np
+import pytest
+from cut_meshes import grid, quadratic
+from judged_fields import judged
+from lying_solvers import PARTS, faster, hidden
+from scipy.linalg import eigvalsh
+from solid_meshes import cube_grid
+
+from verify.compare.energy_account import account_metrics
+from verify.compare.hooke import law_of
+from verify.compare.lumping import lumped_shares, lumping_range, nodal_weights
+from verify.compare.motion_account import motion_account
+from verify.compare.simplices import simplices
+from verify.conformance import scenes
+from verify.result import Verdict
+from verify.scene import Scene
+from verify.scene.loading import load_scene
+from verify.scene.physics import field_values
+from verify.solution import Solution
+from verify.solvers.interface import find_solver
+from verify.solvers.xfem import XfemSolver
+from verify.study.energy import account_findings
+from verify.study.measured_scenes import AT_MOST, Measurement
+
+D = 0.003 / 0.46  # 1/s: takes 2 D ∫T dt, of a bar that has half of its energy in motion
+DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
+
+
+@pytest.fixture(scope="module")
+def plate():
+    """A plate that is cut while it vibrates, and an honest lumped answer."""
+    case = load_scene("dynamics/plate_cut_vibrating")
+    return case, XfemSolver().solve(case, 0, 0)
+
+
+def judgement_of(case, solution, check=DRIFT):
+    """Verdict and record of a copy of the case with that one check."""
+    asked = case.model_dump(mode="json", by_alias=True) | {"acceptance": [check]}
+    found = judged(Scene.model_validate(asked), {"xfem": {0: solution}})
+    return found.verdicts[0].verdict, found.solves[0]
+
+
+def verdict_of(case, solution, check=DRIFT):
+    return judgement_of(case, solution, check)[0]
+
+
+def energies_of(case, solution):
+    metrics, notes = account_metrics(case, motion_account(case, solution, law_of(case)))
+    return {metric.name: metric for metric in metrics}, notes
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("d", [2, 3])
+def test_lumping_changes_the_kinetic_energy_by_a_factor_in_the_range_of_a_cell(d, order):
+    """[1, d + 2] of linear simplices, however their nodes lie: of a whole mesh, by eigenvalues.
+
+    Quadratic ones may lose energy too. Cells of a cut cell are cells: the mass of a part that is
+    lumped at the corners of the whole cell is not that of any of them, and has no such bound.
+    """
+    points, cells = grid(3, 2) if d == 2 else cube_grid(1, 2, 1)
+    points = points + 0.06 * np.random.default_rng(5).normal(size=points.shape)
+    if order == 2:
+        points, cells = quadratic(points, cells)
+    still = np.zeros((1, *points.shape))
+    volume = simplices(points, cells).volume
+    low, high = lumping_range(d, order)
+    if order == 1:
+        assert (low, high) == pytest.approx((1.0, d + 2.0), rel=1e-12)
+    lumped, consistent = np.zeros((2, len(points), len(points)))
+    for nodes, size in zip(cells, volume, strict=True):
+        lumped[nodes, nodes] += size * lumped_shares(d, order)
+        consistent[np.ix_(nodes, nodes)] += size * cell_mass(d, order)
+    ratios = eigvalsh(lumped, consistent)
+    assert ratios.min() >= low - 1e-12
+    assert ratios.max() <= high + 1e-12
+    one = Solution(points, cells, still, order=order)
+    assert nodal_weights(one, 1.0) == pytest.approx(consistent.sum(axis=1), abs=1e-15)
+
+
+def cell_mass(d, order):
+    """Consistent mass of a cell of mass 1: integrals of monomials λ^a are a! d!/(|a| + d)!."""
+    unit = np.eye(d + 1, dtype=int)
+    hats = [[(1.0, one)] for one in unit]
+    if order == 2:
+        corners = [[(2.0, 2 * one), (-1.0, one)] for one in unit]
+        ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: d * (d + 1) // 2]
+        hats = [*corners, *([(4.0, unit[a] + unit[b])] for a, b in ends)]
+
+    def integral(powers):
+        return prod(map(factorial, powers)) * factorial(d) / factorial(sum(powers) + d)
+
+    return np.array([
+        [sum(c * e * integral(a + b) for (c, a), (e, b) in product(one, other)) for other in hats]
+        for one in hats
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("part", [*PARTS, None])
+def test_a_gain_that_is_hidden_in_any_part_of_a_ledger_is_found(plate, part):
+    """Velocities of five times the kinetic energy at the end, and a ledger that closes.
+
+    Without a ledger, and without a declared mass, it is found as well: lumping is no such factor.
+    A ledger that says that the scheme gained it is right, and the energy is not kept.
+    """
+    case, honest = plate
+    assert verdict_of(case, honest) is Verdict.PASS
+    liar = faster(honest, 5.0) if part is None else hidden(honest, 5.0, part)
+    liar = replace(liar, ledger={}) if part is None else liar
+    for one in (liar, replace(liar, mass=None)):
+        assert verdict_of(case, one) is Verdict.FAIL
+    if part in (None, "algorithmic"):
+        return
+    found, notes = energies_of(case, liar)
+    mismatch = found["ledger_mismatch"]
+    assert mismatch.value - mismatch.uncertainty > 0.5
+    assert part.replace("_", " ") in notes["ledger"]
+
+
+@pytest.mark.parametrize("mass, said", [
+    (lambda one: 0.2 * one.mass, "total, first moments or parts are off by 0.8"),
+    (lambda one: np.full(len(one.points), one.mass.sum() / len(one.points)), "off by"),
+    (lambda one: np.roll(np.asarray(one.mass.sum(axis=1)).ravel(), 1), "off by"),
+])  # fmt: skip
+def test_a_mass_that_is_not_of_the_body_is_not_taken(plate, mass, said):
+    case, honest = plate
+    found, _ = energies_of(case, replace(honest, mass=mass(honest)))
+    assert "the declared mass is not taken" in found["energy_drift"].source
+    assert said in found["energy_drift"].source
+
+
+def test_a_mass_with_more_energy_than_any_lumping_is_not_taken(plate):
+    """Total and moments are right: what is added is nothing for a motion that is affine."""
+    case, honest = plate
+    points = np.column_stack([np.ones(len(honest.points)), honest.points])
+    basis = np.linalg.qr(points)[0]
+    more = np.eye(len(points)) - basis @ basis.T
+    heavy = honest.mass + type(honest.mass)(20.0 * honest.mass.max() * more)
+    found, _ = energies_of(case, replace(honest, mass=heavy))
+    assert "lumping makes 1 to 4 of it" in found["energy_drift"].source
+
+
+def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
+    """With the consistent mass of its field an honest lumped answer drifts; not surely so."""
+    case, honest = plate
+    found, _ = energies_of(case, replace(honest, mass=None))
+    drift = found["energy_drift"]
+    assert "no mass is declared" in drift.source
+    assert 1e-6 < drift.value <= drift.uncertainty
+    assert verdict_of(case, replace(honest, mass=None), {**DRIFT, "at_most": 1e-6}) is (
+        Verdict.UNDECIDED
+    )
+    assert verdict_of(case, honest, {**DRIFT, "at_most": 1e-6}) is Verdict.PASS
+
+
+def test_a_hidden_loss_of_three_thousandths_fails_the_prestrained_bar():
+    """0.3 % of its energy, taken by a damping that the case has not; no opening shows it."""
+    case = load_scene("dynamics/prestrained_bar")
+    asked = case.model_dump(mode="json", by_alias=True) | {"mesh": {"cells": [[31, 2]]}}
+    asked["acceptance"] = [one for one in asked["acceptance"] if one["check"] == "error"]
+    honest = XfemSolver().solve(Scene.model_validate(asked), 0, 0)
+    damped = Scene.model_validate(asked | {"analysis": {**asked["analysis"], "damping": [D, 0.0]}})
+    lossy = XfemSolver().solve(damped, 0, 0)
+    total = {"kinetic": honest.ledger["total"] - lossy.ledger["strain"]}
+    lossy = replace(lossy, ledger={"strain": lossy.ledger["strain"], **total})
+    found = judged(Scene.model_validate(asked), {"honest": {0: honest}, "lossy": {0: lossy}})
+    assert [v.verdict for v in found.verdicts] == [Verdict.PASS, Verdict.FAIL]
+    assert found.verdicts[1].observed == pytest.approx(0.003, rel=0.1)
+    assert not found.warnings  # it is below what is warned of, and named in the notes
+    assert "kinetic by 0.003" in found.solves[1].notes["ledger"]
+
+
+def swinging(**changes):
+    """Give the scene of the suite that swings under its weight other parts."""
+    content = scenes.swinging().model_dump(mode="json", by_alias=True)
+    analysis = {**content["analysis"], **changes.pop("analysis", {})}
+    return Scene.model_validate(content | {"analysis": analysis} | changes)
+
+
+@pytest.mark.parametrize("kinematics, factor", [("linear", 1.0), ("corotational", 10.0)])
+def test_what_damping_takes_is_known_from_its_rate_at_the_output_times(kinematics, factor):
+    """Half as much kinetic energy again that hides in damping is seen; the true loss is kept."""
+    case = swinging(
+        analysis={"damping": [0.05, 0.03], "kinematics": kinematics},
+        loads=[{"kind": "gravity", "acceleration": [0.02 * factor, -0.01 * factor]}],
+    )
+    honest = XfemSolver().solve(case, 0, 0)
+    assert honest.ledger["damping"][-1] > 0.1 * np.ptp(honest.ledger["gravity"])
+    check = {**DRIFT, "at_most": 5e-3}  # outputs twenty to a period of the lowest mode
+    assert verdict_of(case, honest, check) is Verdict.PASS
+    found, _ = energies_of(case, honest)
+    mismatch = found["ledger_mismatch"]
+    assert mismatch.value <= mismatch.uncertainty + 1e-5
+    for part in ("damping", "work_of_supports", "kinetic"):
+        assert verdict_of(case, hidden(honest, 1.5, part), check) is Verdict.FAIL
+
+
+SLIDES = [{"where": "bottom", "displacement": [0.05, 0.0], "history": [[0.0, 0.0], [3.9, 1.0]]}]
+SHEARS = [
+    {"where": "bottom", "displacement": [0.0, 0.0]},
+    {"where": "left", "components": ["x"], "displacement": ["0.05 * y * sin(0.5 * t)"]},
+]
+TURN = {"angle": 40.0, "centre": [0.5, 0.0]}
+SPIN = {"angle": 80.0, "centre": [0.5, 0.5, 0.0], "axis": [0.2, 0.0, 1.0]}
+TURNS = [[0.0, 0.0], [3.0, 0.3], [10.0, 1.0]]
+WEDGE = [[0.41, -0.1, 0.3], [0.41, 1.1, 0.3], [1.2, 1.1, 0.62], [1.2, -0.1, 0.62]]
+LARGE = {"kinematics": "corotational"}
+MOVED = {
+    "slides": {"supports": SLIDES},
+    "shears": {"supports": SHEARS},
+    "turns": {
+        "supports": [
+            {"where": "bottom", "displacement": [0.0, 0.0], "rotation": TURN, "history": TURNS}
+        ],
+        "analysis": LARGE,
+    },
+    "turns in space": {
+        **scenes.in_space([{"kind": "polygon", "points": WEDGE}]),
+        "loads": [{"kind": "gravity", "acceleration": [0.02, -0.01, 0.0]}],
+        "supports": [
+            {"where": "bottom", "displacement": [0.0] * 3, "rotation": SPIN, "history": TURNS}
+        ],
+        "analysis": LARGE,
+    },
+}
+
+
+@pytest.mark.parametrize("name, moved", [
+    *product(["xfem", "conforming"], ["slides", "shears", "turns"]), ("snapping", "turns"),
+    ("xfem", "turns in space"),
+    pytest.param("conforming", "turns in space", marks=pytest.mark.heavy),
+])  # fmt: skip
+def test_a_gain_hidden_in_the_work_of_supports_that_move_fails(name, moved):
+    """Half as much kinetic energy again; the honest work is known to a thousandth and passes."""
+    case = swinging(**MOVED[moved])
+    honest = find_solver(name).solve(case, 0, 0)
+    assert np.ptp(honest.ledger["work_of_supports"]) > 0.05 * honest.ledger["kinetic"].max()
+    verdict, record = judgement_of(case, honest)
+    drift = record.metric("energy_drift")
+    assert verdict is Verdict.PASS
+    assert drift.value + drift.uncertainty < 2e-3
+    assert "work_of_supports" not in record.notes  # nobody's word
+    verdict, record = judgement_of(case, hidden(honest, 1.5, "work_of_supports"))
+    assert verdict is Verdict.FAIL
+    assert "work of supports" in record.notes["ledger"]
+
+
+def test_a_loss_of_three_thousandths_hidden_in_the_work_of_supports_is_seen():
+    """What a damping takes that the case has not; the limit is a thousandth."""
+    case = swinging(supports=SLIDES)
+    honest = XfemSolver().solve(case, 0, 0)
+    lossy = XfemSolver().solve(swinging(supports=SLIDES, analysis={"damping": [0.0013, 0.0]}), 0, 0)
+    loss = lossy.ledger["damping"]
+    ledger = {**lossy.ledger, "work_of_supports": lossy.ledger["work_of_supports"] - loss}
+    del ledger["damping"]
+    check = {**DRIFT, "at_most": 1e-3}
+    assert verdict_of(case, honest, check) is Verdict.PASS
+    found, _ = energies_of(case, replace(lossy, ledger=ledger))
+    drift = found["energy_drift"]
+    assert drift.value - drift.uncertainty > 2e-3
+    assert drift.value + drift.uncertainty < 4e-3
+    assert verdict_of(case, replace(lossy, ledger=ledger), check) is Verdict.FAIL
+
+
+@pytest.mark.parametrize("outputs", [3, 4, 6])
+def test_output_times_that_do_not_resolve_a_motion_leave_it_undecided(outputs):
+    case = swinging(supports=SHEARS, analysis={"outputs": outputs})
+    assert verdict_of(case, XfemSolver().solve(case, 0, 0)) is Verdict.UNDECIDED
+
+
+def test_the_work_of_supports_that_jump_is_a_word_and_no_verdict_rests_on_it():
+    jumps = {**SLIDES[0], "history": [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0]]}
+    case = swinging(supports=[jumps])
+    honest = XfemSolver().solve(case, 0, 0)
+    for one in (honest, hidden(honest, 1.5, "work_of_supports")):
+        assert verdict_of(case, one) is Verdict.UNDECIDED
+        assert energies_of(case, one)[1]["work_of_supports"].endswith("it is the solver's word")
+    held = swinging()
+    still = hidden(XfemSolver().solve(held, 0, 0), 1.5, "work_of_supports")
+    assert verdict_of(held, still) is Verdict.FAIL  # supports that stand still do no work
+
+
+CURVED = {
+    2: ["3 * x * x - 3 * y * y", "-6 * x * y"],
+    3: ["3 * x * x - 3 * y * y", "-6 * x * y", "0"],
+}
+LINES = {
+    2: ["0.3 * x + 0.2 * y", "0.1 * y - 0.4 * x"],
+    3: ["0.3 * x + 0.2 * z", "0.1 * y - 0.4 * x", "0.2 * z + 0.1 * y"],
+}
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("field", ["affine", "finite", "curved"])
+def test_a_motion_in_equilibrium_takes_from_its_supports_what_it_stores(d, field):
+    """Displacements in equilibrium that grow evenly: the work of supports is the strain energy.
+
+    Affine ones are, in either kinematics; and gradients of harmonic polynomials with linear ones,
+    of which quadratic elements have those of degree three.
+    """
+    points, cells = grid(4, 3) if d == 2 else cube_grid(2, 2, 2)
+    inner = ((points > 0.0) & (points < 1.0)).all(axis=1)
+    points[inner] += 0.05 * np.random.default_rng(3).normal(size=points.shape)[inner]
+    if field == "curved":
+        points, cells = quadratic(points, cells)
+        points, first = np.unique(np.round(points, 12), axis=0, return_inverse=True)
+        cells = first.ravel()[cells]
+    formulas = CURVED[d] if field == "curved" else LINES[d]
+    parts = scenes.in_space([]) if d == 3 else {"cuts": []}
+    pushed = {"where": "boundary", "displacement": formulas, "history": [[0.0, 0.0], [10.0, 1.0]]}
+    large = {"kinematics": "corotational" if field == "finite" else "linear"}
+    case = swinging(**parts, supports=[pushed], loads=[], analysis=large)
+    times = np.linspace(0.0, 9.0, 7)
+    v = field_values(formulas, points) / 10.0
+    u = np.multiply.outer(times, v)
+    one = Solution(
+        points, cells.astype(np.int64), u, times, 2 if field == "curved" else 1,
+        velocity=np.array([v] * 7), mass="consistent",
+    )  # fmt: skip
+    energies = motion_account(case, one, law_of(case)).energies
+    work, stored = energies.parts["work_of_supports"], energies.parts["strain"]
+    assert stored[-1] > 0.0
+    exact = 1e-6 if field == "finite" else 1e-10  # of four points to a step
+    assert np.abs(work - stored).max() <= exact * stored[-1]
+    assert energies.width.max() <= 1e3 * exact * stored[-1]
+
+
+@pytest.mark.parametrize("rows, verdict", [
+    ([(0.004, 0.009), (0.002, 0.002)], Verdict.PASS),
+    ([(0.02, 0.02), (0.004, 0.05)], Verdict.FAIL),  # the first is above the limit for certain
+    ([(0.004, 0.05), (0.001, 0.001)], Verdict.UNDECIDED),
+])  # fmt: skip
+def test_a_study_knows_the_intervals_of_energies(rows, verdict):
+    own = [
+        Measurement("a case", float(row), "a", name, "", value)
+        for row, values in enumerate(rows)
+        for name, value in zip(("energy_drift", AT_MOST), values, strict=True)
+    ]
+    (found,) = account_findings("a case", own)
+    assert found.verdict is verdict

@@ -1,0 +1,304 @@
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from cut_meshes import STRAIGHT, scene
+
+from verify.judge.intervals import error_interval
+from verify.judge.verdict import judge
+from verify.result import Metric, Rate, SolveRecord, Status, Verdict
+
+
+def solve(level, value, width=0.0, solver="xfem", metric="energy_norm", reference=None, size=None):
+    return SolveRecord(
+        "a test",
+        solver,
+        level,
+        Status.SOLVED,
+        size=size or 0.1 / 2**level,
+        metrics=[Metric(metric, value, "1", reference, width)],
+    )
+
+
+def verdicts(check, records, rates=(), judge_only=(), **more):
+    asked = scene([STRAIGHT], acceptance=[{"metric": "energy_norm", **check}], **more)
+    return judge(asked, records, list(rates), judge_only)
+
+
+PASS, FAIL, UNDECIDED, ERROR = Verdict.PASS, Verdict.FAIL, Verdict.UNDECIDED, Verdict.ERROR
+BOUND = {"check": "error", "at_most": 0.05}
+ENERGY = {**BOUND, "metric": "strain_energy"}
+STATED = {"check": "value", "metric": "strain_energy", "equals": 1.0, "relative_tolerance": 1e-9,
+          "source": "theory"}  # fmt: skip
+WITHIN = {"check": "ratio", "within": 0.05}
+UNKNOWN = {"energy_norm": "no reference", "strain_energy": "reference level 2 failed"}
+
+
+def energy(value, width=0.0, reference=1.0):
+    return [solve(0, value, width, metric="strain_energy", reference=reference)]
+
+
+def beside(ours, theirs, width=0.0, **size):
+    """Errors of both solvers on levels that they have in common."""
+    rows = [solve(i, e, width) for i, e in enumerate(ours)]
+    return rows + [solve(i, e, width, "conforming", **size) for i, e in enumerate(theirs)]
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "width", "low", "high"),
+    [
+        (1.5, 1.0, 0.1, 4 / 11, 2 / 3),
+        (-1.5, -1.0, 0.1, 4 / 11, 2 / 3),
+        (0.5, 1.0, 0.1, 4 / 9, 6 / 11),
+        (1.05, 1.0, 0.1, 0.0, 1 / 6),
+        (-0.5, 1.0, 0.1, 16 / 11, 14 / 9),
+        (3.0, 1.0, 1.0, 0.5, inf),  # the truth may be 0
+        (3.0, 1.0, 1.5, 0.2, inf),
+    ],
+)
+def test_what_divides_an_error_is_uncertain_too(value, reference, width, low, high):
+    found = error_interval(Metric("work", value, "J", reference, width))
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-14, abs=1e-15)
+    true = reference + width * np.linspace(-1, 1, 2001)[1:-1]
+    errors = np.abs(value - true) / np.abs(true)
+    assert found.low * (1 - 1e-14) <= errors.min() <= found.low + 2e-3
+    assert errors.max() <= found.high * (1 + 1e-14)
+
+
+def test_a_verdict_counts_the_uncertainty_of_the_divisor():
+    # 1.045 over 1 ± 0.02: 0.045 ± 0.02 would pass 0.066; the truth reaches 0.0663
+    record = energy(1.045, 0.02)
+    assert verdicts({**ENERGY, "at_most": 0.066}, record)[0].verdict is UNDECIDED
+    assert verdicts({**ENERGY, "at_most": 0.0664}, record)[0].verdict is PASS
+
+
+@pytest.mark.parametrize(
+    ("check", "records", "share", "badge"),
+    [
+        (BOUND, [solve(0, 0.02, 9.8e-3)], 0.49, "reference: 0.49 of the error"),
+        (BOUND, [solve(0, 0.02, 2e-3)], 0.1, ""),
+        (BOUND, [solve(0, 0.9, 0.9), solve(1, 0.02, 0.001)], 0.05, ""),  # on the finest level
+        (BOUND, [solve(0, 1e-14, 1e-13)], None, ""),  # round-off
+        (ENERGY, energy(1.02, 0.01), 0.5, "reference: 0.5 of the error"),
+        (STATED, energy(1.0, 0.01), None, ""),  # no reference judges
+        ({"check": "ratio", "at_most": 2.0},
+         [solve(0, 0.03, 0.003), solve(0, 0.02, 0.003, "conforming")], 0.15,
+         "reference: 0.15 of the error"),
+    ],
+)  # fmt: skip
+def test_the_share_of_the_reference_stands_beside_the_verdict(check, records, share, badge):
+    records = [replace(r, metrics=[replace(m, source="it") for m in r.metrics]) for r in records]
+    found = verdicts(check, records)[0]
+    assert found.reference_share == (None if share is None else pytest.approx(share, rel=1e-6))
+    assert found.badge == badge
+
+
+JUDGED = {
+    "below the limit": (BOUND, [solve(0, 0.02)], PASS, ""),
+    "the whole interval satisfies it": (BOUND, [solve(0, 0.02, 0.029)], PASS, ""),
+    "the interval crosses it": (BOUND, [solve(0, 0.04, 0.02)], UNDECIDED, ""),
+    "it crosses it from above": (BOUND, [solve(0, 0.06, 0.02)], UNDECIDED, ""),
+    "the whole interval is above": (BOUND, [solve(0, 0.06, 0.001)], FAIL, ""),
+    "the uncertainty that leaves it open is named": (
+        {**BOUND, "at_most": 6e-3}, [solve(0, 5e-3, 3e-3)], UNDECIDED,
+        "uncertainty 3.0e-03 is not clearly below the error 5.0e-03"),
+    "the finest level is the one that is bounded": (
+        BOUND, [solve(1, 0.01), solve(0, 0.5)], PASS, ""),
+    "no number": (BOUND, [solve(0, float("nan"))], FAIL, "not finite"),
+    "not measured": (
+        BOUND, [SolveRecord("a test", "xfem", 0, Status.SOLVED, notes=UNKNOWN)], ERROR,
+        "no reference"),
+    "a quantity is bounded by its relative distance": (ENERGY, energy(1.01, 0.001), PASS, ""),
+    "and fails by it": (ENERGY, energy(1.1, 0.001), FAIL, ""),
+    "or is left open": (ENERGY, energy(1.05, 0.01), UNDECIDED, ""),
+    "a reference of zero has no relative error": (ENERGY, energy(1.0, 0.0, 0.0), ERROR, "0"),
+    "a value without a reference is no error": (
+        ENERGY, [replace(*energy(0.008, reference=None), notes=UNKNOWN)], ERROR,
+        "reference level 2 failed"),
+    "a stated value is met": (STATED, energy(1 + 5e-10, reference=None), PASS, ""),
+    "it is missed": (STATED, energy(1 + 2e-9, reference=None), FAIL, ""),
+    "a ratio holds on every level": (WITHIN, beside([0.101, 0.0505], [0.1, 0.05]), PASS, ""),
+    "one level is enough to fail": (WITHIN, beside([0.101, 0.06], [0.1, 0.05]), FAIL, ""),
+    "or the other": (WITHIN, beside([0.12, 0.0505], [0.1, 0.05]), FAIL, ""),
+    "within is on both sides": (WITHIN, beside([0.094, 0.047], [0.1, 0.05]), FAIL, ""),
+    "at most on one": ({"check": "ratio", "at_most": 1.05}, beside([0.01], [0.1]), PASS, ""),
+    "a much smaller error is not within": (WITHIN, beside([0.01], [0.1]), FAIL, ""),
+    "intervals leave a ratio open": (
+        WITHIN, beside([0.101, 0.0505], [0.1, 0.05], 0.005), UNDECIDED, ""),
+    "a ratio of round-off means nothing": (
+        WITHIN, beside([2e-15], [5e-16]), UNDECIDED, "round-off"),
+    "nor one at unequal sizes": (WITHIN, beside([0.1], [0.1], size=0.07), UNDECIDED, "sizes"),
+    "nor one to an error below its uncertainty": (
+        WITHIN, [solve(0, 0.1), solve(0, 1e-3, 2e-3, "conforming")], UNDECIDED, ""),
+}  # fmt: skip
+
+
+def verdict(check, records, rates=()):
+    (found,) = verdicts({"solver": "xfem", **check}, records, rates)
+    return found
+
+
+@pytest.mark.parametrize("claim", JUDGED)
+def test_an_interval_is_judged_as_a_whole_and_what_means_nothing_is_not(claim):
+    check, records, expected, reason = JUDGED[claim]
+    found = verdict(check, records)
+    assert found.verdict is expected
+    assert reason in found.reason
+
+
+@pytest.mark.parametrize(
+    "order, width, limits, expected",
+    [
+        (1.98, 0.01, {"at_least": 1.95}, PASS),
+        (1.96, 0.05, {"at_least": 1.95}, UNDECIDED),
+        (1.50, 0.05, {"at_least": 1.95}, FAIL),
+        (0.51, 0.01, {"equals": 0.5, "within": 0.05}, PASS),
+        (0.60, 0.01, {"equals": 0.5, "within": 0.05}, FAIL),
+        (0.54, 0.02, {"equals": 0.5, "within": 0.05}, UNDECIDED),
+    ],
+)
+def test_a_rate_is_judged_on_its_interval(order, width, limits, expected):
+    rate = Rate("xfem", "energy_norm", order, width, "", [order, order])
+    found = verdict({"check": "rate", **limits}, [solve(0, 0.1), solve(1, 0.05)], [rate])
+    assert found.verdict is expected
+
+
+@pytest.mark.parametrize(
+    "reason, expected",
+    [
+        ("diverging: slopes -1", FAIL),
+        ("oscillating: slopes -1, 1", UNDECIDED),
+        ("floor: errors 1e-15", UNDECIDED),
+    ],
+)
+def test_an_order_that_means_nothing_never_passes(reason, expected):
+    rate = Rate("xfem", "energy_norm", None, 0.0, reason, [-1.0, -1.1])
+    found = verdict({"check": "rate", "at_least": 1.0}, [solve(0, 0.1), solve(1, 0.2)], [rate])
+    assert found.verdict is expected
+    assert reason in found.reason
+
+
+@pytest.mark.parametrize(
+    "limits, width, expected",
+    [
+        ({"at_least": 1.95}, 0.05, FAIL),
+        ({"equals": 0.5, "within": 0.05}, 0.05, FAIL),
+        ({"at_least": 1.95}, 2.0, UNDECIDED),
+        ({"equals": 0.0, "within": 0.1}, 0.05, UNDECIDED),
+    ],
+)
+def test_an_error_that_stops_falling_fails_if_the_order_is_below_the_limit_at_most(
+    limits, width, expected
+):
+    rate = Rate("uncut", "energy_norm", None, width, "slowing: slopes 0.08, 0.01", [0.08, 0.01])
+    records = [solve(0, 0.1, solver="uncut"), solve(1, 0.09, solver="uncut")]
+    found = verdict({"check": "rate", "solver": "uncut", **limits}, records, [rate])
+    assert found.verdict is expected
+    assert found.reason.startswith("slowing")
+
+
+@pytest.mark.parametrize("status", [Status.FAILED, Status.TIMEOUT, Status.REFUSED, Status.MEMORY])
+@pytest.mark.parametrize(
+    "check",
+    [
+        {"check": "error", "at_most": 1.0},
+        {"check": "rate", "at_least": 0.0},
+        {"check": "ratio", "within": 0.05},
+    ],
+    ids=lambda c: c["check"],
+)
+def test_a_solve_that_did_not_finish_is_an_error_with_its_reason(status, check):
+    records = [solve(0, 0.1), SolveRecord("a test", "xfem", 1, status, "out of luck")]
+    records.append(solve(0, 0.1, solver="conforming"))
+    found = verdict(check, records)
+    assert found.verdict is ERROR
+    assert "out of luck" in found.reason
+
+
+AT_MOST_TWICE = {"check": "ratio", "at_most": 2.0}
+
+
+def by_solver(found):
+    return {one.solver: one.verdict for one in found}
+
+
+def test_a_check_that_names_no_solver_is_made_of_each_but_the_reference():
+    records = [
+        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.01, "reference": 9}.items()
+    ]
+    assert by_solver(verdicts(BOUND, records)) == {"mine": FAIL, "xfem": PASS}
+
+
+def test_a_rate_is_judged_for_each_solver_by_its_own():
+    records = [solve(i, 0.1, solver=s) for s in ("mine", "xfem") for i in (0, 1)]
+    rates = [Rate(s, "energy_norm", p, 0.01, "", [p, p]) for s, p in (("mine", 0.1), ("xfem", 1.0))]
+    found = verdicts({"check": "rate", "at_least": 0.9}, records, rates)
+    assert by_solver(found) == {"mine": FAIL, "xfem": PASS}
+
+
+def test_a_ratio_is_made_of_all_but_the_one_compared_with():
+    records = [
+        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.1, "conforming": 0.1}.items()
+    ]
+    assert by_solver(verdicts(AT_MOST_TWICE, records)) == {"mine": FAIL, "xfem": PASS}
+
+
+def test_a_solver_that_refuses_the_case_is_not_judged_and_one_that_failed_is():
+    refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
+    failed = SolveRecord("a test", "broken", 0, Status.FAILED, "singular")
+    found = verdicts(BOUND, [refused, failed, solve(0, 0.01)])
+    assert by_solver(found) == {"broken": ERROR, "xfem": PASS}
+
+
+def test_a_check_that_holds_for_nobody_is_undecided_and_says_so():
+    (found,) = verdicts(AT_MOST_TWICE, [solve(0, 0.1, solver="conforming")])
+    assert (found.solver, found.verdict) == ("", UNDECIDED)
+    assert "no solver" in found.reason
+    refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
+    (found,) = verdicts(BOUND, [refused, solve(0, 0.1, solver="reference")])
+    assert found.verdict is UNDECIDED
+    assert "refuses" in found.reason
+
+
+def test_who_was_not_asked_is_undecided_and_judge_only_narrows():
+    records = [solve(0, 1.0, solver=s) for s in ("mine", "xfem", "reference")]
+    (found,) = verdicts({**BOUND, "solver": "yours"}, records)
+    assert (found.verdict, found.reason) == (UNDECIDED, "the run was not asked for solver 'yours'")
+    assert "conforming" in verdicts(AT_MOST_TWICE, records)[0].reason
+    assert list(by_solver(verdicts(BOUND, records, judge_only=["mine"]))) == ["mine"]
+    (found,) = verdicts({**BOUND, "solver": "xfem"}, records, judge_only=["mine"])
+    assert found.verdict is UNDECIDED
+    # the reference is what all rest on: a check of it is never narrowed away
+    (found,) = verdicts({**BOUND, "solver": "reference"}, records, judge_only=["mine"])
+    assert found.verdict is FAIL
+
+
+def known(solver="mine", check="error"):
+    return [
+        {"solver": solver, "check": check, "metric": "energy_norm", "reason": "it drops slivers"}
+    ]
+
+
+def test_a_known_finding_fails_with_its_reason_and_passes_with_a_hint():
+    records = [solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 1.0}.items()]
+    mine, xfem = verdicts(BOUND, records, known_findings=known())
+    assert mine.verdict is xfem.verdict is FAIL
+    assert (mine.known, mine.counts_as_failed) == ("it drops slivers", False)
+    assert (xfem.known, xfem.counts_as_failed) == ("", True)
+    (mine,) = verdicts(BOUND, [solve(0, 0.01, solver="mine")], known_findings=known())
+    assert mine.verdict is PASS
+    assert "entry" in mine.reason
+
+
+@pytest.mark.parametrize(
+    "check, finding",
+    [
+        (BOUND, known(check="rate")),
+        ({**BOUND, "solver": "xfem"}, known()),
+        (AT_MOST_TWICE, known("conforming", "ratio")),
+    ],
+)
+def test_a_known_finding_that_names_no_check_of_the_case_is_refused(check, finding):
+    with pytest.raises(ValueError, match=r"known_findings\[0\]: no check"):
+        verdicts(check, [], known_findings=finding)

@@ -1,1 +1,0 @@
-"""Measurements of solutions and their intervals: errors, rates, references, energy balances."""

@@ -1,0 +1,179 @@
+"""Energy that a blade releases: where it went, per unit of its advance.
+
+A tip that moves takes the energy release rate G out of the continuum per unit advance. A mesh has
+no such sink: what the time scheme and the damping do not take is left as waves of the length of
+an element. With an exact field they are the difference from it; without one, motions of periods
+below 4h/c, c the speed of shear waves.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from verify.compare.body import body_of
+from verify.compare.hooke import Law
+from verify.compare.integration import cut_rules
+from verify.compare.kinetic import density_of
+from verify.compare.ledger import total_energy
+from verify.compare.motion import field_at
+from verify.compare.motion_account import MotionAccount
+from verify.compare.strain_energy import difference_energy, short_wave_energy
+from verify.errors import InputError, UnsupportedSceneError
+from verify.result import Metric
+from verify.scene import Scene, ToolPathCut
+from verify.solution import Solution
+
+RELEASED = (
+    "released", "released_to_scheme", "released_to_damping", "released_to_kinetic",
+    "released_to_strain", "released_to_short_waves", "released_mismatch",
+)  # fmt: skip
+_UNIT = "J/m²"
+_PERIODS = 4.0  # shortest waves last up to that many h/c
+
+
+def released_metrics(
+    scene: Scene, solution: Solution, size: float, law: Law, account: MotionAccount, exact: Any
+) -> tuple[list[Metric], dict[str, str]]:
+    """Measure where the energy went that the blades of a scene release, J per m² of their way.
+
+    ``released``: G, if the exact solution states it; ``released_to_scheme``: what is missing in the
+    measured balance of energies; ``_damping``: what the rate of damping takes; ``_kinetic`` and
+    ``_strain``: energy of the difference from the exact field since the start, kinetic energy by
+    the solver's own mass (a lumped one holds more of short waves than their field);
+    ``_short_waves``: without an exact field, kinetic energy of motions of periods below 4h/c.
+    ``released_mismatch``: the share of G by which scheme, damping and difference miss it.
+
+    Parameters
+    ----------
+    scene : Scene
+    solution : Solution
+    size : float
+        Element size h, m.
+    law : Law
+    account : MotionAccount
+        Of the solution.
+    exact : object or None
+        The exact solution, if it judges.
+
+    Returns
+    -------
+    metrics : list of Metric
+    notes : dict of str to str
+        For what could not be measured, why. Both are empty if no blade advances.
+    """
+    area = advance(scene)
+    if area == 0.0:
+        return [], {}
+    values, notes = _dissipated(account)
+    if exact is None:
+        found, why = _short_waves(scene, solution, size)
+    else:
+        found, why = _difference(scene, solution, law, exact)
+        if found:
+            found["released_to_kinetic"] += _in_the_mass(account)
+    values, notes = values | found, notes | why
+    values = {name: value / area for name, value in values.items()}
+    metrics = [Metric(name, value, _UNIT, source="fields of the solution")
+               for name, value in values.items()]  # fmt: skip
+    rate = getattr(exact, "energy_release_rate", None)
+    if rate is not None:
+        metrics.append(Metric("released", float(rate), _UNIT, source="exact solution"))
+        missing = sorted({"released_to_scheme", "released_to_kinetic"} - values.keys())
+        if missing:
+            notes["released_mismatch"] = notes[missing[0]]
+        else:
+            off = abs(sum(values.values()) - rate) / rate
+            metrics.append(Metric("released_mismatch", off, "1", source="exact solution"))
+    return metrics, notes
+
+
+def advance(scene: Scene) -> float:
+    """Area that the blades of a scene sweep in its body during the motion, m² (2D: m)."""
+    duration = scene.analysis.duration
+    paths = [cut for cut in scene.cuts if isinstance(cut, ToolPathCut)]
+    parts = [part for cut in paths if (part := _between(cut, 0.0, duration or 0.0)) is not None]
+    total = 0.0
+    for part in parts:
+        alone = scene.model_copy(update={"cuts": [part]})
+        alone._file, alone._name = scene.file, scene.name
+        try:
+            body = body_of(alone)
+        except UnsupportedSceneError:
+            return 0.0
+        if body.has_cuts:
+            total += float(cut_rules(body, body.size / 20, 1)[0].weights.sum())
+    return total
+
+
+def _between(cut: ToolPathCut, start: float, end: float) -> ToolPathCut | None:
+    """Part of a tool's way between two times; None if it does not move then."""
+    moments = cut.moments
+    start, end = max(start, float(moments[0])), min(end, float(moments[-1]))
+    if not end > start:
+        return None
+    times = np.unique([start, *moments[(moments > start) & (moments < end)], end])
+
+    def at(values: np.ndarray) -> list[list[float]]:
+        return np.column_stack([np.interp(times, moments, v) for v in values.T]).tolist()
+
+    tips = np.array(cut.points, dtype=float)
+    if not np.ptp(np.array(at(tips)), axis=0).any():
+        return None
+    given: dict[str, Any] = {"kind": "tool_path", "points": at(tips), "times": times.tolist()}
+    if cut.dimension == 3:
+        given |= {"depth": cut.depth, "direction": [tuple(row) for row in at(cut.blade)]}
+    return ToolPathCut.model_validate(given)
+
+
+def _dissipated(account: MotionAccount) -> tuple[dict[str, float], dict[str, str]]:
+    """Find what the scheme and the dampers took, J."""
+    parts = account.energies.parts
+    total = total_energy(parts)
+    if total is None:
+        names = ("released_to_scheme", "released_to_damping")
+        return {}, dict.fromkeys(names, account.energies.lacking)
+    values = {"released_to_scheme": float(total[0] - total[-1])}
+    if "damping" in parts:
+        values["released_to_damping"] = float(parts["damping"][-1])
+    return values, {}
+
+
+def _difference(
+    scene: Scene, solution: Solution, law: Law, exact: Any
+) -> tuple[dict[str, float], dict[str, str]]:
+    names = ("released_to_kinetic", "released_to_strain")
+    if scene.analysis.kinematics != "linear" or scene.cell_dimension < scene.dimension:
+        return {}, dict.fromkeys(names, "energies of differences add up in linear solids only")
+    times, density = solution.times, density_of(scene, solution)
+    try:
+        first, last = (
+            np.array(difference_energy(solution, k, field_at(exact, float(times[k])), law, density))
+            for k in (0, len(times) - 1)
+        )
+    except InputError as problem:
+        return {}, dict.fromkeys(names, str(problem))
+    return dict(zip(names, (last - first).tolist(), strict=True)), {}
+
+
+def _in_the_mass(account: MotionAccount) -> float:
+    """Kinetic energy that the solver's mass holds beyond that of its velocity field, J.
+
+    It is that of the difference from the exact field: for smooth fields any mass is consistent.
+    """
+    if not account.energies.parts or account.whole is None:
+        return 0.0
+    beyond = account.energies.parts["kinetic"] - account.whole.energy
+    return float(beyond[-1] - beyond[0])
+
+
+def _short_waves(
+    scene: Scene, solution: Solution, size: float
+) -> tuple[dict[str, float], dict[str, str]]:
+    material, name = scene.material, "released_to_short_waves"
+    assert material.density is not None
+    shear = material.young / (2 * (1 + material.poisson))
+    period = _PERIODS * size / float(np.sqrt(shear / material.density))
+    try:
+        return {name: short_wave_energy(solution, period, density_of(scene, solution))}, {}
+    except InputError as problem:
+        return {}, {name: str(problem)}

@@ -1,0 +1,12 @@
+"""The judge: what measured numbers say about what a case demands, in this order of files.
+
+1. `quantities` and `stress_intensity` measure what a case asks for, with `verify.compare`.
+2. `richardson`, `reference` and `rates` say how well a number is known, `intervals` how far from
+   the truth it lies at least and at most. `accuracy` does this for all solves of a case.
+3. `checks` makes each demand of a case one of each solver that it holds for.
+4. `verdict` holds the intervals against the demands: PASS, FAIL, UNDECIDED or ERROR.
+5. `standing` ranks solvers by intervals, `ranks` by every question that a run answers.
+
+Beside the verdicts stand notices: `closing` (overlaps), `doubtful`, `ringing`, `unavailable`, and
+`adequacy`, which says what the model of a case costs. It solves nothing and writes nothing.
+"""

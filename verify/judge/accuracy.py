@@ -1,0 +1,377 @@
+"""Accuracy of the solutions of a case: metrics, rates, the reference.
+
+A pure function of the scene and the stored solutions: it solves nothing and writes nothing.
+"""
+
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from verify.compare.body import AnyBody, body_of
+from verify.compare.energy_account import ACCOUNT, account_metrics, ledger_notices
+from verify.compare.error_history import ERROR_NAMES, History, compared_times, error_history
+from verify.compare.errors import Rules
+from verify.compare.hooke import Law, law_of
+from verify.compare.integration import spread_of
+from verify.compare.locate import ROUND_OFF
+from verify.compare.motion import SolutionMotion
+from verify.compare.motion_account import motion_account
+from verify.compare.part_account import motion_history, part_metrics, part_records
+from verify.compare.released import released_metrics
+from verify.compare.simplices import simplices, straight_or_raise
+from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
+from verify.judge.doubtful import absurd_strain, doubtful_errors, locking_notices
+from verify.judge.intervals import error_interval
+from verify.judge.quantities import Measured, unit_of
+from verify.judge.rates import observed_rate, shifted_ends
+from verify.judge.reference import (
+    OTHER,
+    ExactField,
+    Reference,
+    compared_size,
+    conforming_reference,
+    exact_reference,
+)
+from verify.judge.ringing import ringing_factors
+from verify.judge.sufficiency import sufficiency
+from verify.judge.unavailable import unavailable_quantities
+from verify.printable import one_line
+from verify.reference_record import ReferenceRecord
+from verify.result import (
+    COMPARISON_FAILED,
+    REFERENCE,
+    CaseResult,
+    Metric,
+    Rate,
+    SolveRecord,
+    Status,
+)
+from verify.scene import Scene, scene_hash
+from verify.solution import Solution
+
+# A solver may drop slivers; a mesh that misses more of the body than this is another body.
+_COVERED = 0.01
+_ON_SURFACE = 0.01  # of the size of a membrane: so far apart two triangulations of it may be
+_SAME_TIME = 1e-6  # of the duration
+
+
+def assess_accuracy(
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    solutions: Mapping[str, Mapping[int, Solution]],
+    exact: ExactField | None = None,
+    announce: Callable[[SolveRecord], None] = lambda record: None,
+) -> CaseResult:
+    """Measure all solutions of a case.
+
+    Parameters
+    ----------
+    scene : Scene
+    records : sequence of SolveRecord
+        Every solve of the case, failed ones included; their metrics are filled in.
+    solutions : mapping of solver to mapping of level to Solution
+        Solutions of the solved records. Those of ``"reference"`` are the reference where no
+        exact solution judges.
+    exact : object with ``displacement``, ``gradient`` and ``singular_points``, optional
+        The exact solution that the scene names.
+    announce : callable
+        Is told of each solve before it is measured.
+
+    Returns
+    -------
+    CaseResult
+        Without verdicts, pictures and provenance.
+
+    Raises
+    ------
+    InputError
+        If the scene is judged by an exact solution and `exact` is None.
+    """
+    if scene.judged_by_exact and exact is None:
+        raise InputError("the scene is judged by its exact solution, which was not given")
+    law = law_of(scene)
+    body, missing = _body(scene, exact)
+    reference = None
+    if body is not None:
+        records, solutions = _fit(scene, records, solutions)
+        reference, missing = _reference(scene, solutions, exact, body, law)
+    measured: list[SolveRecord] = list(records)
+    for level in sorted({record.level for record in records}):
+        rows = [i for i, record in enumerate(records) if record.level == level]
+        own = {i: s for i in rows if (s := _solved(records[i], solutions)) is not None}
+        if body is None:
+            measured = [_noted(r, _named(scene, missing)) for r in measured]
+        elif own:
+            # the same points for all solvers of a level: their errors are compared
+            finest = min(compared_size(s, body) for s in own.values())
+            rules = Rules(body, finest, 3 if reference else 1)
+            judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
+            for i, solution in own.items():
+                announce(records[i])
+                try:
+                    one = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
+                    measured[i] = _measure(records[i], one, judge_of, missing, rules, exact)
+                except Exception as problem:  # a fault of the comparison costs this solve alone
+                    traceback.print_exception(problem)  # for the log
+                    why = one_line(f"{type(problem).__name__}: {problem}")
+                    measured[i] = not_compared(scene, records[i], why)
+    rates = _rates(scene, measured)
+    record = reference.record if reference else ReferenceRecord("none", reason=missing)
+    if record.kind == "conforming":
+        levels = len(record.levels or ())
+        record = replace(record, **sufficiency(scene, measured, REFERENCE, levels))
+    return CaseResult(
+        case=scene.name,
+        title=scene.title,
+        requirement=scene.requirement,
+        scene_hash=scene_hash(scene),
+        scene=scene.model_dump(mode="json", by_alias=True),
+        reference=record,
+        solves=measured,
+        rates=rates,
+        verdicts=[],
+        notices=[
+            *unavailable_quantities(scene, measured),
+            *ledger_notices([r for r in measured if r.solver != REFERENCE]),
+            *doubtful_errors(scene, [r for r in measured if r.solver != REFERENCE]),
+            *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
+            *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
+            *ringing_factors(scene, solutions.get(REFERENCE, {})),
+        ],
+        row=asdict(scene.row) if scene.row else None,
+    )
+
+
+def _body(scene: Scene, exact: ExactField | None) -> tuple[AnyBody | None, str]:
+    """Return the body if it can be compared on, else why it cannot."""
+    try:
+        return body_of(scene, None if exact is None else np.asarray(exact.singular_points)), ""
+    except UnsupportedSceneError as problem:
+        return None, str(problem)
+
+
+def _reference(
+    scene: Scene,
+    solutions: Mapping[str, Mapping[int, Solution]],
+    exact: ExactField | None,
+    body: AnyBody,
+    law: Law,
+) -> tuple[Reference | None, str]:
+    """Find the reference, or say why there is none."""
+    try:
+        if scene.judged_by_exact:
+            assert exact is not None
+            return exact_reference(scene, exact, body, law), ""
+        levels = solutions.get(REFERENCE, {})
+        judged = [s for name, own in solutions.items() if name != REFERENCE for s in own.values()]
+        sizes = (compared_size(s, body) for s in judged or levels.values())
+        finest = min(sizes, default=body.size / 50)
+        others = solutions.get(OTHER)
+        return conforming_reference(scene, levels, body, law, finest, others), ""
+    except InputError as problem:
+        return None, str(problem)
+
+
+def _fit(
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    solutions: Mapping[str, Mapping[int, Solution]],
+) -> tuple[list[SolveRecord], Mapping[str, Mapping[int, Solution]]]:
+    """Leave out solutions that no comparison can be made of; their solves are failed ones."""
+    kept, fit = list(records), {name: dict(own) for name, own in solutions.items()}
+    for i, record in enumerate(kept):
+        solution = _solved(record, solutions)
+        if solution is not None and (defect := _unfit(scene, solution)):
+            del fit[record.solver][record.level]
+            reason = f"its solution cannot be compared: {defect}"
+            kept[i] = replace(record, status=Status.FAILED, reason=reason)
+    return kept, {name: own for name, own in fit.items() if own}
+
+
+def _named(scene: Scene, reason: str) -> dict[str, str]:
+    """Say of everything that the case asks about why it was not measured."""
+    asked = [c.metric for c in scene.acceptance] + [q.name for q in scene.quantities]
+    return dict.fromkeys(["comparison", *asked], reason)
+
+
+def not_compared(scene: Scene, record: SolveRecord, why: str) -> SolveRecord:
+    """Return the record of a solve whose comparison failed: solved, and without any metric."""
+    return replace(_noted(record, _named(scene, f"{COMPARISON_FAILED}: {why}")), metrics=[])
+
+
+def _unfit(scene: Scene, solution: Solution) -> str:
+    """Say why no comparison can be made of a solution, or nothing: a fault of its solver."""
+    given, wanted = (
+        f"cells of dimension {one.cell_dimension} in space of dimension {one.dimension}"
+        for one in (solution, scene)
+    )
+    if given != wanted:
+        return f"{given}; expected {wanted}"
+    if simplices(solution.points, solution.cells).degenerate.all():
+        return "all its cells are without volume"
+    if solution.order == 2:
+        try:
+            straight_or_raise(solution.points, solution.cells)
+        except InputError as problem:
+            return str(problem)
+    return ""
+
+
+def _solved(
+    record: SolveRecord, solutions: Mapping[str, Mapping[int, Solution]]
+) -> Solution | None:
+    if record.status is not Status.SOLVED:
+        return None
+    return solutions.get(record.solver, {}).get(record.level)
+
+
+def _noted(record: SolveRecord, notes: dict[str, str]) -> SolveRecord:
+    return replace(record, notes={**record.notes, **notes})
+
+
+def _measure(
+    record: SolveRecord,
+    one: Measured,
+    reference: Reference | None,
+    missing: str,
+    rules: Rules,
+    exact: ExactField | None,
+) -> SolveRecord:
+    """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
+    scene = one.scene
+    assert scene is not None
+    record, other = with_cut(record, one, rules)
+    if defect := _defect(scene, one):
+        return _noted(record, _named(scene, defect))
+    covered = one.coverage
+    if abs(covered - 1) > 1e-9:
+        record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
+    if (off := one.motion.off_surface) > ROUND_OFF * one.body.size:
+        record = _noted(record, {"surface": f"up to {off:.3g} m off the surface of the scene"})
+    # the reference does not judge itself: its finest level would have no error
+    own = record.solver == REFERENCE and not scene.judged_by_exact
+    metrics, notes = _quantities(scene, one, None if own else reference)
+    if scene.analysis.kind == "dynamic":
+        account = motion_account(scene, one.solution, one.law)
+        parts = part_records(scene, one.solution, account)
+        truth = exact if scene.judged_by_exact else None
+        size = compared_size(one.solution, one.body)
+        for kept, why in (
+            account_metrics(scene, account),
+            part_metrics(parts, account),
+            released_metrics(scene, one.solution, size, one.law, account, truth),
+        ):
+            metrics, notes = metrics + kept, notes | why
+        if account.lighter:
+            notes["parts"] = f"{account.lighter} lighter parts are not listed"
+        record = replace(record, account=motion_history(account), parts=parts)
+    if reference is None:
+        without = _named(scene, missing)
+        notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
+    elif not own:
+        errors, why, record = _errors(one, reference, rules, record, other)
+        metrics, notes = errors + metrics, notes | why
+    return _noted(replace(record, metrics=metrics), notes)
+
+
+def _defect(scene: Scene, one: Measured) -> str:
+    """Say why a solution is of another body or of another time than the scene."""
+    covered, times = one.coverage, one.solution.times
+    if abs(covered - 1) > _COVERED:
+        return f"the cells of the solution cover {covered:.4g} of the body"
+    if one.motion.off_surface > _ON_SURFACE * one.body.size:
+        return f"the solution lies up to {one.motion.off_surface:.3g} m off the surface of the body"
+    if (outside := one.outside) > _COVERED:
+        return f"{outside:.4g} of the volume of the solution lies outside the body"
+    duration = scene.analysis.duration
+    if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
+        return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"
+    return ""
+
+
+def _quantities(
+    scene: Scene, one: Measured, reference: Reference | None
+) -> tuple[list[Metric], dict[str, str]]:
+    metrics, notes = [], {}
+    for asked in scene.quantities:
+        try:
+            value = one.quantity(asked)
+        except (UnsupportedSceneError, InputError) as problem:
+            notes[asked.name] = str(problem)
+            continue
+        known, width = (
+            reference.quantities.get(asked.name, (None, 0.0)) if reference else (None, 0.0)
+        )
+        source = reference.source if reference else ""
+        unit = unit_of(asked, scene.dimension)
+        metrics.append(Metric(asked.name, value, unit, known, width, source))
+    return metrics, notes
+
+
+def _errors(
+    one: Measured,
+    reference: Reference,
+    rules: Rules,
+    record: SolveRecord,
+    other: SolutionMotion | None,
+) -> tuple[list[Metric], dict[str, str], SolveRecord]:
+    assert one.scene is not None
+    times = compared_times(one.scene, one.solution)
+    try:
+        history = error_history(one.motion, reference.motion, times, rules, one.law)
+    except InputError as problem:  # the reference does not reach that far in time
+        return [], _named(one.scene, str(problem)), record
+    metrics, notes = [], _time_note(history, reference)
+    for name, norms in history.reported().items():
+        found = spread_of(norms, one.body.dimension)
+        value = found.norm.relative
+        if not np.isfinite(value):
+            notes[name] = f"the reference is zero; the absolute error is {found.norm.absolute:.3e}"
+            continue
+        if name not in reference.norms:
+            notes[name] = "the reference's own error in this norm is not known"
+            continue
+        known = reference.norms[name] / found.norm.scale if found.norm.scale else 0.0
+        # the scale is as uncertain as the reference: (1 + value), to first order
+        width = known * (1 + value) + found.integration_error
+        metrics.append(Metric(name, value, "1", None, width, reference.source))
+    record = with_other_errors(record, other, reference.motion, times, rules, one.law)
+    return metrics, notes, replace(record, series=history.series())
+
+
+def _time_note(history: History, reference: Reference) -> dict[str, str]:
+    times = [time for time in history.times if time is not None]
+    between = sum(not reference.motion.known_at(time) for time in times)
+    if not between:
+        return {}
+    return {
+        "times": f"the reference is interpolated linearly at {between} of {len(times)} output times"
+    }
+
+
+def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
+    """Rates of every error, and of every quantity that is not exact on some level."""
+    fields = {q.name for q in scene.quantities if q.kind in ("displacement", "opening")}
+    names = [*ERROR_NAMES, *(q.name for q in scene.quantities)]
+    rates = []
+    for solver in dict.fromkeys(record.solver for record in records):
+        own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
+        for name in names:
+            rows = [
+                (record.size, error_interval(metric))
+                for record in own
+                if record.size
+                and (metric := record.metric(name)) is not None
+                and (name in ERROR_NAMES or metric.reference)
+            ]
+            if rows:
+                sizes, errors = zip(*rows, strict=True)
+                values, widths = [e.value for e in errors], [e.high - e.value for e in errors]
+                rate = observed_rate(solver, name, sizes, values, widths)
+                mixed = name in {*ERROR_NAMES, *fields} and are_mixed(own)
+                reason = (MIXED if mixed else "") or shifted_ends(own)
+                rates.append(replace(rate, order=None, reason=reason) if reason else rate)
+    return rates

@@ -1,0 +1,109 @@
+"""Acceptance checks and the solvers that each is made of."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from verify.result import REFERENCE, SolveRecord, Status, Verdict, VerdictRecord
+from verify.scene import BoundCheck, RateCheck, RatioCheck, ValueCheck
+
+
+@dataclass(frozen=True)
+class AppliedCheck:
+    """A check, made of one solver.
+
+    Parameters
+    ----------
+    check : acceptance check of a scene
+        Its `solver` is set; it is empty if there is nobody whom the check is made of.
+    not_judged : str
+        Why nothing can be said, in one sentence; empty if the check can be judged.
+    """
+
+    check: Any
+    not_judged: str = ""
+
+
+def judged_by(check: Any, solvers: Sequence[str]) -> list[str]:
+    """Return those of `solvers` that `check` is made of.
+
+    That is the one that it names, else all but the reference, and but the one that it compares
+    with.
+    """
+    if check.solver is not None:
+        return [check.solver]
+    aside = {REFERENCE, check.compared}
+    return [name for name in solvers if name not in aside]
+
+
+def applied_checks(
+    checks: Sequence[Any], records: Sequence[SolveRecord], judge_only: Sequence[str] = ()
+) -> Iterator[AppliedCheck]:
+    """Make every check of each solver that it holds for.
+
+    Parameters
+    ----------
+    checks : sequence of acceptance checks
+    records : sequence of SolveRecord
+        All solves of the case; a solver without any was not asked. One all of whose solves were
+        refused is judged only where a check names it.
+    judge_only : sequence of str
+        Solvers that are judged; empty: all. The reference is judged wherever a check names it.
+
+    Yields
+    ------
+    AppliedCheck
+        In the order of the checks, then of the solvers in `records`; one with an empty solver for
+        a check that holds for nobody.
+    """
+    asked = dict.fromkeys(record.solver for record in records)
+    answering = {record.solver for record in records if record.status is not Status.REFUSED}
+    judged = [n for n in asked if n in answering and (not judge_only or n in judge_only)]
+    for check in checks:
+        names = judged_by(check, judged)
+        if not names:
+            reason = "no solver of this run is judged by this check"
+            if not answering - {REFERENCE}:
+                reason = "every solver that was asked refuses the case"
+            yield AppliedCheck(check.model_copy(update={"solver": ""}), reason)
+        for name in names:
+            one = check.model_copy(update={"solver": name})
+            needed = [name, *([check.compared] if check.compared else [])]
+            if judge_only and name not in (*judge_only, REFERENCE):
+                yield AppliedCheck(one, f"this run judges only {', '.join(judge_only)}")
+            elif missing := [other for other in needed if other not in asked]:
+                yield AppliedCheck(one, f"the run was not asked for solver '{missing[0]}'")
+            else:
+                yield AppliedCheck(one)
+
+
+def unjudged(check: Any, verdict: Verdict, reason: str) -> VerdictRecord:
+    """Return the verdict on a check, made of one solver, for which nothing was observed."""
+    limit = limit_text(check)
+    return VerdictRecord(
+        check.check, check.solver or "", check.metric, verdict, None, None, None, limit, reason
+    )
+
+
+def limit_text(check: Any) -> str:
+    """Say what a check demands."""
+    match check:
+        case RateCheck(at_least=float(least)):
+            return f"order ≥ {least:g}"
+        case RateCheck():
+            return f"order {check.equals:g} ± {check.within:g}"
+        case BoundCheck(metric="overlap_depth"):
+            return f"overlap ≤ {check.at_most:g} m"
+        case BoundCheck():
+            return f"relative error ≤ {check.at_most:g}"
+        case RatioCheck(at_most=float(most)):
+            return f"error ≤ {most:g} × that of {_other(check)}, on every level"
+        case RatioCheck():
+            return f"error ratio to {_other(check)} within 1 ± {check.within:g}, on every level"
+        case ValueCheck():
+            return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
+    raise TypeError(f"{check!r} is no acceptance check")
+
+
+def _other(check: RatioCheck) -> str:
+    return check.to if check.row is None else f"the row {check.row:g}"

@@ -1,0 +1,109 @@
+"""Answers that mean little: errors above 100 % beside ratios, absurd strains, locking."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from verify.compare.hooke import Law
+from verify.compare.strain_energy import strain_energy
+from verify.judge.intervals import NotMeasuredError, error_interval
+from verify.result import Notice, NoticeKind, SolveRecord
+from verify.scene import RatioCheck, Scene
+from verify.solution import Solution
+
+_ALL = 1.0  # relative error of a solver that answers zero
+# Root mean square strain of linear kinematics that no normalised case (stress and stiffness of
+# size one) comes near; a body in millimetres under its weight has a thousand times its strain.
+_ABSURD = 10.0
+# The bound of the energy-norm error of linear elements grows like √(1 + λ/μ) h/L (Babuška and Suri,
+# SIAM J. Numer. Anal. 29, 1992, 1261): h counts as so much more than at ν = 0.3. Below two such
+# elements across, a body cannot bend. Up to ν = 0.45 a pressure does not pay.
+_COMPRESSIBLE, _NEARLY, _ACROSS = 0.3, 0.45, 2.0
+
+
+def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
+    """Warn of errors above 100 % on a finest level where a solver is judged by ratios alone.
+
+    A ratio compares two solvers: it does not see an error that both have.
+    """
+    if not all(isinstance(check, RatioCheck) for check in scene.acceptance):
+        return []
+    found = []
+    metrics = dict.fromkeys(check.metric for check in scene.acceptance)
+    finest = {r.solver: r for r in sorted(records, key=lambda one: one.level)}
+    for record in finest.values():
+        for metric in filter(None, map(record.metric, metrics)):
+            try:
+                error = error_interval(metric)
+            except NotMeasuredError:
+                continue
+            if error.low > _ALL:
+                text = (
+                    f"an error of {100 * error.value:.3g} % on level {record.level}; the checks of "
+                    "this case are ratios to another solver, which do not judge it"
+                )
+                found.append(Notice(NoticeKind.WARNING, metric.name, record.solver, text))
+    return found
+
+
+def absurd_strain(
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    solutions: Mapping[str, Mapping[int, Solution]],
+    law: Law,
+    measure: float,
+) -> list[Notice]:
+    """Warn of strains of linear kinematics that mean that something is not in SI units.
+
+    Parameters
+    ----------
+    scene : Scene
+    records : sequence of SolveRecord
+        The coarsest one that was measured is looked at.
+    solutions : mapping of solver to mapping of level to Solution
+    law : Law
+    measure : float
+        Area or volume of the body.
+    """
+    compared = sorted((r for r in records if r.metrics), key=lambda one: one.level)
+    if scene.analysis.kinematics != "linear" or not compared:
+        return []
+    energy = strain_energy(solutions[compared[0].solver][compared[0].level], law)
+    strain = float(np.sqrt(energy / (np.max(law.shear) * measure)))
+    if strain <= _ABSURD:
+        return []
+    text = (
+        f"about {100 * strain:.2g} % in the mean, where linear kinematics holds for small strains; "
+        "expected lengths in m, stresses and moduli in Pa, densities in kg/m³"
+    )
+    return [Notice(NoticeKind.WARNING, "strain", None, text)]
+
+
+def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]]) -> list[Notice]:
+    """Warn of linear elements in nearly incompressible material, by each solver's finest answer.
+
+    Parameters
+    ----------
+    scene : Scene
+    solutions : mapping of solver to mapping of level to Solution
+    """
+    poisson = max(material.poisson for material in scene.material.each)
+    # in plane stress the sheet is free to become thicker
+    if poisson <= _NEARLY or scene.material.plane == "stress":
+        return []
+    coarser = ((1.0 - 2.0 * _COMPRESSIBLE) / (1.0 - 2.0 * poisson)) ** 0.5  # 1 + λ/μ = 1 / (1 − 2ν)
+    found = []
+    for name, levels in solutions.items():
+        finest = levels[max(levels)]
+        is_membrane = finest.cells.shape[1] == finest.points.shape[1]
+        if finest.order != 1 or is_membrane:
+            continue
+        across = float(np.ptp(finest.points, axis=0).min()) / finest.size  # not known: nan
+        if across < _ACROSS * coarser:
+            text = (
+                f"linear elements at Poisson's ratio {poisson:g}, {across:.3g} across the body, "
+                "may lock: with displacements alone they are too stiff there; expected a finer "
+                "mesh, or a method with a pressure or an averaged dilatation"
+            )
+            found.append(Notice(NoticeKind.WARNING, "locking", name, text))
+    return found

@@ -1,0 +1,132 @@
+"""Quantities of interest of a scene, measured on one solution."""
+
+import numpy as np
+
+from verify.compare.blade_intensity import blade_intensity
+from verify.compare.body import AnyBody
+from verify.compare.cut_deviation import RealisedCut
+from verify.compare.hooke import Law
+from verify.compare.locate import Field
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.motion import SolutionMotion
+from verify.compare.opening import opening, point_displacement
+from verify.compare.part_quantity import part_quantity, part_unit
+from verify.compare.simplices import simplices
+from verify.compare.strain_energy import strain_energy
+from verify.errors import UnsupportedSceneError
+from verify.judge.stress_intensity import solution_intensity
+from verify.scene import Scene
+from verify.scene.acceptance import (
+    DisplacementQuantity,
+    MaximumDisplacementQuantity,
+    OpeningQuantity,
+    PartQuantity,
+    Quantity,
+    StressIntensityQuantity,
+)
+from verify.solution import Solution
+
+_LOOKED_AT = 20_000  # cells
+
+
+class Measured:
+    """A solution with its field, ready to be measured.
+
+    Parameters
+    ----------
+    solution : Solution
+    body : Body or SolidBody
+    law : Law
+    scene : Scene, optional
+        Only stress-intensity factors and numbers of parts need it.
+    cut : RealisedCut, optional
+        Says where its field is continued across that.
+    """
+
+    def __init__(
+        self, solution: Solution, body: AnyBody, law: Law, scene: Scene | None = None,
+        cut: RealisedCut | None = None,
+    ) -> None:  # fmt: skip
+        self.solution, self.body, self.law, self.scene = solution, body, law, scene
+        self.cut = cut
+        self.motion = SolutionMotion(solution, body, continued=True if cut is None else cut)
+
+    def continued(self, everywhere: bool) -> SolutionMotion:
+        """Field over time with continuation across all of the realised cut, or without any."""
+        # sides are asked as far as the cuts are apart; within the limit that is known from facets
+        far = self.cut is not None and not self.cut.record.continued
+        deviation = self.cut.record.lateral if self.cut is not None and far else 0.0
+        return SolutionMotion(self.solution, self.body, deviation, everywhere)
+
+    @property
+    def field(self) -> Field:
+        """Field at the last output time."""
+        return self.motion.at()
+
+    @property
+    def coverage(self) -> float:
+        """Volume of the cells over that of the body: 1, or something is missing or twice there."""
+        shape = simplices(self.solution.points, self.solution.cells)
+        return float(shape.volume.sum()) / self.body.measure
+
+    @property
+    def outside(self) -> float:
+        """Share of the volume of the cells whose centres lie outside the body; 0 of membranes.
+
+        Of many cells, some are looked at.
+        """
+        if isinstance(self.body, MembraneBody):  # how far it is off its surface is known otherwise
+            return 0.0
+        cells = self.solution.cells
+        shape = simplices(self.solution.points, cells[:: 1 + len(cells) // _LOOKED_AT])
+        inside = self.body.inside(shape.corners.mean(axis=1))
+        return float(shape.volume[~inside].sum() / shape.volume.sum())
+
+    def quantity(self, asked: Quantity) -> float:
+        """Value of a quantity of interest, in the unit that `unit_of` gives.
+
+        Raises
+        ------
+        UnsupportedSceneError
+            If it cannot be had from this solution, with the reason.
+        InputError
+            If it is asked for at a time that the solution does not reach.
+        """
+        if isinstance(asked, StressIntensityQuantity):
+            if self.scene is None:
+                raise UnsupportedSceneError("a stress-intensity factor needs the scene")
+            if asked.mode == "III" and asked.point is None:  # at a blade
+                return blade_intensity(self.scene, self.motion, self.body, asked)
+            return solution_intensity(self.scene, self.solution, asked)
+        if isinstance(asked, PartQuantity):
+            if self.scene is None:
+                raise UnsupportedSceneError("a number of a part needs the scene")
+            return part_quantity(self.scene, self.solution, self.motion, self.law, asked)
+        if isinstance(asked, MaximumDisplacementQuantity):
+            u = self.motion.nodal(asked.time)
+            return float(np.linalg.norm(u, axis=1).max())
+        if asked.kind == "strain_energy":
+            return strain_energy(self.solution, self.law)
+        return field_quantity(self.motion.at(asked.time), self.body, asked)
+
+
+def field_quantity(
+    field: Field, body: AnyBody, asked: DisplacementQuantity | OpeningQuantity
+) -> float:
+    """Value of a displacement or an opening of a field, m."""
+    if isinstance(asked, DisplacementQuantity):
+        return point_displacement(field, asked.point, asked.component)
+    place = asked.at if body.dimension == 2 else asked.point
+    assert place is not None  # the scene was checked
+    return opening(field, body, asked.cut, place, asked.component)
+
+
+def unit_of(asked: Quantity, dimension: int) -> str:
+    """SI unit of a quantity; energies of plane scenes are per metre of thickness."""
+    if isinstance(asked, PartQuantity):
+        return part_unit(asked, dimension)
+    if asked.kind == "stress_intensity":
+        return "Pa √m"
+    if asked.kind == "strain_energy":
+        return "J/m" if dimension == 2 else "J"
+    return "m"

@@ -1,0 +1,257 @@
+"""Stress-intensity factors of any solver's solution, by the reference's interaction integral."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.front_factors import front_defect, front_factors
+from verify.scene import (
+    ArcCut,
+    BodyForce,
+    CutFaces,
+    DiscCut,
+    Gravity,
+    Material,
+    MeshFile,
+    PolygonCut,
+    PolylineCut,
+    Scene,
+    ToolPathCut,
+    is_uniform,
+)  # fmt: skip
+from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.history import factor_at, jumps
+from verify.solution import Solution
+
+Array = NDArray[np.float64]
+_SAME_TIME = 1e-9  # of the duration
+_AROUND = 65  # directions, and distances, in which the material around a tip is looked at
+
+
+def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had from any solution of a scene, or None."""
+    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    if asked.mode == "III" and isinstance(cut, ToolPathCut):  # the scene was checked: at a blade
+        return None
+    if scene.cell_dimension < scene.dimension or scene.analysis.kinematics != "linear":
+        return "stress-intensity factors are measured in linear kinematics, and not in membranes"
+    if isinstance(cut, ToolPathCut) and asked.end == "end" and _time(scene, asked) <= cut.ends_at:
+        return "a tip that advances has another field than one at rest: measured of mode III only"
+    if any(isinstance(load, BodyForce) and load.force == "exact" for load in scene.loads):
+        return "stress-intensity factors are not measured under the body force of an exact solution"
+    if reason := _defect_in_time(scene, asked):
+        return reason
+    if reason := _defect_on_faces(scene, asked):
+        return reason
+    if scene.dimension == 3:
+        if not scene.material.is_uniform:
+            return "factors along a front are measured in one material"
+        return front_defect(scene, asked)
+    if isinstance(scene.geometry, MeshFile):
+        return "factors at a tip are measured in rectangles and polygons"
+    from reference.fracture import no_tip
+
+    assert asked.end is not None  # the scene is plane
+    return no_tip(scene, asked.cut, asked.end)
+
+
+def _defect_on_faces(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had from a cut whose faces are loaded, or None."""
+    for load in _face_loads(scene, asked):
+        if not is_uniform(load.components):
+            return f"the load on the faces of cut '{asked.cut}' is not uniform"
+        if load.traction is not None and not _is_plane(scene, asked.cut):
+            return f"tractions are borne by the faces of cut '{asked.cut}', which is not plane"
+    return None
+
+
+def _face_loads(scene: Scene, asked: StressIntensityQuantity) -> list[CutFaces]:
+    return [load for load in scene.loads if isinstance(load, CutFaces) and load.cut == asked.cut]
+
+
+def _is_plane(scene: Scene, name: str) -> bool:
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
+    if isinstance(cut, PolylineCut):
+        return len(cut.points) == 2
+    return isinstance(cut, DiscCut | PolygonCut)
+
+
+def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had at the time at which it is asked for, or None."""
+    duration = scene.analysis.duration
+    if duration is None:
+        return None
+    slack, time = _SAME_TIME * duration, _time(scene, asked)
+    cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
+    opens = float(getattr(cut, "opens_at", 0.0))
+    still_closed = "closed" if opens > 0.0 or time == 0.0 else ""
+    if scene.analysis.damping[1]:
+        return (
+            "stress-intensity factors are not measured under damping by the stiffness: its stress "
+            "is not in the displacement"
+        )
+    if still_closed and time <= opens + slack:
+        return f"at {time:.6g} s cut '{asked.cut}' has not opened yet (opens_at = {opens:.6g} s)"
+    if min(abs(time - t) for t in scene.analysis.output_times) > slack:
+        return f"{time:.6g} s is no output time, and accelerations are known at those only"
+    forces = [load.history for load in scene.loads if isinstance(load, BodyForce)]
+    if any(abs(time - t) <= slack for history in forces for t in jumps(history)):
+        return f"a body force jumps at {time:.6g} s, and with it every acceleration"
+    return None
+
+
+def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQuantity) -> float:
+    """K_I or K_II in Pa √m at an end of a cut, from the field alone.
+
+    The mean over domains around the end as asked: a tip that a solver has put elsewhere shows.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If `intensity_defect` gives a reason, the mesh is too coarse for a domain around the end,
+        or the solution is in motion and carries no accelerations.
+    InputError
+        If the solution has no field at that time.
+    """
+    if reason := intensity_defect(scene, asked):
+        raise UnsupportedSceneError(reason)
+    time = _time(scene, asked)
+    step = int(np.argmin(np.abs(solution.times - time)))
+    moving = scene.analysis.kind == "dynamic"
+    if abs(solution.times[step] - time) > _SAME_TIME * (scene.analysis.duration or np.inf):
+        raise InputError(f"the solution has no field at {time:.6g} s, an output time of the scene")
+    if moving and solution.acceleration is None:
+        raise UnsupportedSceneError("the solution carries no accelerations: its inertia is unknown")
+    drag = scene.analysis.damping[0]
+    if drag and solution.velocity is None:
+        raise UnsupportedSceneError("the solution carries no velocities: its damping is unknown")
+    modes = _front_modes if scene.dimension == 3 else _tip_modes
+    given = {"body_force": _body_force(scene, time), "drag": drag, "step": step}
+    try:
+        found = modes(scene, _with_free_faces(scene, solution, asked, time), asked, given)
+    except InputError as problem:
+        raise UnsupportedSceneError(str(problem)) from None
+    return found[("I", "II", "III").index(asked.mode)]
+
+
+def _tip_modes(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
+) -> tuple[float, ...]:
+    from reference.fracture import DomainError, stress_intensity, tips
+
+    tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
+    material = _material_around(scene, tip.point, max(tip.radii()))
+    try:
+        found = stress_intensity(
+            solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc, **given
+        )
+    except DomainError as problem:
+        raise InputError(f"{problem}: {tip.nearest}, {tip.reach:.4g} m away") from None
+    return found.mode_1, found.mode_2
+
+
+def _front_modes(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
+) -> tuple[float, ...]:
+    return front_factors(scene, solution, scene.material.each[0], asked, **given)
+
+
+def _with_free_faces(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, time: float
+) -> Solution:
+    """Add the uniform stress that frees the loaded faces of a cut: K is that of both fields."""
+    loads = _face_loads(scene, asked)
+    if not loads:
+        return solution
+    d = scene.dimension
+    stress = np.zeros((d, d))
+    for load in loads:
+        factor = factor_at(load.history, time)
+        values = factor * load.values(np.zeros((1, d)), time)[0]
+        if load.traction is None:
+            stress += values[0] * np.eye(d)
+        else:
+            normal = _normal(scene, asked.cut)
+            stress += np.outer(values, normal) + np.outer(normal, values)
+            stress -= (values @ normal) * np.outer(normal, normal)
+    from reference.exact.hooke import hooke
+
+    law = hooke(scene.material.each[0])
+    trace = np.trace(stress) / (d * law.lame + 2 * law.shear)
+    strain = (stress - law.lame * trace * np.eye(d)) / (2 * law.shear)
+    return replace(solution, displacement=solution.displacement + solution.points @ strain)
+
+
+def _normal(scene: Scene, name: str) -> Array:
+    """Give the unit normal of a plane cut, towards its positive side."""
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
+    if isinstance(cut, DiscCut):
+        return cut.axes()[2]
+    if isinstance(cut, PolygonCut):
+        return cut.normal
+    assert isinstance(cut, PolylineCut)
+    along = np.subtract(cut.points[1], cut.points[0])
+    return np.array([-along[1], along[0]]) / np.linalg.norm(along)
+
+
+def _material_around(scene: Scene, tip: Array, radius: float) -> Material:
+    """Return the one material around a tip; the integral's fields know no interface.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If there are several within the radius, m.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, _AROUND)
+    spokes = np.column_stack([np.cos(turn), np.sin(turn)])
+    rings = radius * np.linspace(0.0, 1.0, _AROUND)
+    found = np.unique(
+        scene.material.number_at((tip + rings[:, None, None] * spokes).reshape(-1, 2))
+    )
+    if len(found) > 1:
+        raise UnsupportedSceneError(
+            f"materials differ within {radius:.3g} m of the tip; the integral expects one"
+        )
+    return scene.material.each[found[0]]
+
+
+def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) -> float | None:
+    """Factor that an exact solution states, Pa √m; None if it states none."""
+    if hasattr(exact, "intensity_at"):  # its tips differ
+        cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
+        point = asked.point
+        if isinstance(cut, PolylineCut | ArcCut):
+            point = cut.vertices()[0 if asked.end == "start" else -1]
+        stated = exact.intensity_at(point)
+    else:
+        stated = getattr(exact, "stress_intensity", None)
+    place = ("I", "II", "III").index(asked.mode)
+    return None if stated is None or len(stated) <= place else float(stated[place])
+
+
+def _time(scene: Scene, asked: StressIntensityQuantity) -> float:
+    """Time at which a factor is asked for, s; 0 in statics."""
+    return float(scene.analysis.output_times[-1] if asked.time is None else asked.time)
+
+
+def _body_force(scene: Scene, time: float) -> Callable[[Array], Array] | None:
+    """Force per volume (n, 2) at points (n, 2) in N/m³, if there is any."""
+    weights = [load for load in scene.loads if isinstance(load, Gravity)]
+    forces = [load for load in scene.loads if isinstance(load, BodyForce)]
+    if not weights and not forces:
+        return None
+
+    def force(points: Array) -> Array:
+        total = np.zeros_like(points)
+        for weight in weights:
+            density = np.nan_to_num(scene.material.at(points).density)
+            total += np.multiply.outer(density, np.asarray(weight.acceleration))
+        for given in forces:
+            total += factor_at(given.history, time) * given.values(points, time)
+        return total
+
+    return force

@@ -1,0 +1,309 @@
+"""Verdicts: whether a case keeps what it promises, given what is known about the truth.
+
+Everything measured is an interval. PASS if all of it satisfies the limit, FAIL if none of it
+does, UNDECIDED otherwise: the reference is too imprecise to tell. ERROR if a solve that the
+check needs is missing, or its comparison failed.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import isfinite
+
+from verify.judge.checks import applied_checks, limit_text, unjudged
+from verify.judge.intervals import (
+    Interval,
+    NotMeasuredError,
+    error_interval,
+    reference_share,
+)
+from verify.judge.rates import ROUND_OFF
+from verify.result import (
+    CaseResult,
+    Metric,
+    Rate,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+    finest_of,
+)
+from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
+
+Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
+
+# "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
+_SAME_SIZE = 0.1
+
+
+def judge(
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    rates: Sequence[Rate],
+    judge_only: Sequence[str] = (),
+) -> list[VerdictRecord]:
+    """Judge every acceptance check of `scene` on what was measured, for each solver by itself.
+
+    Parameters
+    ----------
+    scene : Scene
+    records : sequence of SolveRecord
+        All solves of the case, with their metrics.
+    rates : sequence of Rate
+    judge_only : sequence of str
+        Solvers that are judged; empty: all that were asked and do not refuse the case.
+
+    Returns
+    -------
+    list of VerdictRecord
+        One per check and solver, in the order of the scene, then of the solvers in `records`.
+    """
+    judges: dict[type, Callable[..., VerdictRecord]] = {
+        RateCheck: _judge_rate,
+        BoundCheck: _judge_bound,
+        RatioCheck: _judge_ratio,
+        ValueCheck: _judge_value,
+    }
+    verdicts = []
+    for applied in applied_checks(scene.acceptance, records, judge_only):
+        check = applied.check
+        if applied.not_judged:
+            verdicts.append(unjudged(check, Verdict.UNDECIDED, applied.not_judged))
+            continue
+        try:
+            found = judges[type(check)](check, records, rates)
+            verdicts.append(replace(found, reference_share=_reference_share(check, records)))
+        except NotMeasuredError as problem:
+            verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
+    return [_marked(scene, verdict) for verdict in verdicts]
+
+
+def with_verdicts(scene: Scene, result: CaseResult, judge_only: Sequence[str] = ()) -> CaseResult:
+    """Return what was measured of a case with its verdicts; see `judge`."""
+    return replace(result, verdicts=judge(scene, result.solves, result.rates, judge_only))
+
+
+def judged_against_rows(
+    scene: Scene,
+    result: CaseResult,
+    rows: Mapping[float, CaseResult],
+    judge_only: Sequence[str] = (),
+) -> CaseResult:
+    """Judge the checks of a row that compare it with other rows of its family.
+
+    Parameters
+    ----------
+    scene : Scene
+    result : CaseResult
+        Of the scene; its verdicts on these checks are made anew.
+    rows : mapping of float to CaseResult
+        The rows that are known, by the value of the parameter.
+    judge_only : sequence of str
+        As of `judge`.
+    """
+    if result.reference.kind is None:  # its comparison failed, and its verdicts say so
+        return result
+    applied = applied_checks(scene.acceptance, result.solves, judge_only)
+    verdicts = []
+    for one, found in zip(applied, result.verdicts, strict=True):
+        check = one.check
+        if isinstance(check, RatioCheck) and check.row is not None and not one.not_judged:
+            found = _marked(scene, _against_row(check, result, rows))
+            found = replace(found, reference_share=_reference_share(check, result.solves))
+        verdicts.append(found)
+    return replace(result, verdicts=verdicts)
+
+
+def _against_row(
+    check: RatioCheck, result: CaseResult, rows: Mapping[float, CaseResult]
+) -> VerdictRecord:
+    assert check.row is not None
+    assert check.solver is not None
+    if check.row not in rows:
+        text = f"the row {check.row:g} is not part of this run"
+        return unjudged(check, Verdict.UNDECIDED, text)
+    try:
+        return _ratio(check, result.solves, rows[check.row].solves, check.solver)
+    except NotMeasuredError as problem:
+        return unjudged(check, Verdict.ERROR, str(problem))
+
+
+def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
+    """Enter the reason if the case lists this as a known finding; say if it is none any more."""
+    for known in scene.known_findings:
+        named = (known.check, known.metric, known.solver)
+        if named != (found.check, found.metric, found.solver):
+            continue
+        if found.verdict is Verdict.FAIL:
+            return replace(found, known=known.reason)
+        if found.verdict is Verdict.PASS:
+            text = "it passes, and is listed as a known finding: the entry can go"
+            return replace(found, reason=f"{found.reason}; {text}")
+    return found
+
+
+def _judge_bound(
+    check: BoundCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    error = _error(_levels(records, check.solver)[-1], check.metric)
+    return _decide(check, error, 0.0, check.at_most, "error on the finest level")
+
+
+def _judge_value(
+    check: ValueCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    value = _metric(_levels(records, check.solver)[-1], check.metric).value
+    allowed = check.relative_tolerance * abs(check.equals)
+    known = Interval(value, value, value)
+    off = abs(value - check.equals) / abs(check.equals) if check.equals else abs(value)
+    text = f"off by {off:.2e} (relative); stated by: {check.source}"
+    return _decide(check, known, check.equals - allowed, check.equals + allowed, text)
+
+
+def _judge_ratio(
+    check: RatioCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    if check.row is not None:
+        text = "the row that it is compared with is judged after it"
+        return unjudged(check, Verdict.UNDECIDED, text)
+    return _ratio(check, records, records, check.to)
+
+
+def _ratio(
+    check: RatioCheck,
+    records: Sequence[SolveRecord],
+    others: Sequence[SolveRecord],
+    to: str,
+) -> VerdictRecord:
+    """Judge an error over that of the solver `to`, level by level."""
+    ours, theirs = _levels(records, check.solver), _levels(others, to)
+    if [r.level for r in ours] != [r.level for r in theirs]:
+        raise NotMeasuredError(f"{check.solver} and {to} were not solved on the same levels")
+    low, high = 0.0, check.at_most or 0.0
+    if check.within is not None:
+        low, high = 1 - check.within, 1 + check.within
+    found = []
+    for one, other in zip(ours, theirs, strict=True):
+        a = _error(one, check.metric)
+        b = _error(other, check.metric)
+        if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
+            text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+        if max(a.value, b.value) <= ROUND_OFF:
+            text = f"level {one.level}: both errors ({a.value:.1e}, {b.value:.1e}) are round-off"
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+        if b.low <= 0.0:
+            text = (
+                f"level {one.level}: the uncertainty {b.half_width:.1e} is not below the error "
+                f"{b.value:.1e} of {to}"
+            )
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+        found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))
+    all_levels = ", ".join(f"{ratio.value:.4g}" for _, ratio in found)
+    decided = [
+        _decide(check, ratio, low, high, f"worst at level {level}; by level {all_levels}")
+        for level, ratio in found
+    ]
+    order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL]
+    centre = 0.5 * (low + high) if check.within is not None else 0.0
+    return max(decided, key=lambda v: (order.index(v.verdict), abs((v.observed or 0.0) - centre)))
+
+
+def _judge_rate(
+    check: RateCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    for record in _levels(records, check.solver):
+        if record.not_compared:  # a rate of the other levels would hide it
+            text = f"{record.solver} level {record.level}: {record.not_compared}"
+            raise NotMeasuredError(text)
+    rate = next((r for r in rates if (r.solver, r.metric) == (check.solver, check.metric)), None)
+    if rate is None:
+        raise NotMeasuredError(f"no rate of {check.metric} for {check.solver}")
+    low, high = -float("inf"), float("inf")
+    if check.at_least is not None:
+        low = check.at_least
+    else:
+        assert check.equals is not None
+        assert check.within is not None
+        low, high = check.equals - check.within, check.equals + check.within
+    if rate.order is not None:
+        found = Interval(rate.order, rate.order - rate.uncertainty, rate.order + rate.uncertainty)
+        slopes = ", ".join(f"{slope:.3f}" for slope in rate.pairwise)
+        return _decide(check, found, low, high, f"slopes {slopes}")
+    if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
+        worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
+        return _record(check, Verdict.FAIL, worst, limit_text(check), rate.reason)
+    if rate.reason.startswith("slowing") and rate.pairwise[-1] + rate.uncertainty < low:
+        least = min(rate.pairwise[-1] - rate.uncertainty, *rate.pairwise)
+        at_most = Interval(rate.pairwise[-1], least, rate.pairwise[-1] + rate.uncertainty)
+        return _record(check, Verdict.FAIL, at_most, limit_text(check), rate.reason)
+    return _record(check, Verdict.UNDECIDED, None, limit_text(check), rate.reason)
+
+
+def _reference_share(check: Check, records: Sequence[SolveRecord]) -> float | None:
+    """Return the largest share of the reference in an error that a check compares, if it does."""
+    if isinstance(check, ValueCheck):
+        return None
+    solvers = {check.solver, check.to if isinstance(check, RatioCheck) else None}
+    metrics = [s.metric(check.metric) for s in finest_of(records).values() if s.solver in solvers]
+    shares = [reference_share(metric) for metric in metrics if metric is not None]
+    return max((share for share in shares if share is not None), default=None)
+
+
+def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:
+    limit = limit_text(check)
+    if not isfinite(found.value):
+        return _record(check, Verdict.FAIL, None, limit, f"{text}: not finite")
+    if low <= found.low and found.high <= high:
+        return _record(check, Verdict.PASS, found, limit, text)
+    if found.high < low or found.low > high:
+        return _record(check, Verdict.FAIL, found, limit, text)
+    reason = (
+        f"{text}: the uncertainty {found.half_width:.1e} is too large to tell {found.value:.4g} "
+        "from the limit"
+    )
+    if isinstance(check, BoundCheck) and found.half_width > 0.1 * found.value:
+        reason = (
+            f"{text}: reference uncertainty {found.half_width:.1e} is not clearly below the "
+            f"error {found.value:.1e} it judges"
+        )
+    return _record(check, Verdict.UNDECIDED, found, limit, reason)
+
+
+def _record(
+    check: Check, verdict: Verdict, found: Interval | None, limit: str, reason: str
+) -> VerdictRecord:
+    value, low, high = (None, None, None) if found is None else (found.value, found.low, found.high)
+    solver = check.solver or ""
+    return VerdictRecord(
+        check.check, solver, check.metric, verdict, value, low, high, limit, reason
+    )
+
+
+def _levels(records: Sequence[SolveRecord], solver: str | None) -> list[SolveRecord]:
+    """All solves of a solver, coarse to fine; every one must have finished."""
+    own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
+    if not own:
+        raise NotMeasuredError(f"'{solver}' was not run")
+    for record in own:
+        if record.status is not Status.SOLVED:
+            raise NotMeasuredError(
+                f"{solver} level {record.level} {record.status}: {record.reason}"
+            )
+    return own
+
+
+def _metric(record: SolveRecord, name: str) -> Metric:
+    metric = record.metric(name)
+    if metric is None:
+        why = record.notes.get(name, "it was not measured")
+        raise NotMeasuredError(f"{record.solver} level {record.level} has no {name}: {why}")
+    return metric
+
+
+def _error(record: SolveRecord, name: str) -> Interval:
+    metric = _metric(record, name)
+    try:
+        return error_interval(metric)
+    except NotMeasuredError as problem:
+        why = f": {record.notes[name]}" if name in record.notes else ""
+        raise NotMeasuredError(f"{problem}{why}") from None

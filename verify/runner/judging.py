@@ -1,0 +1,204 @@
+"""The comparison of a finished case: ``python -m verify.runner.judging judge.json``.
+
+Reads the stored solves of a case, has `verify.judge` compare and judge them, and writes
+``result.json``, the error fields for the pictures and, last, ``judged.json`` with the key of what
+was compared.
+"""
+
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from verify.compare.body import body_of
+from verify.compare.error_field import truth_of, write_error_field
+from verify.errors import InputError
+from verify.json_files import read_json, write_json
+from verify.judge.accuracy import assess_accuracy, not_compared
+from verify.judge.adequacy import adequacy_notice
+from verify.judge.closing import with_openings
+from verify.judge.verdict import with_verdicts
+from verify.printable import words_of
+from verify.processes import die_with_parent
+from verify.result import (
+    REFERENCE,
+    CaseResult,
+    Notice,
+    NoticeKind,
+    SolveRecord,
+    Status,
+    error_picture,
+)
+from verify.result_files import write_result
+from verify.runner.directory import JUDGING, folder_name
+from verify.runner.job import check_files, load_record
+from verify.runner.mesh_faults import mesh_notices
+from verify.scene import Scene, restore_scene
+from verify.solution import Solution, read_solution
+from verify.solvers.interface import is_built_in
+from verify.whole_files import write_whole
+
+_WILD = 1e3  # sizes of its body: a solution that moves farther has no openings to look at
+
+
+def main(question_file: Path) -> None:
+    """Compare and judge what `question_file` says."""
+    from reference.exact import exact_of
+
+    die_with_parent()
+    question, folder = read_json(question_file), question_file.parent
+    root = Path(question["root"])
+    scene = restore_scene(read_json(folder / "scene.json"))
+
+    def announce(record: SolveRecord) -> None:
+        write_whole(folder / JUDGING, at.get((record.solver, record.level), ""))
+
+    unfit, where = question["unfit"], folder / JUDGING
+    records, solutions, at = _stored(root, question["folders"], unfit, where)
+    records = [
+        not_compared(scene, record, unfit[name]) if name in unfit else record
+        for record, name in zip(records, question["folders"], strict=True)
+    ]
+    exact = exact_of(scene)
+    measured = assess_accuracy(scene, records, solutions, exact, announce)
+    solutions = _comparable(measured, solutions)
+    measured = _with_openings(measured, scene, solutions, exact, announce)
+    (folder / JUDGING).unlink(missing_ok=True)
+    result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
+    notices = _adequacy(root, question["models"], scene, result)
+    result = replace(result, notices=[*result.notices, *notices, *mesh_notices(scene)])
+    result = replace(result, provenance=question["provenance"])
+    try:
+        drawn = _error_pictures(result, scene, solutions, exact, folder)
+    except Exception:  # pictures cost nobody a verdict
+        traceback.print_exc()
+        drawn = {}
+    pictures = {name: str(path.relative_to(root)) for name, path in drawn.items()}
+    result = replace(result, pictures={**result.pictures, **pictures})
+    write_result(result, folder / "result.json")
+    write_json({"key": question["key"]}, folder / "judged.json")
+
+
+def _stored(
+    root: Path, folders: Sequence[str], unfit: Mapping[str, str], at: Path
+) -> tuple[list[SolveRecord], dict[str, dict[int, Solution]], dict[tuple[str, int], str]]:
+    """Read records and solutions; a solution that cannot be read is a failed solve.
+
+    Each folder is written into the file `at` before its solution is read. The third that is
+    returned is the folder by solver and level.
+    """
+    records: list[SolveRecord] = []
+    solutions: dict[str, dict[int, Solution]] = {}
+    for name in folders:
+        write_whole(at, name)
+        record = load_record(root / name)
+        if record.status is Status.SOLVED and name not in unfit:
+            try:
+                check_files(root / name)
+                solution = read_solution(root / name / "solution")
+            except InputError as error:
+                record = replace(record, status=Status.FAILED, reason=str(error))
+            else:
+                record = replace(record, solution=f"{name}/solution")
+                solutions.setdefault(record.solver, {})[record.level] = solution
+        records.append(record)
+    at.unlink()
+    where = {(r.solver, r.level): name for r, name in zip(records, folders, strict=True)}
+    return records, solutions, where
+
+
+def _adequacy(
+    root: Path, models: Mapping[str, Sequence[str]], scene: Scene, result: CaseResult
+) -> list[Notice]:
+    """State what the model of the case costs beside others that were solved."""
+    found = []
+    for model, folders in models.items():
+        solutions: dict[int, Solution] = {}
+        for name in folders:
+            record = load_record(root / name)
+            if record.status is Status.SOLVED:
+                solutions[record.level] = read_solution(root / name / "solution")
+        try:
+            found.append(adequacy_notice(scene, model, solutions, result))
+        except Exception as error:  # it costs nobody a verdict
+            traceback.print_exc()
+            text = f"was not measured: {words_of(error)}"
+            found.append(Notice(NoticeKind.ADEQUACY, model, None, text))
+    return found
+
+
+def _with_openings(
+    result: CaseResult,
+    scene: Scene,
+    solutions: dict[str, dict[int, Solution]],
+    exact: Any,
+    announce: Callable[[SolveRecord], None],
+) -> CaseResult:
+    """Add openings and overlaps; those of a guest may not cost the others theirs."""
+    own = {name: one for name, one in solutions.items() if is_built_in(name)}
+    for given in (solutions, own):
+        try:
+            return with_openings(result, scene, given, exact, announce)
+        except Exception as error:
+            traceback.print_exc()
+            text = f"cannot be had: {words_of(error)}"
+            about = Notice(NoticeKind.UNAVAILABLE, "openings and overlaps", None, text)
+            result = replace(result, notices=[*result.notices, about])
+    return result
+
+
+def _comparable(
+    result: CaseResult, solutions: dict[str, dict[int, Solution]]
+) -> dict[str, dict[int, Solution]]:
+    """Leave out the solutions that could not be compared, or move out of all proportion."""
+    fit = {
+        (s.solver, s.level)
+        for s in result.solves
+        if s.status is Status.SOLVED and not s.not_compared
+    }
+    kept = {
+        name: {k: s for k, s in own.items() if (name, k) in fit and not _is_wild(s)}
+        for name, own in solutions.items()
+    }
+    return {name: own for name, own in kept.items() if own}
+
+
+def _is_wild(solution: Solution) -> bool:
+    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+    return bool(np.abs(solution.displacement).max() > _WILD * size)
+
+
+def _error_pictures(
+    result: CaseResult,
+    scene: Scene,
+    solutions: dict[str, dict[int, Solution]],
+    exact: Any,
+    folder: Path,
+) -> dict[str, Path]:
+    """Write the error field of the finest solution of each solver, if there is a reference."""
+    body = body_of(scene)
+    judged = [own[max(own)] for solver, own in solutions.items() if solver != REFERENCE]
+    truth = truth_of(scene, solutions.get(REFERENCE, {}), judged, exact)
+    cuts = {(solve.solver, solve.level): solve.cut for solve in result.solves}
+    pictures: dict[str, Path] = {}
+    for solver, own in solutions.items():
+        if solver == REFERENCE or truth is None:
+            continue
+        path = folder / f"error_field_{folder_name(solver)}.vtu"
+        try:
+            finest = own[max(own)]
+            cut = cuts[solver, max(own)]
+            write_error_field(finest, truth(float(finest.times[-1])), path, body, cut)
+        except Exception:  # a solution that cannot be drawn costs nobody else a picture
+            traceback.print_exc()
+            continue
+        pictures[error_picture(solver)] = path
+    return pictures
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())
