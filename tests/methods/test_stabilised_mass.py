@@ -6,7 +6,7 @@ from cut_bodies import DENSITY, cut_body, cut_membrane
 from scipy.linalg import eigh
 from test_junctions import fork
 
-from verify.compare.system_numbers import critical_step, lowest_frequency
+from verify.judge.system_numbers import critical_step, lowest_frequency
 from verify.methods.mass_variants import (
     eigenvalue_stabilised_mass,
     generalised_eigenvalue_stabilised_mass,

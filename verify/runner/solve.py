@@ -139,7 +139,7 @@ def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict
 
 def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
     """Note the critical explicit step of the undeformed body with all cuts open, or why not."""
-    from verify.compare.system_numbers import critical_step
+    from verify.judge.system_numbers import critical_step
     from verify.system import checked_system
 
     system = getattr(solver, "system", None)

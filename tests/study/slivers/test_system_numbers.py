@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import eigh
 from scipy.sparse import csr_array, diags_array
 
-from verify.compare.system_numbers import condition_numbers, critical_step, lowest_frequency
 from verify.errors import InputError
+from verify.judge.system_numbers import condition_numbers, critical_step, lowest_frequency
 from verify.result import Verdict
 from verify.scene import load_scene
 from verify.solvers import find_solver

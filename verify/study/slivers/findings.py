@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-from verify.compare.system_numbers import CONDITION, FREQUENCY, SCALED, STEP
+from verify.judge.system_numbers import CONDITION, FREQUENCY, SCALED, STEP
 from verify.result import Verdict
 from verify.study.energy import account_findings
 from verify.study.measured_scenes import Measurement, missing_solutions

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from verify.compare.system_numbers import (
+from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.system_numbers import (
     CONDITION,
     FREQUENCY,
     SCALED,
@@ -17,7 +18,6 @@ from verify.compare.system_numbers import (
     lowest_frequency,
     with_uncut_twin,
 )
-from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line, words_of
 from verify.scene import Box, Rectangle, Scene, scene_content
 from verify.solvers import Solver

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
-from verify.compare.system_numbers import critical_step, with_uncut_twin
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.system_numbers import critical_step, with_uncut_twin
 from verify.judge.work import work_points
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import Scene

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from verify.compare.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.errors import UnsupportedSceneError
+from verify.judge.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.scene import Scene
 from verify.study.measured_scenes import variant_of
 
