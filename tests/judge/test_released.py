@@ -126,3 +126,23 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most
     if scheme == "newmark":  # nothing takes it: all of it is in the mesh
         assert abs(values["released_to_scheme"]) < 1e-9
         assert values["released_to_kinetic"] > 0.3 * 0.36
+
+
+def test_what_the_forces_at_a_cut_take_is_told_from_the_scheme():
+    """Swept openings, the trapezoidal rule: 0.7 of G at least, by the table of the theory page.
+
+    The scheme takes nothing, up to what gravity-free energies are known to; the sum is G as above.
+    """
+    scene = strip(angle=17.0)
+    scene = scene.model_copy(update={
+        "analysis": scene.analysis.model_copy(update={"opening": "swept"})
+    })  # fmt: skip
+    found = find_solver("xfem").solve(scene, 0, 0, scheme="newmark", mass="consistent")
+    law = law_of(scene)
+    exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
+    account = motion_account(scene, found, law)
+    metrics, _ = released_metrics(scene, found, found.size, law, account, exact)
+    values = {metric.name: metric.value for metric in metrics}
+    assert 0.7 * 0.36 < values["released_to_cut"] < 1.25 * 0.36
+    assert abs(values["released_to_scheme"]) < 1e-3 * 0.36
+    assert values["released_mismatch"] < 0.25

@@ -235,3 +235,10 @@ def test_steps_are_counted_from_output_to_output(tmp_path):
     analysis = load(tmp_path, MOVING).analysis
     steps = [analysis.steps(largest) for largest in (5.0, 0.2, 0.1, 0.08)]
     assert steps == [10, 10, 20, 30]
+
+
+def test_an_opening_rule_is_for_what_moves(tmp_path):
+    with pytest.raises(InputError, match="opening: it belongs to a dynamic analysis"):
+        load(tmp_path, STATIC + HELD + '[analysis]\nopening = "swept"\n')
+    with pytest.raises(InputError, match=r"late.*swept"):
+        load(tmp_path, MOVING + HELD.replace("[[", 'opening = "never"\n[[', 1))

@@ -174,6 +174,18 @@ def test_slivers_that_are_kept_close_and_those_that_are_merged_are_refused(tmp_p
         solve(tmp_path, "removal", text)
 
 
+@pytest.mark.parametrize("solver", ["xfem", "virtual_node", "subdivision"])
+def test_a_scene_says_the_rule_for_all(tmp_path, solver):
+    text = PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0])
+    told = solve(tmp_path, solver, text).displacement
+    (tmp_path / "said.toml").write_text(text.replace("[analysis]", '[analysis]\nopening = "swept"'))
+    scene = load_scene(tmp_path / "said.toml")
+    np.testing.assert_array_equal(find_solver(solver).solve(scene, 0, 0).displacement, told)
+    late = find_solver(solver).solve(scene, 0, 0, opening="late").displacement
+    assert np.abs(late - told).max() > 1e-3 * np.abs(told).max()
+    assert "cut_work" not in find_solver("removal").solve(scene, 0, 0).ledger
+
+
 def test_what_merging_projects_away_has_an_entry_of_its_own(tmp_path):
     """The trapezoidal rule of a linear body dissipates nothing: the scheme's entry is round-off."""
     text = PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0])

@@ -24,8 +24,8 @@ from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
 RELEASED = (
-    "released", "released_to_scheme", "released_to_damping", "released_to_kinetic",
-    "released_to_strain", "released_to_short_waves", "released_mismatch",
+    "released", "released_to_cut", "released_to_scheme", "released_to_damping",
+    "released_to_kinetic", "released_to_strain", "released_to_short_waves", "released_mismatch",
 )  # fmt: skip
 _UNIT = "J/m²"
 _PERIODS = 4.0  # shortest waves last up to that many h/c
@@ -36,12 +36,13 @@ def released_metrics(
 ) -> tuple[list[Metric], dict[str, str]]:
     """Measure where the energy went that the blades of a scene release, J per m² of their way.
 
-    ``released``: G, if the exact solution states it; ``released_to_scheme``: what is missing in the
+    ``released``: G, if the exact solution states it; ``released_to_cut``: what the forces took that
+    the solver says it has held the released cut with; ``_scheme``: what else is missing in the
     measured balance of energies; ``_damping``: what the rate of damping takes; ``_kinetic`` and
     ``_strain``: energy of the difference from the exact field since the start, kinetic energy by
     the solver's own mass (a lumped one holds more of short waves than their field);
     ``_short_waves``: without an exact field, kinetic energy of motions of periods below 4h/c.
-    ``released_mismatch``: the share of G by which scheme, damping and difference miss it.
+    ``released_mismatch``: the share of G by which cut, scheme, damping and difference miss it.
 
     Parameters
     ----------
@@ -133,6 +134,10 @@ def _dissipated(account: MotionAccount) -> tuple[dict[str, float], dict[str, str
         names = ("released_to_scheme", "released_to_damping")
         return {}, dict.fromkeys(names, account.energies.lacking)
     values = {"released_to_scheme": float(total[0] - total[-1])}
+    if "cut_work" in account.stated:
+        taken = account.stated["cut_work"]
+        values["released_to_cut"] = float(taken[-1] - taken[0])
+        values["released_to_scheme"] -= values["released_to_cut"]
     if "damping" in parts:
         values["released_to_damping"] = float(parts["damping"][-1])
     return values, {}

@@ -141,6 +141,7 @@ def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | 
 
 
 _PARTS = {
+    "released_to_cut": "taken at the cut",
     "released_to_scheme": "dissipated by the scheme",
     "released_to_damping": "by damping",
     "released_to_kinetic": "kinetic energy beside the exact field",

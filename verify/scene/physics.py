@@ -366,6 +366,11 @@ class Analysis(Strict):
     damping: tuple[NonNegative, NonNegative] = Field(
         default=(0.0, 0.0), description="Rayleigh: mass (1/s) and stiffness (s) factors"
     )
+    opening: Literal["late", "swept"] = Field(
+        default="late",
+        description="what a tool_path opens is free at once when it is passed, or held by forces "
+        "that fade as it is swept: of the reference and all own solvers",
+    )
 
     rules: ClassVar[Rules] = (
         ("", lambda a: a.kind == "dynamic" and a.duration is None,
@@ -374,6 +379,8 @@ class Analysis(Strict):
          "duration, time_step and outputs belong to a dynamic analysis"),
         ("", lambda a: a.kind == "static" and any(a.damping),
          "damping belongs to a dynamic analysis"),
+        ("opening", lambda a: a.kind == "static" and a.opening != "late",
+         "it belongs to a dynamic analysis"),
     )  # fmt: skip
 
     @property

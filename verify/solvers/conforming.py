@@ -74,7 +74,7 @@ class ConformingSolver:
         By which facets behind a blade on its way open late, s.
     opening : {"late", "swept"}
         Dynamics: when a blade opens a facet, when it has passed all of it, or ahead of it against
-        forces that fade (docs/theory/dynamics.md).
+        forces that fade (docs/theory/dynamics.md); by default as the scene says.
     """
 
     name = "conforming"
@@ -101,9 +101,10 @@ class ConformingSolver:
         scheme: str = "newmark",
         spectral_radius: float = 0.8,
         delay: float = 0.0,
-        opening: str = "late",
+        opening: str | None = None,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
+        opening = opening or scene.analysis.opening
         given = {"mesh": mesh, "degree": degree, "scheme": scheme, "opening": opening}
         check_choices(self.name, self.choices, given)
 
@@ -161,7 +162,7 @@ class ReferenceSolver:
         level: int,
         repetitions: int = 1,
         delay: float = 0.0,
-        opening: str = "late",
+        opening: str | None = None,
     ) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
         behind = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
@@ -172,7 +173,7 @@ class ReferenceSolver:
 
         def marching(level: int, size: float) -> Marching:
             step = scene.analysis.time_step or natural_step(scene, size * 2**level)
-            return Marching(scheme, step, radius, delay, level, opening)
+            return Marching(scheme, step, radius, delay, level, opening or scene.analysis.opening)
 
         degree = scene.reference.degree
         return _solve(

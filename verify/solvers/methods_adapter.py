@@ -94,7 +94,7 @@ class MethodSolver:
         scheme: str = "newmark",
         step_factor: float = 0.9,
         spectral_radius: float = 0.8,
-        opening: str = "late",
+        opening: str | None = None,
         **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`.
@@ -111,16 +111,19 @@ class MethodSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        check_choices(self.name, self.choices, {"scheme": scheme, "opening": opening})
-        if opening != "late" and self._method.startswith("removal"):
-            raise InputError("cells are removed behind the blade; expected opening = 'late'")
+        rule = opening or scene.analysis.opening
+        check_choices(self.name, self.choices, {"scheme": scheme, "opening": rule})
+        if self._method.startswith("removal"):
+            if opening not in (None, "late"):
+                raise InputError("cells are removed behind the blade; expected opening = 'late'")
+            rule = "late"
         check_steps(load_steps, step_factor)
         self._check(scene, scheme, parameters)
         marching = Marching(scheme, step_factor, spectral_radius)
 
         def run(mesh: tuple[SimplexMesh, float], trial: bool) -> Solution:
             if scene.analysis.kind == "dynamic":
-                return self._moved(scene, *mesh, marching, opening, parameters, trial)
+                return self._moved(scene, *mesh, marching, rule, parameters, trial)
             return self._at_rest(scene, *mesh, load_steps, parameters)
 
         with errors_of_scene(scene):

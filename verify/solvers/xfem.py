@@ -60,18 +60,29 @@ class _Parameters:
     step_factor: float = 0.9
     spectral_radius: float = 0.8
     kernels: str = "fast"
-    opening: str = "late"
+    opening: str | None = None
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in _CHOICES}
+        given = {name: getattr(self, name) for name in _CHOICES if getattr(self, name) is not None}
         check_choices(XfemSolver.name, _CHOICES, given)
         check_steps(self.load_steps, self.step_factor)
         self.marching()  # it checks its own
-        if self.opening != "late" and self.slivers in ("merge", "drop"):
+
+    def rule(self, scene: Scene) -> str:
+        """Return the rule by which blades open a scene.
+
+        Raises
+        ------
+        InputError
+            If the policy for slivers does not go with it.
+        """
+        rule = self.opening or scene.analysis.opening
+        if rule != "late" and self.slivers in ("merge", "drop"):
             raise InputError(
-                f"opening = '{self.opening}' with slivers = '{self.slivers}', whose unknowns are "
-                "not those of before parted; expected slivers = 'keep' or 'penalise'"
+                f"opening = '{rule}' with slivers = '{self.slivers}', whose unknowns are not those "
+                "of before parted; expected slivers = 'keep' or 'penalise'"
             )
+        return rule
 
     def cutting(self) -> Cutting:
         """Return those of a body that is cut on its way."""
@@ -121,7 +132,7 @@ class XfemSolver:
         implicit one if the scene states no time step.
     opening : {"late", "swept"}
         Dynamics: when a blade opens an element, when it has passed all of it, or ahead of it
-        against forces that fade (docs/theory/dynamics.md).
+        against forces that fade (docs/theory/dynamics.md); by default as the scene says.
     kernels : {"fast", "plain"}
         Operations of `verify.accelerated`, or those that `verify.xfem` does alone.
     """
@@ -220,7 +231,7 @@ def _run(
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
         timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline, given.opening)
+        openings = openings_of(scene, size, timeline, given.rule(scene))
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
         motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)

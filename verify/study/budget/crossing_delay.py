@@ -28,11 +28,11 @@ def mean_wait(scene: Scene, body: AnyBody, solution: Solution) -> float | None:
     Returns
     -------
     float or None
-        None if no blade opens anything.
+        None if no blade opens anything, or what it opens is not late.
     """
     blades = {cut.name: cut for cut in scene.cuts if isinstance(cut, ToolPathCut)}
     facets = solution.cut_facets
-    if not blades or not len(facets):
+    if not blades or not len(facets) or scene.analysis.opening != "late":
         return None
     count, corners, space = facets.shape
     middles = facets.mean(axis=1)
