@@ -18,14 +18,14 @@ _SAME = 1e-6  # of a facet: points that are one
 
 
 class FacetOpenings(NamedTuple):
-    """When each of `mesh.cut_facets` opens.
+    """When the pairs of nodes that face each other across each of `mesh.cut_facets` open.
 
     Attributes
     ----------
-    times : (f,) array
-        From when on it is open, s.
-    passed : (f,) array
-        When the blade has passed all of it, s.
+    times : (f, q) array
+        From when on each is open, s.
+    passed : (f, q) array
+        When the blade has passed all of its facet, s.
     shares : SweptShares or None
         Of the places of nodes on the cut; None where facets are released at once.
     place : (n,) int array
@@ -48,8 +48,8 @@ def facet_openings(
     """Find when each facet of the cut opens.
 
     Those of a cut open with it. One on a tool path opens when the blade has passed all of it, the
-    last of its corners; or if `swept` so early that each node is let go as the first facet at it
-    begins to be swept. A facet belongs to the cut that it is closest to: one on a curved cut is
+    last of its corners; or if `swept` at each node as the first facet there begins to be swept. A
+    facet belongs to the cut that it is closest to: one on a curved cut is
     off by its own sagitta, and cuts do not lie on each other.
 
     Parameters
@@ -72,8 +72,8 @@ def facet_openings(
         for cut in scene.final_cuts
     ]
     _, place = np.unique(space.node_points, axis=0, return_inverse=True)
-    shares = SweptShares(len(corners)) if swept else SweptShares(len(corners), 1)
-    times, passed = np.zeros((2, len(corners)))
+    shares = SweptShares(len(corners), by_node=True)
+    times, passed = np.zeros((2, *facing.shape[:2]))
     for i, cut in enumerate(scene.cuts):
         mine = np.argmin(off, axis=0) == i
         if isinstance(cut, ToolPathCut):
@@ -81,7 +81,7 @@ def facet_openings(
             shape = _weights(corners[mine], space.node_points[nodes])
             simplices = CutSimplices(corners[mine], which, place.ravel()[nodes], shape)
             found = shares.add(simplices, partial(_passed_at, cut, delay))
-            times[mine], passed[mine] = (one[mine] for one in found)
+            times[mine], passed[mine] = found.begins, found.passed[mine, None]
         else:
             times[mine] = passed[mine] = cut.opens_at
     known = shares if swept and shares.used else None

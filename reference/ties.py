@@ -49,11 +49,11 @@ def lasting_ties(facing: Numbers, opening: Array) -> Numbers:
     ----------
     facing : (f, q, 2) array
         Pairs of nodes on both sides of each facet.
-    opening : (f,) array
-        When each facet opens, s.
+    opening : (f, q) array
+        When each pair opens, s.
     """
-    order = np.argsort(-opening, kind="stable")
-    pairs = np.sort(facing[order].reshape(-1, 2), axis=1)
+    order = np.argsort(-opening.ravel(), kind="stable")
+    pairs = np.sort(facing.reshape(-1, 2)[order], axis=1)
     _, first = np.unique(pairs, axis=0, return_index=True)
     count = int(facing.max(initial=-1)) + 1
     graph = coo_array((first + 1.0, tuple(pairs[first].T)), shape=(count, count))

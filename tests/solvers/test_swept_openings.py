@@ -63,7 +63,7 @@ def test_a_share_is_the_integral_of_a_shape_function_over_what_is_swept():
 
     shares = SweptShares(1)
     simplices = CutSimplices(corners[None], np.zeros(1, int), np.arange(3)[None], np.eye(3)[None])
-    let_go, passed = shares.add(simplices, passed_at)
+    let_go, passed, _ = shares.add(simplices, passed_at)
     times = passed_at(corners)
     assert let_go[0] == pytest.approx(times.min())
     assert passed[0] == pytest.approx(times.max())
@@ -91,9 +91,10 @@ def test_nodes_in_a_row_are_let_go_a_facet_ahead_and_held_half_when_the_blade_is
     shares = SweptShares(5)
     shape = np.broadcast_to(np.eye(2), (5, 2, 2))
     simplices = CutSimplices(row, np.arange(5), node, shape)
-    let_go, passed = shares.add(simplices, lambda points: points[:, 0])
+    let_go, passed, begins = shares.add(simplices, lambda points: points[:, 0])
     np.testing.assert_allclose(let_go, [0.0, 0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(passed, [1.0, 2.0, 3.0, 4.0, 5.0])
+    np.testing.assert_allclose(begins, [[0, 0], [0, 1], [1, 2], [2, 3], [3, 4]])
     fading = shares.fading(np.array([3, 3]), 2.0)
     for t, left in ((2.0, 1.0), (2.5, 0.875), (3.0, 0.5), (3.5, 0.125), (4.0, 0.0)):
         np.testing.assert_allclose(fading.at(t), left, atol=1e-12)

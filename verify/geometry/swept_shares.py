@@ -42,6 +42,25 @@ class CutSimplices(NamedTuple):
     shape: Array
 
 
+class Passage(NamedTuple):
+    """When a blade sweeps pieces of a cut, s.
+
+    Attributes
+    ----------
+    let_go : (pieces,) array
+        When each piece opens so that each of its nodes can be let go as its cut begins to be
+        swept. NaN for other pieces.
+    passed : (pieces,) array
+        When the blade has passed all of it. NaN for other pieces.
+    begins : (q, n) array
+        When the cut begins to be swept in the support of each node of each simplex.
+    """
+
+    let_go: Array
+    passed: Array
+    begins: Array
+
+
 @dataclass(frozen=True)
 class Fading:
     """Factors of some forces that fall from 1 to 0 as a blade sweeps what they hold.
@@ -84,10 +103,12 @@ class SweptShares:
         Number of pieces.
     divisions : int
         Of each edge of a simplex of the cut; one where nothing is asked but when it is passed.
+    by_node : bool
+        Whether nodes are let go one by one, or as soon as all pieces at them are open.
     """
 
-    def __init__(self, pieces: int, divisions: int = _DIVISIONS) -> None:
-        self._pieces, self._divisions = pieces, divisions
+    def __init__(self, pieces: int, divisions: int = _DIVISIONS, by_node: bool = False) -> None:
+        self._pieces, self._divisions, self._by_node_alone = pieces, divisions, by_node
         self._parts: list[tuple[Numbers, Numbers, Array, Array, Array]] = []
 
     @property
@@ -95,7 +116,7 @@ class SweptShares:
         """Whether a blade sweeps anything."""
         return any(len(node) for node, *_ in self._parts)
 
-    def add(self, cut: CutSimplices, passed_at: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def add(self, cut: CutSimplices, passed_at: Callable[[Array], Array]) -> Passage:
         """Add the simplices of one cut that a blade sweeps.
 
         Parameters
@@ -104,11 +125,6 @@ class SweptShares:
         passed_at : callable
             When the blade is at points (n, d) of the cut, s.
 
-        Returns
-        -------
-        let_go, passed : (pieces,) array
-            When each piece opens so that each of its nodes can be let go as its cut begins to be
-            swept; and when the blade has passed all of it, s. NaN for other pieces.
         """
         inside, parts = _divided(cut.points.shape[1], self._divisions)
         points = inside @ cut.points
@@ -125,13 +141,15 @@ class SweptShares:
         let_go, passed = np.full((2, self._pieces), np.nan)
         np.fmin.at(let_go, cut.piece, starts[cut.node].min(axis=1))
         np.fmax.at(passed, cut.piece, end.max(axis=1))
-        free = np.full(count, -np.inf)
-        np.maximum.at(free, cut.node, np.broadcast_to(let_go[cut.piece, None], cut.node.shape))
+        free = starts
+        if not self._by_node_alone:
+            free = np.full(count, -np.inf)
+            np.maximum.at(free, cut.node, np.broadcast_to(let_go[cut.piece, None], cut.node.shape))
 
         moments = (np.broadcast_to(x[..., None], held.shape)[held] for x in (begin, end))
         node = nodes[held]
         self._parts.append((node, free[node], *moments, weight[held]))  # type: ignore[arg-type]
-        return let_go, passed
+        return Passage(let_go, passed, starts[cut.node])
 
     def fading(self, nodes: Numbers, since: float, close: float = 0.0) -> Fading:
         """Give the factors of the forces at nodes (k,) that are let go at a time.

@@ -65,7 +65,7 @@ def seams_of(phantom: PhantomMesh) -> Seams:
 
 
 def welded(phantom: PhantomMesh, seams: Seams, closed: NDArray[np.bool_]) -> PhantomMesh:
-    """Join the two faces of the seams (k,) that are closed; cells stay as they are."""
+    """Join pairs of nodes (k, d) of the seams that are closed; cells stay as they are."""
     count = phantom.node_count
     first, second = seams.one[closed].ravel(), seams.other[closed].ravel()
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))

@@ -116,7 +116,7 @@ class TiedMotion:
             self.facing = facing_nodes(space)
             swept = marching.opening == "swept"
             self.opening = facet_openings(scene, space, self.facing, swept, marching.delay)
-            self.closed = np.ones(len(self.opening.times), dtype=bool)
+            self.closed = np.ones(self.opening.times.shape, dtype=bool)
             self.planned = self._plan()
         self.ledger, self.account = Ledger(), Account()
         self.steppers: dict[float, Stepper] = {}
@@ -244,7 +244,7 @@ class TiedMotion:
         return True
 
     def _untie(self, times: Array, time: float) -> bool:
-        """Untie the facets whose times have come; hold the nodes that these let go."""
+        """Untie the pairs of nodes whose times have come; hold those that are let go."""
         due = self.closed & (times <= time + self.timeline.close)
         if not due.any():
             return False
@@ -271,7 +271,7 @@ class TiedMotion:
 
     def _tie(self, closed: NDArray[np.bool_]) -> None:
         self.closed = closed
-        self.body.tie(self.facing[closed].reshape(-1, 2))
+        self.body.tie(self.facing[closed])
         for stepper in self.steppers.values() if not self.planned else ():
             stepper.close()
 
@@ -298,7 +298,7 @@ class TiedMotion:
         """Displacement at which the body is at rest with what is closed, which must hold it."""
         before = self.space
         if self.closed.any():
-            mesh = partly_opened(self.space.mesh, ~self.closed)
+            mesh = partly_opened(self.space.mesh, ~self.closed.any(axis=1))
             before = conforming_space(mesh, self.space.degree, self.comm)
         constrained_values(self.scene, before, self.exact)  # says which piece is not held
         if self.scene.analysis.kinematics == "linear" or before is self.space:

@@ -21,7 +21,7 @@ _Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Opened:
-    """When pieces (elements, or facets of a finished mesh) open.
+    """When pieces (elements, or pairs of nodes of the facets of a finished mesh) open.
 
     Attributes
     ----------
@@ -97,19 +97,19 @@ class Openings:
         phantom : PhantomMesh
             The mesh with all of them.
         """
-        shares = self._none_swept(len(phantom.mesh.cells))
+        shares = self._none_swept(len(phantom.mesh.cells), by_node=False)
         times, passed = np.full((2, len(phantom.mesh.cells), len(self.asked)), np.nan)
         for k, cut in enumerate(self.asked):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             if isinstance(cut, ToolPathCut):
                 sections = _sections(phantom, cells, k)
-                times[:, k], passed[:, k] = shares.add(sections, cut.passed_at)
+                times[:, k], passed[:, k], _ = shares.add(sections, cut.passed_at)
             else:
                 times[cells, k] = passed[cells, k] = self.times[k]
         return self._by_rule(times, passed, shares)
 
     def of_seams(self, seams: _Floats, node: _Ints) -> Opened:
-        """Return when seams (k, d, space) open, given by their corners: (k,).
+        """Return when seams (k, d, space) open at each of their corners: (k, d).
 
         A tool path has passed a seam with all its corners, another cut opens it at once. A seam is
         of the cut to which its corners and its middle are nearest: nodes may be off it.
@@ -121,27 +121,28 @@ class Openings:
             Number of the place of each corner.
         """
         count, corners, space = seams.shape
-        shares = self._none_swept(count)
+        shares = self._none_swept(count, by_node=True)
         if not count:
-            return Opened(np.empty(0), np.empty(0), None)
+            return Opened(np.empty((0, corners)), np.empty((0, corners)), None)
         middles = seams.mean(axis=1, keepdims=True)
         places = np.concatenate([seams, middles], axis=1).reshape(-1, space)
         off = np.stack(
             [np.maximum(np.abs(cut.level_set(places)), -cut.depth(places)) for cut in self.cuts]
         )
         nearest = off.reshape(len(self.cuts), count, corners + 1).max(axis=2).argmin(axis=0)
-        times, passed = np.tile(np.array(self.times)[nearest], (2, 1))
+        times, passed = np.tile(np.array(self.times)[nearest][:, None], (2, 1, corners))
         for k, cut in enumerate(self.asked):
             mine = np.flatnonzero(nearest == k)
             if isinstance(cut, ToolPathCut) and len(mine):
                 shape = np.broadcast_to(np.eye(corners), (len(mine), corners, corners))
                 simplices = CutSimplices(seams[mine], mine, node[mine], shape)
-                one, other = shares.add(simplices, cut.passed_at)
-                times[mine], passed[mine] = one[mine], other[mine]
+                passage = shares.add(simplices, cut.passed_at)
+                times[mine], passed[mine] = passage.begins, passage.passed[mine, None]
         return self._by_rule(times, passed, shares)
 
-    def _none_swept(self, pieces: int) -> SweptShares:
-        return SweptShares(pieces, 1) if self.rule == "late" else SweptShares(pieces)
+    def _none_swept(self, pieces: int, by_node: bool) -> SweptShares:
+        divisions = {"divisions": 1} if self.rule == "late" else {}
+        return SweptShares(pieces, by_node=by_node, **divisions)
 
     def _by_rule(self, times: _Floats, passed: _Floats, shares: SweptShares) -> Opened:
         if self.rule == "late":
