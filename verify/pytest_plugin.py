@@ -110,7 +110,7 @@ class _Runs:
 
     def _options(self, scene: "Scene") -> "Options":
         from verify.runner import Options
-        from verify.source_digest import cache_folder
+        from verify.runner.fingerprint import cache_folder
 
         named = {name for c in scene.acceptance for name in (c.solver, c.compared)}
         # the default would run the conforming solver too, for the report that nobody reads here;

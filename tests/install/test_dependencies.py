@@ -77,7 +77,7 @@ def test_a_package_imports_only_what_is_declared_for_it(folder, groups, besides)
 
 @pytest.mark.parametrize(
     ("name", "files"),
-    [("distributed", {"cluster.py"}), ("pytest", {"pytest_plugin.py"})],
+    [("distributed", {"engines.py"}), ("pytest", {"pytest_plugin.py"})],
 )
 def test_what_only_some_have_is_imported_by_its_own_modules_alone(name, files):
     assert {f.name for f in (ROOT / "verify").rglob("*.py") if name in imported_by(f)} == files

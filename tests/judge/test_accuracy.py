@@ -9,7 +9,7 @@ from verify.judge.accuracy import assess_accuracy
 from verify.judge.verdict import with_verdicts
 from verify.result import SolveRecord, Status, Verdict
 from verify.result_files import read_result, write_result
-from verify.runner.ending import SOLVER_FAILED, exit_code
+from verify.runner.run import SOLVER_FAILED, exit_code
 
 
 def line(x):

@@ -13,7 +13,7 @@ import pytest
 from case_texts import STRETCHED, body_text
 from command_line import run_here
 
-from verify.runner import engine, loading
+from verify.runner import engines, loading
 from verify.solvers.interface import is_built_in
 
 HERE = Path(__file__).parent
@@ -65,7 +65,7 @@ class CommandLine:
         if arguments[0] == "run":
             arguments = (*arguments, "--no-report")
         with (
-            patch.object(engine, "is_built_in", forked),
+            patch.object(engines, "is_built_in", forked),
             patch.object(loading, "is_built_in", forked),
         ):
             return run_here(arguments, self.folder, {**self.environment, **environment})

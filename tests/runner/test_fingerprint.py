@@ -7,10 +7,8 @@ import grimp
 import pytest
 import scenes
 
-from verify import source_digest
 from verify.runner import fingerprint
-from verify.runner.fingerprint import code_of_comparison, code_of_solver
-from verify.source_digest import ROOT, Sources, modules_in
+from verify.runner.fingerprint import ROOT, Sources, code_of_comparison, code_of_solver, modules_in
 
 SOLVING = "verify.runner.solve"
 ROOTS = [
@@ -63,11 +61,11 @@ def test_what_a_module_depends_on_is_what_another_program_finds(sources):
 def test_a_statement_changes_a_digest_and_a_comment_or_docstring_does_not(module, sources):
     text = sources.file(module).read_text("utf-8")
     package = module if sources.file(module).name == "__init__.py" else module.rpartition(".")[0]
-    digest, imports = source_digest._parsed(text.encode(), package)
+    digest, imports = fingerprint._parsed(text.encode(), package)
     said = ast.get_docstring(ast.parse(text), clean=False)
     other = text.replace(said, f"Another text. {said}", 1) + "\n\n# a comment\n"
-    assert source_digest._parsed(other.encode(), package) == (digest, imports)
-    assert source_digest._parsed(f"{text}\n_new = 1\n".encode(), package).digest != digest
+    assert fingerprint._parsed(other.encode(), package) == (digest, imports)
+    assert fingerprint._parsed(f"{text}\n_new = 1\n".encode(), package).digest != digest
 
 
 @pytest.mark.parametrize("module", ["reference.law", "verify.judge.checks", "verify.xfem.clip"])
@@ -128,7 +126,7 @@ def test_versions_and_data_files_are_part_of_a_digest(tmp_path, monkeypatch):
     (tmp_path / "verify/tables").mkdir()
     (tmp_path / "verify/tables/weights.csv").write_text("1")
     digests.append(Sources(tmp_path).digest("verify"))
-    monkeypatch.setattr(source_digest, "versions", lambda: {"python": "3", "numpy": "0.1"})
+    monkeypatch.setattr(fingerprint, "versions", lambda: {"python": "3", "numpy": "0.1"})
     digests.append(Sources(tmp_path).digest("verify"))
     assert len(set(digests)) == 3
     with pytest.raises(KeyError, match=r"verify\.third"):

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from verify.runner.job import Job
-from verify.runner.options import Options
 from verify.runner.plan import CasePlan, begun_after
+from verify.runner.selection import Options
 from verify.scene import load_scene
 
 SOLVERS = ["xfem", "reference"]

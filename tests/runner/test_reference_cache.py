@@ -9,10 +9,9 @@ import pytest
 
 from verify.errors import InputError
 from verify.result import Status
-from verify.runner import reference_cache
+from verify.runner import references
 from verify.runner.job import Job
-from verify.runner.reference_bundle import ReferenceBundle, write_bundle
-from verify.runner.reference_cache import ReferenceCache
+from verify.runner.references import ReferenceBundle, ReferenceCache, write_bundle
 from verify.scene import load_scene
 from verify.solution import read_solution, write_solution
 
@@ -63,7 +62,7 @@ def test_what_was_kept_is_taken_with_its_origin(scene, kept, tmp_path):
 @pytest.mark.parametrize("change", ["young = 2.0", "scene"])
 def test_other_physics_or_other_code_finds_nothing(scene, kept, tmp_path, monkeypatch, change):
     if change == "scene":
-        monkeypatch.setattr(reference_cache, "code_of_solver", lambda name: "another version")
+        monkeypatch.setattr(references, "code_of_solver", lambda name: "another version")
         assert {entry.outdated for entry in kept.entries()} == {True}
     else:
         text = scene.file.read_text().replace("young = 1.0", change)

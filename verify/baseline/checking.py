@@ -9,7 +9,7 @@ from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity
 from verify.calibration import KERNEL
 from verify.meaning import changes_of
 from verify.result import CaseResult, Metric, Verdict
-from verify.runner.ending import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
+from verify.runner.run import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 
 # below this an exact reference that is computed anew may differ by its own quadrature
 _SAME_REFERENCE = 1e-9

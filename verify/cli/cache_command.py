@@ -7,9 +7,8 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.runner import select_cases
-from verify.runner.reference_bundle import write_bundle
-from verify.runner.reference_cache import Entry, ReferenceCache
-from verify.source_digest import cache_folder
+from verify.runner.fingerprint import cache_folder
+from verify.runner.references import Entry, ReferenceCache, write_bundle
 
 
 def execute(arguments: argparse.Namespace) -> int:

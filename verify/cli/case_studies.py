@@ -120,7 +120,7 @@ def _run(
 ) -> "list[CaseResult]":
     from verify.cli.progress import progress_on
     from verify.runner import Options, run_cases
-    from verify.source_digest import cache_folder
+    from verify.runner.fingerprint import cache_folder
 
     options = Options(
         solvers=solvers,

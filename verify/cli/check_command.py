@@ -9,13 +9,12 @@ from typing import Any
 from verify.cli.cost_text import case_lines, costs_of, memory_line
 from verify.errors import InputError
 from verify.printable import one_line
-from verify.runner.body_size import body_text
 from verify.runner.checking import check_scene
-from verify.runner.cost import LevelCost
+from verify.runner.cost import LevelCost, body_text
+from verify.runner.fingerprint import cache_folder
 from verify.runner.mesh_faults import mesh_warning
-from verify.runner.options import Options
+from verify.runner.selection import Options
 from verify.scene import load_scenes
-from verify.source_digest import cache_folder
 
 
 def execute(arguments: argparse.Namespace) -> int:

@@ -6,8 +6,8 @@ from itertools import groupby
 
 from verify.printable import memory_text
 from verify.runner.cost import LevelCost, case_cost
-from verify.runner.options import Options
 from verify.runner.plan import solvers_of
+from verify.runner.selection import Options
 from verify.scene import Scene
 
 _HOPELESS = 10.0  # times the memory of the machine: the estimate is good to a factor of about 3

@@ -6,7 +6,7 @@ import textwrap
 from typing import Any
 
 from verify.errors import InputError
-from verify.runner.body_size import body_text
+from verify.runner.cost import body_text
 from verify.scene import Scene, load_scene, scene_hash
 
 

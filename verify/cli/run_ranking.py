@@ -16,10 +16,9 @@ from verify.json_files import read_json, write_json
 from verify.printable import words_of
 from verify.ranking import ranked_solvers
 from verify.result import CaseResult, Status
-from verify.runner.fingerprint import code_of_solver, digest_of, file_digest
+from verify.runner.fingerprint import code_digest, code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
 from verify.solvers.named import solver_in
-from verify.source_digest import code_digest
 
 RANKING_FILE = "ranking.json"
 _SECONDS = 120.0  # for each small solve of the suite

@@ -22,9 +22,9 @@ from verify.cli.streams import print_line
 from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
-from verify.runner.ending import NOTHING_RAN
+from verify.runner.fingerprint import cache_folder
+from verify.runner.run import NOTHING_RAN
 from verify.solvers.named import one_name, parameters_of
-from verify.source_digest import cache_folder
 
 
 def execute(arguments: argparse.Namespace) -> int:

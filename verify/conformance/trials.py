@@ -10,8 +10,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.result import Status
-from verify.runner.child import POLL_SECONDS, Child
-from verify.runner.outcome import telling_line
+from verify.runner.child import POLL_SECONDS, Child, telling_line
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in

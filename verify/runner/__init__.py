@@ -4,11 +4,8 @@ The runner knows solvers by their names only and judges nothing: the comparison 
 case (`verify.study`) runs in a process of its own too.
 """
 
-from verify.runner.ending import exit_code
-from verify.runner.interruption import RunStoppedError
-from verify.runner.options import Options
-from verify.runner.run import RunSummary, run_cases
-from verify.runner.selection import select_cases
+from verify.runner.run import RunStoppedError, RunSummary, exit_code, run_cases
+from verify.runner.selection import Options, select_cases
 from verify.runner.work import Progress
 
 __all__ = [

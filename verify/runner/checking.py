@@ -45,10 +45,13 @@ def _check_mechanics(scene: Scene, exact: Any) -> None:
     """Refuse what has no solution, or another one than the exact solution."""
     # they cut meshes: commands that check nothing shall not load what that takes
     from verify.runner.cost import mesh_of_level
-    from verify.runner.cuts_in_body import check_cuts_can_be_meshed, check_places_in_mesh
     from verify.runner.exact_fit import check_exact_fits
-    from verify.runner.finite_formulas import check_formulas_are_finite
-    from verify.runner.held_pieces import check_pieces_are_held
+    from verify.runner.mesh_checks import (
+        check_cuts_can_be_meshed,
+        check_formulas_are_finite,
+        check_pieces_are_held,
+        check_places_in_mesh,
+    )
     from verify.solvers.body_of_scene import background_mesh
 
     if (mesh_of_level(scene, 0) or (0.0,))[0] > _CHECKED:

@@ -6,7 +6,8 @@ never touch; and a solver that hits them dies in an unlucky place with an unclea
 watch looks fifty times a second, so that a solve may overshoot by what it can touch in 20 ms.
 
 Its end is the end of everything that it started: of its process group, of its descendants as the
-watch has seen them, and of what bears its mark in the environment that it was started with.
+watch has seen them, and of what bears its mark in the environment that it was started with. Its
+death is told in words, by what it was killed for or by its log.
 """
 
 import atexit
@@ -15,6 +16,7 @@ import ctypes
 import faulthandler
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -30,7 +32,9 @@ from uuid import uuid4
 import numpy as np
 import psutil
 
+from verify.printable import memory_text, one_line
 from verify.processes import FORKED, PARENT_VARIABLE, die_with_parent, start_server
+from verify.result import Status
 from verify.threads import ONE_THREAD
 
 POLL_SECONDS = 0.02
@@ -39,6 +43,10 @@ _MARK_VARIABLE = "VERIFY_CHILD"
 _LONGEST_LOG = 64 * 2**20  # bytes; beyond, only its beginning and what comes next are kept
 _BEGINNING = 2**20
 _ROUNDS = 50  # of killing: what forks meanwhile is found in the next
+_FATAL = re.compile(r"^Fatal Python error: (.+)")  # faulthandler's headline of a crash
+_TELLING = re.compile(r"error|exception|abort|killed|fail|cannot|not found", re.IGNORECASE)
+_LONGEST_LINE = 300
+_READ = 2**18
 
 
 @dataclass(frozen=True)
@@ -255,3 +263,52 @@ def _shorten(log: Path) -> None:
             os.truncate(log, _BEGINNING)
             with log.open("ab") as stream:
                 stream.write(b"\n... (cut here by the runner: too long) ...\n")
+
+
+def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Status, str]:
+    """Explain the end of a process that left no outcome.
+
+    Parameters
+    ----------
+    log : Path
+    ending : Ending
+    timeout, memory : float
+        The limits that it had, s and bytes.
+    """
+    if ending.killed_for == "timeout":
+        return Status.TIMEOUT, f"killed after {timeout:g} s"
+    if ending.killed_for == "memory":
+        return Status.MEMORY, f"killed above {memory_text(memory)}"
+    if ending.returncode == -9:
+        if ending.starved:
+            return Status.MEMORY, "killed by the system, which was out of memory"
+        return Status.FAILED, "killed from outside (signal 9), not for memory"
+    code = ending.returncode
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    return Status.FAILED, f"{telling_line(log)} ({how}{'' if code else ', without an answer'})"
+
+
+def telling_line(log: Path) -> str:
+    """Return the line of `log` that says most about a death: a crash, an error, the last one."""
+    try:
+        text = _ends(log)
+    except OSError:
+        return "left no log"
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    if not lines:
+        return "said nothing"
+    for line in lines:
+        if match := _FATAL.match(line):
+            return one_line(match.group(1)[:_LONGEST_LINE])
+    tail = lines[-30:]
+    line = next((line for line in reversed(tail) if _TELLING.search(line)), lines[-1])
+    return one_line(line[:_LONGEST_LINE])
+
+
+def _ends(log: Path) -> str:
+    """Return the beginning and the end of a log that may be very long."""
+    with log.open("rb") as stream:
+        head = stream.read(_READ)
+        size = stream.seek(0, 2)
+        stream.seek(max(_READ, size - _READ))
+        return (head + b"\n" + stream.read()).decode("utf-8", errors="replace")

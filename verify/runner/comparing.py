@@ -13,9 +13,8 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.result import COMPARISON_FAILED, CaseResult
 from verify.result_files import read_result
-from verify.runner.child import Child, Ending
+from verify.runner.child import Child, Ending, death
 from verify.runner.directory import JUDGING
-from verify.runner.outcome import death
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene
 

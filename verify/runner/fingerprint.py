@@ -1,16 +1,39 @@
-"""Fingerprints that decide whether a stored solve or verdict is still that of today's code."""
+"""Fingerprints that decide whether a stored solve or verdict is still that of today's code.
 
+What modules depend on is read from their sources, so that nothing lists it: what they import, at
+their top or inside their functions, and what that imports; of a package on the way to a module that
+package's own file, of which names are imported on what it imports too. What is imported by a name
+in a string is not seen: whoever does so names the module. Comments, docstrings and the places of
+words in a file are not code; imports for type checkers alone are none. Data files beside a module,
+and versions of other packages, are part of it.
+"""
+
+import ast
 import hashlib
 import json
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from functools import cache
+from importlib import metadata
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from verify.json_files import read_json
+from verify.provenance import DISTRIBUTIONS, versions
 from verify.scene import MeshFile, Scene, mesh_path
 from verify.solvers.interface import module_of, program_of
-from verify.source_digest import code_digest, modules_in
+from verify.whole_files import write_whole
 
+ROOT = Path(__file__).resolve().parent.parent.parent
+_PACKAGES = ("verify", "reference")
+_PROGRAMS = "verify.foreign.programs."
+_WITH_DOCSTRING = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+_STORE = "sources.json"
+_MOST = 5000  # files that are remembered
 # what solves in a process of its own, and what judges in one
 _SOLVING, _COMPARING = "verify.runner.solve", "verify.runner.judging"
 # what a solver of somebody else may be built on
@@ -85,3 +108,199 @@ def code_of_solver(name: str) -> str:
 def code_of_comparison() -> str:
     """Return the hash of all that a verdict depends on, given the solutions."""
     return code_digest(_COMPARING)
+
+
+class Source(NamedTuple):
+    """What a file says: the hash of its code, and the full names that it imports."""
+
+    digest: str
+    imports: list[str]
+
+
+class Sources:
+    """The sources below a folder, each read once.
+
+    Parameters
+    ----------
+    root : Path
+        Holds the packages.
+    store : Path, optional
+        File that remembers, by their bytes, what files said: parsing them takes seconds.
+    """
+
+    def __init__(self, root: Path = ROOT, store: Path | None = None) -> None:
+        self.root, self.store = root, store
+        self._known: dict[str, list] = {}
+        self._read: dict[str, Source] = {}
+        self._files: dict[str, Path | None] = {}
+        self._new = False
+        if store is not None and store.is_file():
+            try:
+                self._known = dict(read_json(store))
+            except (ValueError, TypeError):  # damaged: read anew
+                self._known = {}
+
+    def digest(self, *modules: str) -> str:
+        """Return the hash of all code, data and versions that modules depend on."""
+        found = self.closure(*modules)
+        outside = {name.partition(".")[0] for m in found for name in self._source(m).imports}
+        content = [
+            {name: self._source(name).digest for name in sorted(found)},
+            {path.relative_to(self.root).as_posix(): _sha(path) for path in self._data(found)},
+            _versions(outside),
+        ]
+        self._remember()
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+
+    def closure(self, *modules: str) -> set[str]:
+        """Return the modules that modules depend on, themselves included.
+
+        Raises
+        ------
+        KeyError
+            If one of `modules` is none.
+        """
+        if missing := [name for name in modules if self.file(name) is None]:
+            raise KeyError(missing[0])
+        found, waiting, passed = set[str](), list(modules), set[str]()
+        while waiting:
+            name = waiting.pop()
+            if name in found:
+                continue
+            found.add(name)
+            passed |= {package for package in _above(name) if self.file(package)}
+            waiting += self._imported(name)
+        return found | passed
+
+    def file(self, name: str) -> Path | None:
+        """Return the file of a module; None if there is none below the root."""
+        if name not in self._files:
+            place = self.root.joinpath(*name.split("."))
+            files = (place / "__init__.py", place.with_name(f"{place.name}.py"))
+            ours = name.partition(".")[0] in _PACKAGES
+            self._files[name] = next((f for f in files if ours and f.is_file()), None)
+        return self._files[name]
+
+    def _imported(self, name: str) -> list[str]:
+        """Modules that one imports: of a name in a module, that module."""
+        whole = self._source(name).imports
+        if name.startswith(_PROGRAMS):  # run by another Python, with their own folders as paths
+            own = name.rpartition(".")[0]
+            whole = [f"{place}.{n}" for n in whole for place in (own, _PROGRAMS.rstrip("."))]
+        either = (n if self.file(n) else n.rpartition(".")[0] for n in whole)
+        return [n for n in either if self.file(n) and n != name]
+
+    def _source(self, name: str) -> Source:
+        if name not in self._read:
+            file = self.file(name)
+            assert file is not None
+            text = file.read_bytes()
+            package = name if file.name == "__init__.py" else name.rpartition(".")[0]
+            key = hashlib.sha256(f"{package} ".encode() + text).hexdigest()
+            if key not in self._known:
+                self._known[key], self._new = list(_parsed(text, package)), True
+            self._read[name] = Source(*self._known[key])
+        return self._read[name]
+
+    def _data(self, modules: Iterable[str]) -> list[Path]:
+        """Files that are no modules, in folders of modules and those below that hold no module."""
+        folders = {file.parent for name in modules if (file := self.file(name)) is not None}
+        found = {path for folder in folders for path in _data_files(folder)}
+        return sorted(found)
+
+    def _remember(self) -> None:
+        if self._new and self.store is not None:
+            self._new = False
+            used = list(self._known.items())[-_MOST:]
+            with suppress(OSError):  # else parsed again by the next process
+                self.store.parent.mkdir(parents=True, exist_ok=True)
+                write_whole(self.store, json.dumps(dict(used)))
+
+
+@cache
+def code_digest(*modules: str) -> str:
+    """Return the hash of all that modules depend on, as it was when this process asked first."""
+    return _own().digest(*modules)
+
+
+def modules_in(package: str) -> list[str]:
+    """Return all modules of a package."""
+    place = ROOT.joinpath(*package.split("."))
+    files = [path.relative_to(ROOT).with_suffix("") for path in place.rglob("*.py")]
+    return [".".join(file.parts).removesuffix(".__init__") for file in sorted(files)]
+
+
+def cache_folder() -> Path:
+    """Return the folder of the cache: ``VERIFY_CACHE``, else below the user's cache folder."""
+    if named := os.environ.get("VERIFY_CACHE"):
+        return Path(named)
+    home = os.environ.get("XDG_CACHE_HOME")
+    return (Path(home) if home else Path.home() / ".cache") / "cutting-verification" / "references"
+
+
+@cache
+def _own() -> Sources:
+    return Sources(store=cache_folder() / _STORE)
+
+
+def _parsed(text: bytes, package: str) -> Source:
+    """Read a source file of a package."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, _WITH_DOCSTRING) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+    imports = sorted(set(_imports(tree, package)))
+    return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:24], imports)
+
+
+def _imports(tree: ast.AST, package: str) -> Iterator[str]:
+    """Full names of what is imported, but for type checkers alone."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and _is_type_checking(node.test):
+            for other in node.orelse:
+                yield from _imports(ast.Module([other], []), package)
+        elif isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            steps = package.split(".")
+            above = ".".join(steps[: len(steps) - node.level + 1]) if node.level else ""
+            base = ".".join(filter(None, [above, node.module]))
+            yield from (f"{base}.{name.name}" for name in node.names)
+        else:
+            yield from _imports(node, package)
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    return "TYPE_CHECKING" in (getattr(test, "id", ""), getattr(test, "attr", ""))
+
+
+def _above(name: str) -> list[str]:
+    """Return the packages that hold a module."""
+    steps = name.split(".")
+    return [".".join(steps[:n]) for n in range(1, len(steps))]
+
+
+def _data_files(folder: Path) -> Iterator[Path]:
+    for path in folder.iterdir():
+        if path.is_dir():
+            if path.name != "__pycache__" and not any(path.rglob("*.py")):
+                yield from _data_files(path)
+        elif path.suffix not in (".py", ".pyc"):
+            yield path
+
+
+def _sha(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:24]
+
+
+def _versions(names: Iterable[str]) -> dict[str, str]:
+    """Return the versions of Python and of what is installed of packages by these names."""
+    known = versions()
+    found = {"python": known["python"]}
+    for name in sorted(set(names) - set(_PACKAGES) - sys.stdlib_module_names):
+        carried = [key for key, own in DISTRIBUTIONS.items() if name == key or name in own]
+        found |= {key: known[key] for key in carried if key in known}
+        if not carried:
+            with suppress(metadata.PackageNotFoundError):
+                found[name] = metadata.version(name)
+    return found

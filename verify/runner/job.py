@@ -1,4 +1,4 @@
-"""One solve as a unit of work: what identifies it, how its record is stored and found again."""
+"""One solve as a unit of work: what identifies it, its outcome, its record."""
 
 import re
 from dataclasses import asdict, dataclass, field
@@ -9,7 +9,9 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.result import SolveRecord, Status
 from verify.result_files import checked
+from verify.runner.directory import LEVELS
 from verify.runner.fingerprint import file_digest
+from verify.solvers.interface import MOST_LEVELS
 
 
 @dataclass(frozen=True)
@@ -122,3 +124,25 @@ def _stored(content: dict[str, Any], folder: Path) -> SolveRecord:
     if "record" not in content:
         raise InputError("not a readable record ('record' is missing)", where)
     return record_of(content["record"], where)
+
+
+def outcome_in(folder: Path) -> dict[str, Any] | None:
+    """Return what a solve left in `folder` as fields of a record, with ``peak_memory``.
+
+    None if it left nothing, or something else.
+    """
+    try:
+        outcome = read_json(folder / "outcome.json")
+        blank = {"case": "", "solver": "", "level": 0}
+        record = checked(SolveRecord, {**blank, **outcome}, "outcome", str(folder))
+    except InputError:
+        return None
+    return {name: getattr(record, name) for name in outcome}
+
+
+def levels_told(job: Job) -> int:
+    """Return how many levels a solver has that was asked for level 0; 0 if it has not said."""
+    try:
+        return min(int((job.folder / LEVELS).read_text()), MOST_LEVELS)
+    except (OSError, ValueError):
+        return 0

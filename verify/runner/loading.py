@@ -8,7 +8,7 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,9 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.processes import die_with_parent
-from verify.runner.child import POLL_SECONDS, Child
+from verify.runner.child import POLL_SECONDS, Child, telling_line
 from verify.runner.fingerprint import digest_of, file_digest
-from verify.runner.interruption import StopRequest
-from verify.runner.options import Options
-from verify.runner.outcome import telling_line
+from verify.runner.selection import Options
 from verify.solvers.interface import is_built_in, module_of
 from verify.solvers.named import parameters_of, solver_in
 
@@ -45,15 +43,17 @@ class Loaded:
     source: str = ""
 
 
-def load_solvers(names: Collection[str], options: Options, stop: StopRequest) -> dict[str, Loaded]:
+def load_solvers(
+    names: Collection[str], options: Options, check: Callable[[], None]
+) -> dict[str, Loaded]:
     """Load solvers in processes of their own and check their parameters.
+
+    `check` is called again and again, and may raise to stop it.
 
     Raises
     ------
     InputError
         If `options` name a solver that does not work here, or a parameter that it does not have.
-    RunStoppedError
-        If a signal came.
     """
     given = {name: parameters_of(name, options.parameters) for name in names}
     waiting = [
@@ -64,7 +64,7 @@ def load_solvers(names: Collection[str], options: Options, stop: StopRequest) ->
     with tempfile.TemporaryDirectory(prefix="verify-") as folder:
         try:
             while waiting or running:
-                stop.check()
+                check()
                 while waiting and len(running) < options.jobs:
                     name = waiting.pop(0)
                     place = Path(folder, str(len(waiting)))

@@ -1,19 +1,23 @@
-"""From cases to solves: which solvers, which levels, in which order."""
+"""From cases to solves: which solvers, which levels, in which order.
 
-from collections.abc import Callable, Mapping, Sequence
+The reference gets levels beside those that its scene names, as long as they are needed, and solves
+other models of a case that asks how adequate its own is.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from verify.errors import InputError
-from verify.result import SolveRecord, Status
+from verify.errors import InputError, UnsupportedSceneError
+from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.cost import case_cost
 from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.job import Job, stored_record
 from verify.runner.loading import Loaded
-from verify.runner.options import Options
-from verify.runner.reference_bundle import ReferenceBundle
-from verify.runner.reference_cache import REFERENCE
+from verify.runner.references import REFERENCE, ReferenceBundle
+from verify.runner.selection import Options
 from verify.scene import Scene
 from verify.scene.messages import nearest
 from verify.solvers.named import parameters_of
@@ -167,9 +171,6 @@ def plan_case(
     if bundle is None and not scene.judged_by_exact:
         plan.most_levels = scene.reference.max_levels or 0
     if options.judged and bundle is None and scene.adequacy.models:
-        # what only reads cases shall not wait for the comparison that this imports
-        from verify.runner.models import model_jobs
-
         folder = directory.case_folder(scene.name)
         plan.models, plan.other_scenes = model_jobs(scene, folder)
     others = [job for job in plan.jobs if job.solver != REFERENCE]
@@ -204,3 +205,105 @@ def begun_after(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], 
         return (begun and job.solver != REFERENCE, case, first, *own)
 
     return key
+
+
+def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]:
+    """Lay out the reference's solves of the other models of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    folder : Path
+        Of the case.
+
+    Returns
+    -------
+    jobs : list of Job
+        Each with its ``model``.
+    scenes : dict of str to Scene
+        By model.
+    """
+    # what only reads cases shall not wait for the comparison that this imports
+    from verify.judge.adequacy import other_scene
+
+    jobs, scenes = [], {}
+    for model in scene.adequacy.models:
+        try:
+            other = other_scene(scene, model)
+        except UnsupportedSceneError:  # the comparison says so
+            continue
+        scenes[model] = other
+        physics = physics_digest(other)
+        jobs += [
+            Job(
+                case=scene.name,
+                solver=REFERENCE,
+                level=level,
+                repetitions=1,
+                key=digest_of([physics, REFERENCE, level, 1, {}, code_of_solver(REFERENCE)]),
+                folder=folder / f"{REFERENCE}_{model}-{level}",
+                model=model,
+            )
+            for level in range(other.reference.levels)
+        ]
+    return jobs, scenes
+
+
+_FEWEST = 3  # levels from which a reference has an error bar
+
+
+def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
+    """Take the next level of the reference out of the plan's spare ones, if it is needed.
+
+    It is if the case was judged by levels of the reference, each of them solved, whose
+    uncertainty is above a tenth of an error that it judges.
+
+    Parameters
+    ----------
+    plan : CasePlan
+        Changed: the level that is returned is one of its jobs from then on.
+    result : CaseResult
+        The judgement by the levels so far.
+    """
+    if not plan.spare or result.reference.suffices is not False:
+        return None
+    own = [solve for solve in result.solves if solve.solver == REFERENCE]
+    if any(solve.status is not Status.SOLVED for solve in own):
+        return None
+    plan.jobs.append(plan.spare.pop(0))
+    return plan.jobs[-1]
+
+
+def levels_in_vain(
+    plan: CasePlan, failed: Job, record: SolveRecord, waiting: Collection[Job]
+) -> list[tuple[Job, SolveRecord]]:
+    """List the levels of a reference that need not be solved, each with a record that says so.
+
+    Those that wait when one has failed, and too few are left for the reference to have an error
+    bar: nothing is judged by it then.
+
+    Parameters
+    ----------
+    plan : CasePlan
+        Whose own reference it is; those of other models and of exact cases are not looked at.
+    failed : Job
+    record : SolveRecord
+        Of `failed`.
+    waiting : collection of Job
+        Of all cases.
+    """
+    if (
+        failed.solver != REFERENCE
+        or record.status is Status.SOLVED
+        or plan.scene.judged_by_exact
+        or failed not in plan.jobs
+    ):
+        return []
+    levels = [job for job in plan.jobs if job.solver == REFERENCE]
+    if len(levels) > _FEWEST:
+        return []
+    reason = (
+        f"not tried: level {failed.level} has no answer ({record.status}), and a reference "
+        f"needs {_FEWEST} levels"
+    )
+    return [(job, job.blank(Status.FAILED, reason)) for job in levels if job in waiting]

@@ -1,28 +1,76 @@
-"""The run: solves in parallel processes, then the comparison of each finished case."""
+"""The run: solves in parallel processes, then the comparison of each finished case.
 
-from collections.abc import Sequence
+It notices Ctrl-C and friends between two steps, so that nothing is left half written, and ends with
+an exit code: a failed verdict (1) goes before a failed solve (3), as a FAIL is only given when the
+whole interval of what is known violates the limit, so that it stands whatever the missing solves
+would have said, and a script that repeats a run on code 3 must not take a wrong answer for a bad
+day of the machine. A FAIL that its case lists as a known finding does not count.
+"""
+
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from verify.errors import InputError
 from verify.processes import start_server
 from verify.provenance import provenance
-from verify.result import CaseResult
+from verify.result import COMPARISON_FAILED, CaseResult, Status, Verdict
 from verify.runner.checking import check_scene
-from verify.runner.cluster import ClusterEngine
 from verify.runner.directory import claimed, folder_name, write_run
+from verify.runner.engines import ClusterEngine
 from verify.runner.fingerprint import code_of_solver
-from verify.runner.interruption import listening
 from verify.runner.loading import load_solvers
-from verify.runner.options import Options
 from verify.runner.plan import check_judged, plan_case, solvers_of
 from verify.runner.ranks import mpiexec
-from verify.runner.reference_bundle import ReferenceBundle
-from verify.runner.reference_cache import REFERENCE
+from verify.runner.references import REFERENCE, ReferenceBundle
+from verify.runner.selection import Options
 from verify.runner.work import Progress, Work
 from verify.scene import Scene
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class RunStoppedError(Exception):
+    """The run was asked to stop by a signal."""
+
+    def __init__(self, signum: int) -> None:
+        self.signum = signum
+        super().__init__(f"interrupted by {signal.Signals(signum).name}")
+
+
+class StopRequest:
+    """Remembers the first signal that asked the run to stop."""
+
+    signum: int | None = None
+
+    def check(self) -> None:
+        """Raise `RunStoppedError` if a signal came."""
+        if self.signum is not None:
+            raise RunStoppedError(self.signum)
+
+
+@contextmanager
+def listening() -> Iterator[StopRequest]:
+    """Turn SIGINT, SIGTERM and SIGHUP into a `StopRequest` for the time of the block."""
+    request = StopRequest()
+
+    def note(signum: int, _frame: FrameType | None) -> None:
+        request.signum = request.signum or signum
+
+    before = {s: signal.getsignal(s) for s in _SIGNALS}
+    for s in _SIGNALS:
+        if before[s] != signal.SIG_IGN:  # nohup stays nohup
+            signal.signal(s, note)
+    try:
+        yield request
+    finally:
+        for s, handler in before.items():
+            signal.signal(s, handler)
 
 
 @dataclass(frozen=True)
@@ -94,7 +142,7 @@ def run_cases(
                 if REFERENCE in solvers_of(scene, options):
                     bundle.levels(scene)  # or say now that there are none
         needed = [name for name in names if bundle is None or name != REFERENCE]
-        loaded = load_solvers(needed, options, stop)
+        loaded = load_solvers(needed, options, stop.check)
         with claimed(out, identity) as directory:
             record: dict[str, Any] = {
                 **identity,
@@ -108,10 +156,48 @@ def run_cases(
             write_run(directory, record)
             plans = [plan_case(scene, options, loaded, directory, bundle) for scene in scenes]
             work = Work(plans, directory, options, origin, progress, bundle, cluster, drawings)
-            results = work.until_done(stop)
+            results = work.until_done(stop.check)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
 
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+ALL_PASS = 0
+VERDICT_FAILED = 1
+BAD_INPUT = 2
+SOLVER_FAILED = 3
+NOTHING_RAN = 4
+ONLY_WARNINGS = 5
+
+_BROKEN = (Status.FAILED, Status.TIMEOUT, Status.MEMORY)
+
+
+def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
+    """Return the exit code of a run that ended with `results`.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+    strict : bool
+        Whether an undecided verdict, a refusal, a warning, or a case without any verdict counts.
+    """
+    judged = [record for result in results for record in result.verdicts]
+    verdicts = [record.verdict for record in judged]
+    statuses = [solve.status for result in results for solve in result.solves]
+    if any(record.counts_as_failed for record in judged):
+        return VERDICT_FAILED
+    uncompared = [solve.not_compared for result in results for solve in result.solves]
+    if (
+        Verdict.ERROR in verdicts
+        or any(status in _BROKEN for status in statuses)
+        or any(why.startswith(COMPARISON_FAILED) for why in uncompared)
+    ):
+        return SOLVER_FAILED
+    if Status.SOLVED not in statuses:
+        return NOTHING_RAN
+    doubtful = Verdict.UNDECIDED in verdicts or Status.REFUSED in statuses
+    doubtful |= any(not result.verdicts or result.warnings for result in results)
+    return ONLY_WARNINGS if strict and doubtful else ALL_PASS

@@ -1,8 +1,12 @@
-"""Selection of cases: by name, by file, by pattern, by ``-k`` expression, by weight."""
+"""What a run is asked for: its options, and its cases by name, file, pattern, ``-k`` or weight."""
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
 from fnmatch import fnmatchcase
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 from verify.errors import InputError
 from verify.scene import RatioCheck, Scene, list_cases, load_scenes
@@ -78,26 +82,22 @@ def parse_expression(text: str) -> Predicate:
         If the text is not such an expression.
     """
     tokens = _TOKEN.findall(text)
-    predicate, rest = _either(tokens, text)
+    predicate, rest = _joined(tokens, text)
     if rest:
         raise _bad(text, f"unexpected '{rest[0]}'")
     return predicate
 
 
-def _either(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
-    first, rest = _both(tokens, text)
-    while rest and rest[0].lower() == "or":
-        second, rest = _both(rest[1:], text)
-        first = _any(first, second)
-    return first, rest
-
-
-def _both(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
-    first, rest = _term(tokens, text)
-    while rest and rest[0].lower() == "and":
-        second, rest = _term(rest[1:], text)
-        first = _all(first, second)
-    return first, rest
+def _joined(tokens: list[str], text: str, word: str = "or") -> tuple[Predicate, list[str]]:
+    """Read terms that are joined by ``or``, or by ``and``, which binds closer."""
+    inner = partial(_joined, word="and") if word == "or" else _term
+    first, rest = inner(tokens, text)
+    parts = [first]
+    while rest and rest[0].lower() == word:
+        part, rest = inner(rest[1:], text)
+        parts.append(part)
+    holds = any if word == "or" else all
+    return (lambda scene: holds(part(scene) for part in parts)), rest
 
 
 def _term(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
@@ -108,21 +108,13 @@ def _term(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
         inner, rest = _term(rest, text)
         return (lambda scene: not inner(scene)), rest
     if word == "(":
-        inner, rest = _either(rest, text)
+        inner, rest = _joined(rest, text)
         if not rest or rest[0] != ")":
             raise _bad(text, "a ')' is missing")
         return inner, rest[1:]
     if word == ")" or word.lower() in ("and", "or"):
         raise _bad(text, f"a word is missing before '{word}'")
     return (lambda scene: _mentions(scene, word)), rest
-
-
-def _any(first: Predicate, second: Predicate) -> Predicate:
-    return lambda scene: first(scene) or second(scene)
-
-
-def _all(first: Predicate, second: Predicate) -> Predicate:
-    return lambda scene: first(scene) and second(scene)
 
 
 def _mentions(scene: Scene, word: str) -> bool:
@@ -154,3 +146,69 @@ def _of_weight(scene: Scene, weight: str) -> bool:
     if weight == "quick":
         return "quick" in scene.tags
     return weight == "heavy" or "heavy" not in scene.tags
+
+
+_PATHS = ("cache", "references")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a run.
+
+    Parameters
+    ----------
+    solvers : tuple of str
+        The solvers compared; empty: those that the case's acceptance names, with ``xfem`` and
+        ``conforming``. The conforming reference of a case without exact solution runs in any
+        case.
+    repetitions : int
+        Timed repetitions of each solve, after the first call, which compiles.
+    parameters : dict of str to dict
+        Parameters by solver.
+    jobs : int
+        Processes at the same time.
+    timeout : float
+        Wall seconds after which a solve is killed.
+    memory : float or None
+        Bytes of resident memory above which a solve is killed; default: 80 % of the machine's,
+        shared by `jobs`.
+    cache : Path or None
+        Folder of references that were solved before; None: every run solves its own.
+    references : Path or None
+        A bundle of references, which judges instead of solving any.
+    cluster : str or None
+        Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
+    ranks : int
+        MPI ranks of each reference.
+    judge_only : tuple of str
+        Solvers that are judged; empty: all that are asked and do not refuse the case.
+    judged : bool
+        Whether the references that judge are solved with the rest; without them only `solvers` run.
+    """
+
+    solvers: tuple[str, ...] = ()
+    repetitions: int = 3
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    jobs: int = 1
+    timeout: float = 600.0
+    memory: float | None = None
+    cache: Path | None = None
+    references: Path | None = None
+    cluster: str | None = None
+    ranks: int = 1
+    judge_only: tuple[str, ...] = ()
+    judged: bool = True
+
+    def of_result(self) -> dict[str, Any]:
+        """Return those that change what is computed; a resumed run must have the same."""
+        return {
+            "solvers": list(self.solvers),
+            "repetitions": self.repetitions,
+            "parameters": self.parameters,
+        }
+
+    def record(self) -> dict[str, Any]:
+        """Return all of them as plain values."""
+        paths = {name: str(v) if (v := getattr(self, name)) else None for name in _PATHS}
+        names = {"solvers": list(self.solvers), "judge_only": list(self.judge_only)}
+        return {**asdict(self), **paths, **names}

@@ -2,7 +2,7 @@
 
 import os
 from bisect import insort
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import sleep
@@ -13,22 +13,24 @@ from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.result import LOG, CaseResult, SolveRecord, Status
 from verify.result_files import write_result
-from verify.runner.child import POLL_SECONDS, Ending
-from verify.runner.cluster import ClusterEngine
+from verify.runner.child import POLL_SECONDS, Ending, death
 from verify.runner.comparing import Comparison, comparison_label, stored_result
-from verify.runner.deepening import further_level, levels_in_vain
 from verify.runner.directory import LEVELS, RunDirectory, emptied
 from verify.runner.drawing import Drawings
-from verify.runner.engine import Engine, LocalEngine, Running
+from verify.runner.engines import ClusterEngine, Engine, LocalEngine, Running
 from verify.runner.families import Families
 from verify.runner.fingerprint import code_of_comparison, digest_of
-from verify.runner.interruption import StopRequest
-from verify.runner.job import Job, load_record, store_record, stored_record
-from verify.runner.options import Options
-from verify.runner.outcome import death, levels_told, outcome_in
-from verify.runner.plan import CasePlan, begun_after
-from verify.runner.reference_bundle import ReferenceBundle
-from verify.runner.reference_cache import REFERENCE, ReferenceCache
+from verify.runner.job import (
+    Job,
+    levels_told,
+    load_record,
+    outcome_in,
+    store_record,
+    stored_record,
+)
+from verify.runner.plan import CasePlan, begun_after, further_level, levels_in_vain
+from verify.runner.references import REFERENCE, ReferenceBundle, ReferenceCache
+from verify.runner.selection import Options
 from verify.scene import scene_content
 from verify.whole_files import write_whole
 
@@ -67,7 +69,8 @@ class Work:
         cluster: ClusterEngine | None,
         drawings: Path | None,
     ) -> None:
-        self.bundle, self.cache = bundle, ReferenceCache(options.cache) if options.cache else None
+        cache = ReferenceCache(options.cache) if options.cache else None
+        self.references: ReferenceBundle | ReferenceCache | None = bundle or cache
         self.directory, self.options, self.origin = directory, options, origin
         self.progress, self.reused = progress, 0
         self.plans = {plan.scene.name: plan for plan in plans}
@@ -88,14 +91,14 @@ class Work:
         self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
         self.engine: Engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
 
-    def until_done(self, stop: StopRequest) -> list[CaseResult]:
-        """Run everything; kill what runs if that is interrupted or fails."""
+    def until_done(self, check: Callable[[], None]) -> list[CaseResult]:
+        """Run everything; kill what runs if that fails, or if `check`, called in turn, raises."""
         self._say_plan()
         try:
             for plan in self.plans.values():
                 self._prepare(plan)
             while self._unfinished():
-                stop.check()
+                check()
                 while self._has_room():
                     self._start()
                 for solve, job in list(self.running.items()):
@@ -108,7 +111,7 @@ class Work:
                         self._case_done(result)
                 self.drawings.poll()
                 sleep(POLL_SECONDS)
-            stop.check()  # asked while the last of it ended
+            check()  # asked while the last of it ended
         finally:
             for solve in self.running:
                 solve.kill()
@@ -192,22 +195,17 @@ class Work:
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""
         scene = self.plans[job.case].scene_of(job)
-        if job.solver != REFERENCE:
+        if job.solver != REFERENCE or self.references is None:
             return None
-        record = None
-        if self.bundle is not None:
-            record = self.bundle.take(scene, job)
-        elif self.cache is not None:
-            record = self.cache.take(scene, job)
+        record = self.references.take(scene, job)
         if record is not None and not job.level:
-            levels = self.bundle.levels(scene) if self.bundle else scene.reference.levels
-            write_whole(job.folder / LEVELS, str(levels))
+            write_whole(job.folder / LEVELS, str(self.references.levels(scene)))
         return record
 
     def _ended(self, job: Job, solve: Running, ending: Ending) -> None:
         record = self._record(job, solve, ending)
-        if job.solver == REFERENCE and self.cache is not None:
-            trouble = self.cache.keep(self.plans[job.case].scene_of(job), job, record)
+        if job.solver == REFERENCE and isinstance(self.references, ReferenceCache):
+            trouble = self.references.keep(self.plans[job.case].scene_of(job), job, record)
             if trouble:
                 record.notes["cache"] = trouble
         record = self._kept(job, record)

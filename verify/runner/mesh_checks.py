@@ -1,6 +1,8 @@
-"""Cuts that no mesh follows, and cuts and places that are not in a body from a mesh file."""
+"""Faults that a mesh of the body shows before a run: of formulas, cuts, places and loose pieces."""
 
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,20 +10,126 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.geometry.planar import overlap_length
 from verify.geometry.spatial import measures, rim_edges
+from verify.runner import exact_samples as samples
+from verify.runner.cost import mesh_of_level
 from verify.runner.exact_samples import holds
-from verify.scene import PolylineCut, Scene
+from verify.runner.mesh_faults import mesh_warning
+from verify.scene import (
+    BodyForce,
+    CutFaces,
+    Equilibrium,
+    InitialField,
+    PolylineCut,
+    Scene,
+    Traction,
+)
+from verify.scene.parts import on_part
+from verify.scene.physics import field_values
 from verify.scene.placement import misplaced_point
+from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.supports_of_scene import supports_of
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
+from verify.xfem.slivers import join_fragments
+from verify.xfem.supports import UnsupportedBodyError, check_bodies
 
 Array = NDArray[np.float64]
+_Values = Callable[[Array, float], Any]
 
+_NODES = 3000  # of the mesh on which loose pieces are looked for: cut in 0.1 s
 _SHORTEST = 1e-4  # of the body: the reference puts one facet on what is shorter, and cannot open it
 _ALONG = 40  # samples of a line inside the bounding box of the body
 _NEAR = 1e-6  # of the body: on its boundary, not inside
 _METRES = 100.0  # times the body: a cut as large is not in metres, or the body is not
+
+
+def check_formulas_are_finite(scene: Scene, mesh: SimplexMesh) -> None:
+    """Raise `InputError` where a formula has no finite value at a node, or inside a facet or cell.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : SimplexMesh
+        Any mesh of the body.
+    """
+    times = scene.analysis.output_times
+    for key, values, points in _used(scene, mesh):
+        for time in sorted({times[0], times[len(times) // 2], times[-1]}):
+            try:
+                values(points, time)
+            except InputError as error:
+                at = f" at {time:.6g} s" if scene.analysis.duration is not None else ""
+                where = str(scene.file or scene.name)
+                raise InputError(f"{key}: {error.what}{at}", where) from None
+
+
+def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array]]:
+    """Key, values, and the points (n, d) at which they are needed, of every formula."""
+    rng = np.random.default_rng(5)
+    nodes, facets = samples.boundary_nodes(mesh)[0], samples.on_boundary(mesh, rng).points
+    inside = samples.in_body(mesh, rng)[:, 0]
+    for i, support in enumerate(scene.supports):
+        if support.displacement != "exact":
+            on = on_part(scene.geometry, support.where, nodes, mesh.extent)
+            given = cast(list[Any], support.displacement)
+            yield f"supports[{i}].displacement", partial(field_values, given), nodes[on]
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Traction) and not load.exact:
+            on = on_part(scene.geometry, load.where, facets, mesh.extent)
+            yield f"loads[{i}].traction", load.values, facets[on]
+        elif isinstance(load, BodyForce) and not load.exact:
+            yield f"loads[{i}].force", load.values, inside
+        elif isinstance(load, CutFaces):
+            cut = next(cut for cut in scene.final_cuts if cut.name == load.cut)
+            on_cut = samples.on_cut(cut, np.zeros(0), rng).points
+            if scene.cell_dimension == scene.dimension:
+                yield f"loads[{i}]", load.values, on_cut[samples.holds(mesh, on_cut)]
+    if isinstance(scene.initial, InitialField):
+        for key in ("displacement", "velocity"):
+            given = getattr(scene.initial, key)
+            if given not in (None, "exact"):
+                yield f"initial.{key}", partial(field_values, given), inside
+
+
+def check_pieces_are_held(scene: Scene, exact: object) -> None:
+    """Raise `InputError` if a piece of a body that is to be in equilibrium can move rigidly.
+
+    The body is cut as `verify.xfem` cuts it, on the finest of the scene's meshes that is cheap.
+    """
+    static = scene.analysis.kind == "static"
+    if not static and not isinstance(scene.initial, Equilibrium):
+        return
+    mesh, size = background_mesh(scene, _level(scene))
+    opened = static or (isinstance(scene.initial, Equilibrium) and scene.initial.cuts == "open")
+    cuts = [
+        cut
+        for cut, asked in zip(cuts_of(scene, size), scene.cuts, strict=True)
+        if static or (opened and asked.kind != "tool_path" and asked.opens_at == 0.0)
+    ]
+    try:
+        phantom = cut_mesh(mesh, cuts)
+        phantom, _ = join_fragments(phantom, supports_of(scene, phantom, exact))
+        check_bodies(phantom, supports_of(scene, phantom, exact))
+    except UnsupportedBodyError as error:
+        apart = mesh_warning(scene)
+        text = f"supports: {error}{f' ({apart})' if apart else ''}"
+        raise InputError(text, str(scene.file or scene.name)) from None
+    except XfemError:
+        return  # no fault of the scene: another method may cut this mesh
+
+
+def _level(scene: Scene) -> int:
+    """Finest level of a structured mesh with few nodes; else the first."""
+    if scene.mesh.pattern != "structured":
+        return 0
+    cheap = [0]
+    for level in range(1, scene.mesh.count):
+        found = mesh_of_level(scene, level)
+        if found is not None and found[0] <= _NODES:
+            cheap.append(level)
+    return cheap[-1]
 
 
 def check_cuts_can_be_meshed(scene: Scene) -> None:

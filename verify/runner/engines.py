@@ -1,9 +1,10 @@
-"""Solves on the workers of a Dask cluster: ``verify run --cluster ADDRESS``.
+"""Engines that run solves: processes here, or workers of a Dask cluster (``--cluster ADDRESS``).
 
-The scheduler hands solves out, restarts those whose worker died, and waits for workers that are
-to come. Each worker must have the same code and versions. No file system is shared: a worker solves
-in a folder of its own, in a child with the limits of the run, which dies if the run no longer wants
-its answer, and the files come back as bytes. The comparison stays on the machine of the run.
+The scheduler of a cluster hands solves out, restarts those whose worker died, and waits for workers
+that are to come. Each worker must have the same code and versions. No file system is shared: a
+worker solves in a folder of its own, in a child with the limits of the run, which dies if the run
+no longer wants its answer, and the files come back as bytes. The comparison stays on the machine of
+the run.
 """
 
 import logging
@@ -11,18 +12,82 @@ import re
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child, Ending
-from verify.runner.engine import solving
 from verify.runner.fingerprint import code_of_solver
 from verify.scene import MeshFile, mesh_path, restore_scene
+from verify.solvers.interface import is_built_in
 from verify.whole_files import write_whole
 
 _CONNECT_SECONDS, _LOOK_SECONDS = 15.0, 1.0
+
+
+class Running(Protocol):
+    """A solve that was started; it writes its files into the folder of its job."""
+
+    log: Path
+
+    def poll(self) -> Ending | None:
+        """Look once; tell how it ended if it has."""
+        ...
+
+    def kill(self) -> None:
+        """End it; nothing of it may go on."""
+        ...
+
+
+class Engine(Protocol):
+    """Starts solves."""
+
+    @property
+    def width(self) -> int:
+        """How many solves run side by side at most."""
+        ...
+
+    def start(self, job: dict[str, Any], folder: Path) -> Running:
+        """Start the solve that ``job.json`` in `folder` describes, whose content is `job`."""
+        ...
+
+    def close(self) -> None:
+        """Leave the engine; what runs has ended or was killed."""
+        ...
+
+
+class LocalEngine:
+    """Child processes of this one.
+
+    Parameters
+    ----------
+    width : int
+        Processes at the same time.
+    timeout : float
+        Wall seconds of each.
+    memory : float
+        Bytes of resident memory of each.
+    """
+
+    def __init__(self, width: int, timeout: float, memory: float) -> None:
+        self.width, self._timeout, self._memory = width, timeout, memory
+
+    def start(self, job: dict[str, Any], folder: Path) -> Child:
+        """Start a process."""
+        return solving(job, folder, self._timeout, self._memory)
+
+    def close(self) -> None:
+        """There is nothing to leave."""
+
+
+def solving(
+    job: dict[str, Any], folder: Path, timeout: float, memory: float, forked: bool = True
+) -> Child:
+    """Start the process that solves what ``job.json`` in `folder` says; `forked` if it may be."""
+    own = forked and is_built_in(job["solver"])
+    files, ranks = (folder / "job.json", folder / "log.txt"), job.get("ranks", 1)
+    return Child("verify.runner.solve", *files, timeout, memory, ranks, own=own)
 
 
 class ClusterEngine:
