@@ -10,10 +10,10 @@ from time import process_time
 import numpy as np
 import pytest
 
-from verify.simulator.collision.surface_collider import SurfaceCollider
+from verify.simulator.collision import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
+from verify.simulator.mapping.moving_surface import BodySurface
 from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh
 

@@ -8,7 +8,7 @@ import pytest
 
 from verify.calibration import kernel_seconds
 from verify.simulator import Session, quality_of
-from verify.simulator.step_record import PHASES, Spread
+from verify.simulator.session import PHASES, Spread
 from verify.xfem.cuts import ToolPath
 
 ROUND_OFF = 1e-12

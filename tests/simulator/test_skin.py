@@ -5,11 +5,8 @@ import numpy as np
 import pytest
 
 from verify.scene import Skin
-from verify.simulator.anatomy.plane_mesh import plane_mesh
-from verify.simulator.anatomy.procedural import procedural_face
-from verify.simulator.anatomy.skin_mesh import skin_mesh, skin_surface
-from verify.simulator.anatomy.surface_file import border_loops
-from verify.simulator.anatomy.thicken import closed_shell, thicken
+from verify.simulator.skin_mesh import border_loops, closed_shell, skin_mesh, skin_surface, thicken
+from verify.simulator.skin_shapes import plane_mesh, procedural_face
 from verify.xfem.mesh import SimplexMesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

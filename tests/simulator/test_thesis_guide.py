@@ -10,7 +10,7 @@ import pytest
 
 from verify.cli import main
 from verify.scene import Skin
-from verify.simulator.anatomy.skin_mesh import skin_mesh
+from verify.simulator.skin_mesh import skin_mesh
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "simulator.md"
 

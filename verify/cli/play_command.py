@@ -59,7 +59,7 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         write_film,
         write_picture,
     )
-    from verify.simulator.step_record import Spread
+    from verify.simulator.session import Spread
 
     session = Session(stage)
     every = max(1, round(stage.steps / (arguments.frames - 1)))

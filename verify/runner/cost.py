@@ -18,6 +18,23 @@ from verify.scene.placement import points_of_body
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import solver_in
 
+REFERENCE = "reference"
+_FENICSX = ("conforming", REFERENCE)
+_BESIDE = {True: 0.8, False: 0.25}  # s of a process that is no solve, with FEniCSx and without
+_MEMORY = {True: 2.3e8, False: 1.6e8}  # bytes of a process before it solves
+_SECONDS = {True: 1.5e-5, False: 5e-6}  # per unknown of a static, linear solve in the plane
+_BYTES = 2.5e3  # per unknown in the plane
+_IN_SPACE = 2.5  # times as much per unknown: fill-in of the factors
+_ITERATIONS = {"linear": 1.0, "corotational": 8.0}
+_STEP = 0.2  # of a static solve
+_LEAST = {True: 1e-3, False: 3e-4}  # s of a step, however few the unknowns
+_FINENESS = {2: 12, 3: 4}  # elements over a body's extent on the first level of its reference
+_GRADED = {2: 3.0, 3: 1.5}  # times as many elements, where a reference is graded
+# of 81 levels of references of published runs, 72 had between these times as many unknowns; more
+# where cuts are near each other
+_RANGE = (0.6, 5.0)
+_PER_AREA, _PER_VOLUME = 2 / sqrt(3), sqrt(2)  # nodes per h^d of equilateral triangles, tetrahedra
+
 
 def volume_of(scene: Scene) -> float:
     """Area or volume of a rectangle, a box or a polygon."""
@@ -61,24 +78,6 @@ def body_text(scene: Scene) -> str:
         weights = volumes * scene.material.at(places).density * (scene.material.thickness or 1.0)
         mass = f", {weights.sum():.3g} kg{' per m of thickness' if d == 2 else ''}"
     return f"{extent} m{mesh}, {volumes.sum():.3g} m{power}{mass}"
-
-
-REFERENCE = "reference"
-_FENICSX = ("conforming", REFERENCE)
-_BESIDE = {True: 0.8, False: 0.25}  # s of a process that is no solve, with FEniCSx and without
-_MEMORY = {True: 2.3e8, False: 1.6e8}  # bytes of a process before it solves
-_SECONDS = {True: 1.5e-5, False: 5e-6}  # per unknown of a static, linear solve in the plane
-_BYTES = 2.5e3  # per unknown in the plane
-_IN_SPACE = 2.5  # times as much per unknown: fill-in of the factors
-_ITERATIONS = {"linear": 1.0, "corotational": 8.0}
-_STEP = 0.2  # of a static solve
-_LEAST = {True: 1e-3, False: 3e-4}  # s of a step, however few the unknowns
-_FINENESS = {2: 12, 3: 4}  # elements over a body's extent on the first level of its reference
-_GRADED = {2: 3.0, 3: 1.5}  # times as many elements, where a reference is graded
-# of 81 levels of references of published runs, 72 had between these times as many unknowns; more
-# where cuts are near each other
-_RANGE = (0.6, 5.0)
-_PER_AREA, _PER_VOLUME = 2 / sqrt(3), sqrt(2)  # nodes per h^d of equilateral triangles, tetrahedra
 
 
 @dataclass(frozen=True)

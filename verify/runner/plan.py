@@ -22,6 +22,8 @@ from verify.scene import Scene
 from verify.scene.messages import nearest
 from verify.solvers.named import parameters_of
 
+_FEWEST = 3  # levels from which a reference has an error bar
+
 
 @dataclass
 class CasePlan:
@@ -247,9 +249,6 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
             for level in range(other.reference.levels)
         ]
     return jobs, scenes
-
-
-_FEWEST = 3  # levels from which a reference has an error bar
 
 
 def further_level(plan: CasePlan, result: CaseResult) -> Job | None:

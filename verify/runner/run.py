@@ -33,6 +33,13 @@ from verify.runner.work import Progress, Work
 from verify.scene import Scene
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ALL_PASS = 0
+VERDICT_FAILED = 1
+BAD_INPUT = 2
+SOLVER_FAILED = 3
+NOTHING_RAN = 4
+ONLY_WARNINGS = 5
+_BROKEN = (Status.FAILED, Status.TIMEOUT, Status.MEMORY)
 
 
 class RunStoppedError(Exception):
@@ -163,16 +170,6 @@ def run_cases(
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-ALL_PASS = 0
-VERDICT_FAILED = 1
-BAD_INPUT = 2
-SOLVER_FAILED = 3
-NOTHING_RAN = 4
-ONLY_WARNINGS = 5
-
-_BROKEN = (Status.FAILED, Status.TIMEOUT, Status.MEMORY)
 
 
 def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:

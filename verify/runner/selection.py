@@ -14,6 +14,7 @@ from verify.scene.family import row_asked
 
 Predicate = Callable[[Scene], bool]
 _TOKEN = re.compile(r"\(|\)|[^\s()]+")
+_PATHS = ("cache", "references")
 
 
 def select_cases(
@@ -146,9 +147,6 @@ def _of_weight(scene: Scene, weight: str) -> bool:
     if weight == "quick":
         return "quick" in scene.tags
     return weight == "heavy" or "heavy" not in scene.tags
-
-
-_PATHS = ("cache", "references")
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,9 @@
 """Cutting scenes played as a simulator would: tool, incision, pulls, surfaces, step by step."""
 
 from verify.simulator.quality import Quality, quality_of
-from verify.simulator.session import Session
+from verify.simulator.session import PHASES, Session, StepRecord
 from verify.simulator.stage import Hold, Hook, Stage
 from verify.simulator.stage_of_scene import stage_of
-from verify.simulator.step_record import PHASES, StepRecord
 
 __all__ = [
     "PHASES", "Hold", "Hook", "Quality", "Session", "Stage", "StepRecord", "quality_of", "stage_of",

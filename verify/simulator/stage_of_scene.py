@@ -6,9 +6,9 @@ import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Gravity, Pull, Scene, Skin, ToolPathCut, is_uniform
-from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.simulator.cutting.growing_body import GrowingBody
-from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.simulator.stage import Hold, Hook, Stage
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary

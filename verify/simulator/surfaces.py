@@ -7,9 +7,8 @@ import numpy as np
 
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
-from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.simulator.mapping.moving_surface import BodySurface, MovingSurface
 from verify.simulator.stage import Stage
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.phantom import PhantomMesh

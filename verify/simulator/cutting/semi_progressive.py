@@ -12,12 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.simulator.cutting.bounding_tree import BoundingTree
-from verify.simulator.cutting.division import Division
-from verify.simulator.cutting.growing_body import GrowingBody, Increment
-from verify.simulator.cutting.patch import MeshPatch
+from verify.simulator.cutting.division import Division, MeshPatch
+from verify.simulator.cutting.growing_body import GrowingBody, Increment, whole_mesh
 from verify.simulator.cutting.stroke import Stroke
-from verify.simulator.cutting.whole_mesh import whole_mesh
+from verify.simulator.places import BoundingTree
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from verify.simulator.arrays import distinct
-from verify.simulator.cutting.bounding_tree import BoundingTree
-from verify.simulator.cutting.patch import MeshPatch
+from verify.simulator.cutting.division import MeshPatch
+from verify.simulator.places import BoundingTree
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.cuts import Cut

@@ -7,7 +7,7 @@ import numpy as np
 
 from verify.calibration import kernel_seconds
 from verify.simulator import PHASES, Session, Stage, quality_of
-from verify.simulator.step_record import LIMITS
+from verify.simulator.session import LIMITS
 from verify.simulator.thesis.strokes import hand, stroke_along
 from verify.xfem.arrays import Floats
 

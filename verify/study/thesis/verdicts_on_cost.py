@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from verify.result import Verdict
-from verify.simulator.step_record import LIMITS
+from verify.simulator.session import LIMITS
 from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import SPEEDS, Delay, Frames
 from verify.simulator.thesis.real_time import RealTime

@@ -1,1 +1,0 @@
-"""Bounding-volume trees of surfaces, and queries of tools against them."""
