@@ -1,13 +1,17 @@
 """Meshes: conforming to the cut with its nodes doubled, or unfitted background meshes."""
 
-from reference.meshing.background import background_mesh
 from reference.meshing.conforming import conforming_mesh
+from reference.meshing.edge_splitting import refine_uniformly
 from reference.meshing.grading import Grading, clear_radii, singular_points
-from reference.meshing.imprint import imprint, structured_triangles
+from reference.meshing.imprint import (
+    imprint,
+    imprint_polygons,
+    structured_tetrahedra,
+    structured_triangles,
+)
 from reference.meshing.imprint_facets import Realised, imprint_facets
-from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
 from reference.meshing.opening import ConformingMesh, open_cut
-from reference.meshing.refinement import refine_uniformly
+from reference.meshing.session import background_mesh
 
 __all__ = [
     "ConformingMesh",

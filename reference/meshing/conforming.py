@@ -6,13 +6,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.features import Feature, close_pairs, plane_features
-from reference.meshing.flat_cells import flip_flat_cells
+from reference.meshing.edge_splitting import flip_flat_cells, shrink_to_points
+from reference.meshing.features import Feature, close_pairs, divided_outline, plane_features
 from reference.meshing.grading import Grading
 from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
-from reference.meshing.outline import divided_outline
-from reference.meshing.refinement import shrink_to_points
 from reference.meshing.separation import APART, check_separation, check_strips
 from reference.meshing.session import (
     add_polygon,

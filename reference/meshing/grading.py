@@ -8,9 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.features import Feature, crossing_points, plane_features
+from reference.meshing.features import (
+    Feature,
+    crossing_points,
+    divided_outline,
+    load_jumps,
+    plane_features,
+    supported_edges,
+)
 from reference.meshing.interfaces import plane_interfaces
-from reference.meshing.outline import divided_outline, load_jumps, supported_edges
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene

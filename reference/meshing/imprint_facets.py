@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reference.meshing.edge_splitting import loosen_front, split_edges
-from reference.meshing.imprint_solid import ON, imprint_polygons
+from reference.meshing.imprint import ON, imprint_polygons
 from reference.meshing.opening import cell_facets, inner_facets, measures
 from verify.errors import InputError
 

@@ -1,4 +1,4 @@
-"""One gmsh session at a time, quiet, deterministic, closed whatever happens."""
+"""One gmsh session at a time, quiet, deterministic, closed whatever happens; unfitted meshes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -96,3 +96,30 @@ def oriented(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[n
     cells = cells.copy()
     cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
     return cells
+
+
+def background_mesh(
+    outline: NDArray[np.float64], size: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Uniform unstructured triangles of a polygon, ignorant of any cut.
+
+    Parameters
+    ----------
+    outline : (k, 2) array
+        Corners in order, m.
+    size : float
+        Element size, m.
+
+    Returns
+    -------
+    points : (n, 2) array
+    cells : (m, 3) array
+    """
+    origin, scale = outline.min(axis=0), float(np.ptp(outline, axis=0).max())
+    with gmsh_session() as gmsh:
+        add_polygon(gmsh.model.occ, (outline - origin) / scale)
+        gmsh.model.occ.synchronize()
+        set_sizes(gmsh, [], size / scale, size / scale)
+        gmsh.model.mesh.generate(2)
+        points, cells, _ = simplices(gmsh, 2)
+    return points * scale + origin, cells

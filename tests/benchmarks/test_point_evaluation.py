@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from reference.meshing.imprint import imprint, structured_triangles
-from reference.meshing.imprint_solid import structured_tetrahedra
+from reference.meshing.imprint import imprint, structured_tetrahedra, structured_triangles
 from reference.meshing.opening import open_cut
 from verify.compare.locate import SolutionField
 from verify.solution import Solution

@@ -12,7 +12,7 @@ from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, sq
 from reference.fracture import tips
 from reference.fracture.domain import ring
 from reference.meshing import background_mesh, conforming_mesh
-from reference.meshing.flat_cells import flip_flat_cells
+from reference.meshing.edge_splitting import flip_flat_cells
 from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut

@@ -1,7 +1,7 @@
 """Cuts and places are held against bodies from mesh files as against those that a case describes.
 
 Random cuts of a rectangle and a box, once described and once from a file with the same mesh: the
-closed form of `verify.scene.cut_placement` says what the check of the mesh must say.
+closed form of `verify.scene.placement` says what the check of the mesh must say.
 """
 
 import re

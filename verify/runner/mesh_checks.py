@@ -170,7 +170,7 @@ def _extent(cut: Any) -> float:
 def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
     """Raise `InputError` if cuts or quantities do not lie in the mesh of a body as they should.
 
-    As `verify.scene.cut_placement` holds them against bodies that the case itself describes; of
+    As `verify.scene.placement` holds them against bodies that the case itself describes; of
     a membrane only whether a cut reaches it at all is known.
     """
     where = str(scene.file or scene.name)
