@@ -11,9 +11,9 @@ import pytest
 
 import verify
 from verify import provenance as module
-from verify.cut_record import CutRecord
 from verify.errors import InputError
 from verify.provenance import provenance, versions
+from verify.records import CutRecord
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.result_files import read_result, write_result

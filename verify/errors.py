@@ -1,4 +1,4 @@
-"""The errors that users see as one line and exit code 2."""
+"""Errors that users see, and what to use instead of what was removed."""
 
 
 class InputError(ValueError):
@@ -23,3 +23,20 @@ class UnsupportedSceneError(Exception):
 
     It becomes a row of the result with its reason; it is not a crash.
     """
+
+
+_INSTEAD = {
+    "geometry.source": (
+        "shapes are made by formulas; for real anatomy give its surface as 'file' "
+        "(docs/guide/simulator.md)"
+    ),
+    "verify data": (
+        "for real anatomy give its surface as 'file' of [geometry] (docs/guide/simulator.md)"
+    ),
+    "xfem.basis": "leave it out; all bases span the space of the side-wise unknowns",
+}
+
+
+def instead(name: str) -> str:
+    """Say what to use instead of what was removed under `name`, or ""."""
+    return f"'{name}' was removed: {_INSTEAD[name]}" if name in _INSTEAD else ""

@@ -1,7 +1,13 @@
-"""Faults of a solution where a solver hands it over, so that a wrong one fails there, not later.
+"""What a solver hands over, checked there, so that a wrong answer fails there and not later.
 
 Shapes, types, and numbers that mean nothing: what is not finite, or so large that its square is
 not; sizes and times below zero. Whether an answer is right is not asked here.
+
+The mass that a solver moves with, on the nodes of its solution, is none, a word, a vector or a
+matrix. `CONSISTENT` says that it is ∫ρ N_i N_j of the solution's own field. A vector has the mass
+of each node; a sparse matrix what couples nodes too, as the mass of phantom nodes does that is
+expressed by the nodes around them. All are of the body with all its cuts open, the same at all
+times and for every component.
 """
 
 from collections.abc import Mapping
@@ -18,6 +24,8 @@ _LARGEST = 1e100
 _LONGEST = 200  # characters of a name
 _LONGEST_NOTE = 10_000
 _MOST_ENTRIES = 1000
+CONSISTENT = "consistent"
+_SYMMETRIC = 1e-9  # of the largest entry
 
 
 def check_field(name: str, values: Any, shape: tuple[int | None, ...]) -> None:
@@ -139,3 +147,66 @@ def _is_count(value: Any) -> bool:
 
 def _kind(value: Any) -> str:
     return "None" if value is None else f"of type '{type(value).__name__}'"
+
+
+def _is_matrix(mass: Any) -> bool:
+    """Whether a mass is a sparse array, found without SciPy, which takes its time to import."""
+    return hasattr(mass, "tocoo")
+
+
+def check_mass(mass: Any, count: int) -> None:
+    """Raise `InputError` if a declared mass is none of `count` nodes."""
+    if mass is None or (isinstance(mass, str) and mass == CONSISTENT):
+        return
+    if isinstance(mass, str):
+        raise InputError(f"mass '{mass}'; expected '{CONSISTENT}', numbers or a sparse matrix")
+    if not _is_matrix(mass):
+        check_field("mass", mass, (count,))
+        return
+    if mass.shape != (count, count):
+        raise InputError(f"mass of shape {mass.shape}; expected {(count, count)}")
+    entries = mass.tocoo()
+    check_field("entries of the mass", entries.data, (None,))
+    if np.abs((mass - mass.T).data).max(initial=0.0) > _SYMMETRIC * np.abs(entries.data).max():
+        raise InputError("a mass that is not symmetric")
+
+
+def plain_mass(mass: Any) -> Any:
+    """Write a declared mass as plain values: of a matrix the entries on and above the diagonal."""
+    if mass is None or isinstance(mass, str):
+        return mass
+    if not _is_matrix(mass):
+        return np.asarray(mass, dtype=float).tolist()
+    entries = mass.tocoo()
+    upper = entries.row <= entries.col
+    columns = {"rows": entries.row, "columns": entries.col, "values": entries.data}
+    return {name: values[upper].tolist() for name, values in columns.items()}
+
+
+def restored_mass(content: Any, count: int) -> Any:
+    """Read what `plain_mass`, or another program, wrote of a mesh of `count` nodes.
+
+    Raises
+    ------
+    InputError
+        If it is nothing of the kind.
+    """
+    if content is None or isinstance(content, str):
+        return content
+    if isinstance(content, list):
+        return np.asarray(content, dtype=float)
+    if not isinstance(content, dict) or set(content) != {"rows", "columns", "values"}:
+        kinds = f"'{CONSISTENT}', a list by node, or rows, columns and values"
+        raise InputError(f"mass of type '{type(content).__name__}'; expected {kinds}")
+    from scipy.sparse import csr_array
+
+    rows, columns = (np.asarray(content[name], dtype=np.int64) for name in ("rows", "columns"))
+    values = np.asarray(content["values"], dtype=float)
+    if (rows > columns).any():
+        raise InputError("mass has entries below its diagonal; expected those on and above it")
+    off = rows < columns
+    entries = (
+        np.concatenate([values, values[off]]),
+        (np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])),
+    )
+    return csr_array(entries, shape=(count, count))

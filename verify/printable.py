@@ -1,15 +1,16 @@
-"""Text from elsewhere, made fit for a terminal: no escapes, no hidden marks, a bounded length.
+"""Text of others made safe to show: on a terminal, in a message, in a table for a spreadsheet."""
 
-Titles, reasons and names come from case files, solvers and archives. An escape sequence in them
-could clear the screen, set its title or hide a verdict; a mark of direction could turn it round.
-"""
-
+import csv
+import io
 import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 _LONGEST = 2000  # characters of a message; more is no message
 # ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
 _HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 _KEPT = "\n\t"
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
 def visible(text: str) -> str:
@@ -57,3 +58,28 @@ def words_of(error: BaseException, longest: int = _LONGEST) -> str:
 def memory_text(amount: float) -> str:
     """Return bytes in the units of ``--memory``: MB, or GB from 1 on (powers of ten)."""
     return f"{amount / 1e6:.0f} MB" if amount < 0.9995e9 else f"{amount / 1e9:.3g} GB"
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return a table with a head, one line per row.
+
+    Parameters
+    ----------
+    columns : sequence of str
+    rows : iterable of mapping
+        Values by column; a missing one is an empty cell. A text that a spreadsheet would
+        compute (``=HYPERLINK(…)``) gets an apostrophe in front; numbers are as they are.
+    """
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: _cell(value) for name, value in row.items()})
+    return buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    text = visible(value)
+    return f"'{text}" if text.lstrip(" ").startswith(_FORMULA) else text

@@ -10,9 +10,8 @@ from enum import StrEnum
 from math import inf
 from typing import Any
 
-from verify.cut_record import CutRecord
+from verify.records import CutRecord, Regularisation
 from verify.reference_record import ReferenceRecord
-from verify.regularisation import Regularisation
 
 SCHEMA_VERSION = 1
 REFERENCE = "reference"  #: solver that judges the others, where no exact solution does

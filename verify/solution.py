@@ -18,12 +18,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.declared_mass import check_mass, plain_mass, restored_mass
 from verify.errors import InputError
-from verify.handed_over import check_accounts, check_cells, check_field, check_vectors
+from verify.handed_over import (
+    check_accounts,
+    check_cells,
+    check_field,
+    check_mass,
+    check_vectors,
+    plain_mass,
+    restored_mass,
+)
 from verify.json_files import read_json
 from verify.read_mesh import read_with_meshio
-from verify.regularisation import Regularisation
+from verify.records import Regularisation
 from verify.whole_files import whole_file, write_whole
 
 __all__ = [

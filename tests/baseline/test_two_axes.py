@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 import runs
 
-from verify.cut_record import CutRecord
 from verify.meaning import changes_of
+from verify.records import CutRecord
 
 
 def rows(answer, axis=None):

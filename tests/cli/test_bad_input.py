@@ -9,8 +9,7 @@ import pytest
 from command_line import without_waits
 
 from verify.cli import main
-from verify.csv_files import csv_text
-from verify.printable import one_line, visible
+from verify.printable import csv_text, one_line, visible
 from verify.scene import case_folder
 
 PATCH = (case_folder() / "statics" / "f1_patch.toml").read_text()

@@ -9,7 +9,7 @@ import numpy as np
 
 from verify.compare.hooke import hooke
 from verify.compare.strain_energy import strain_energy
-from verify.regularisation import Regularisation
+from verify.records import Regularisation
 from verify.solvers.xfem import XfemSolver
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from verify.judge.ranks import rank_solvers
+from verify.records import Regularisation
 from verify.reference_record import ReferenceRecord
-from verify.regularisation import Regularisation
 from verify.result import CaseResult, Metric, SolveRecord, Status
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from verify.records import Regularisation
 from verify.reference_record import ReferenceRecord
-from verify.regularisation import Regularisation
 from verify.result import (
     CaseResult,
     Metric,

@@ -23,7 +23,7 @@ from verify.cli.shared_arguments import (
     sentence,
 )
 from verify.cli.study_parser import add_study_command
-from verify.removed import instead
+from verify.errors import instead
 
 _EXIT_CODES = """\
 exit codes:

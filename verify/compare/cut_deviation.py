@@ -26,8 +26,8 @@ from verify.compare.simplex_rule import points_in
 from verify.compare.simplices import simplices, triangle_frames
 from verify.compare.solid import SolidBody
 from verify.compare.splitting import heights
-from verify.cut_record import CutRecord
 from verify.geometry.curves import Arc
+from verify.records import CutRecord
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from verify.compare.locate import Field, SolutionField
 from verify.compare.motion import ExactMotion
 from verify.compare.realised import cut_deviation, field_of
 from verify.compare.simplices import simplices
-from verify.cut_record import CutRecord
 from verify.errors import InputError
+from verify.records import CutRecord
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.whole_files import whole_file

@@ -16,7 +16,7 @@ from verify.compare.kinetic import Kinetic
 from verify.compare.lumping import consistent_mass, lumping_of, lumping_range, nodal_weights
 from verify.compare.separated import Part
 from verify.compare.simplices import simplices
-from verify.declared_mass import CONSISTENT
+from verify.handed_over import CONSISTENT
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from verify.compare.simplices import simplices
 from verify.compare.strain_energy import nodal_strain_energy
 from verify.conformance.measures import covered
 from verify.conformance.scenes import YOUNG, Array, Field
-from verify.cut_record import CutRecord
+from verify.records import CutRecord
 from verify.scene import Scene
 from verify.scene.parts import on_part
 from verify.solution import Solution

@@ -21,9 +21,9 @@ from verify.compare.body import body_of
 from verify.compare.error_field import Truth, nodal_differences, truth_of
 from verify.compare.locate import SolutionField
 from verify.compare.stress import strain_and_stress
-from verify.cut_record import CutRecord
 from verify.errors import InputError
 from verify.json_files import read_json
+from verify.records import CutRecord
 from verify.report.bodies import read_stored
 from verify.report.run_directory import CaseEntry, load_run
 from verify.result import SolveRecord, Status

@@ -12,9 +12,8 @@ from verify.compare.errors import Rules
 from verify.compare.hooke import Law
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import Motion, SolutionMotion
-from verify.cut_record import CutRecord
 from verify.judge.quantities import Measured
-from verify.regularisation import Regularisation
+from verify.records import CutRecord, Regularisation
 from verify.result import CUT, SolveRecord
 from verify.solution import Solution
 

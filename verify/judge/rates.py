@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 from math import log
 
-from verify.regularisation import Regularisation
+from verify.records import Regularisation
 from verify.result import Rate, SolveRecord
 from verify.scene.held_facets import END_OF_SUPPORT
 

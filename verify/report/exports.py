@@ -7,7 +7,7 @@ from statistics import median
 from typing import Any
 from xml.etree import ElementTree
 
-from verify.csv_files import csv_text
+from verify.printable import csv_text
 from verify.report.curves import duration
 from verify.report.notation import printable
 from verify.report.run_directory import CaseEntry, Run

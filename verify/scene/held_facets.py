@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.nearest import nearest_parts
-from verify.regularisation import Regularisation
+from verify.records import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.parts import on_part, pieces_on_part, size_of
 from verify.scene.tables import SceneTables

@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from verify.errors import instead
 from verify.printable import shown
-from verify.removed import instead
 
 _FEW, _SHOWN = 30, 3
 

@@ -17,7 +17,7 @@ from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
 from reference.ties import facing_nodes, lasting_ties
 from reference.weak_place import naming_weak_places
-from verify.declared_mass import CONSISTENT
+from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
 from verify.solvers.account import Account

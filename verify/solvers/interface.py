@@ -11,9 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from verify.errors import InputError
+from verify.errors import InputError, instead
 from verify.printable import one_line, shown, words_of
-from verify.removed import instead
 from verify.scene import Scene
 from verify.scene.messages import nearest
 from verify.solution import Solution

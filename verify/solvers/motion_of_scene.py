@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.declared_mass import CONSISTENT
 from verify.errors import InputError, UnsupportedSceneError
+from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open

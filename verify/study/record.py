@@ -5,9 +5,9 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from verify.csv_files import csv_text
 from verify.errors import InputError
 from verify.json_files import write_json
+from verify.printable import csv_text
 from verify.provenance import provenance
 from verify.result import Verdict
 from verify.whole_files import write_whole
