@@ -34,6 +34,7 @@ METRICS = tuple(dict.fromkeys((
     "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
     OVERLAP, *OF_MOTION,
 )))  # fmt: skip
+OF_MOVING_PARTS = ("linear_momentum", "angular_momentum", "kinetic_energy")
 _DIRECTED = ("inertia", "linear_momentum", "angular_momentum")  # of a part, along an axis
 Time = Annotated[
     NonNegative | None, Field(description="dynamic: when, s; default the last output time")

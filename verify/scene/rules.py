@@ -1,18 +1,20 @@
-"""Rules that take more than one part of a scene, as tables: key, what breaks the rule, message.
+"""Rules that take more than one part of a scene, as a table: place, what breaks the rule, message.
 
-A rule on the whole scene is asked of the scene; one on a table of it, or on the entries of a list,
-of the scene and the entry. What breaks a rule answers with nothing where it holds, else with what
-the braces of the message stand for.
+A place with brackets is a key of the entries of a list: of all (``supports[*].where``), or of those
+of a kind (``loads[gravity].acceleration``). What breaks a rule is asked of the scene, or of the
+scene and the entry. It answers with nothing where the rule holds, else with what the braces of the
+message stand for.
 """
 
+import re
 from collections.abc import Iterator
-from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from verify.geometry.nearest import feet
-from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, OVERLAP
+from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, OF_MOVING_PARTS, OVERLAP
 from verify.scene.cuts import DiscCut, PolygonCut
 from verify.scene.geometry import MeshFile, Polygon, Skin
 from verify.scene.messages import nearest
@@ -24,7 +26,7 @@ from verify.scene.placement import (
     points_of_body,
 )  # fmt: skip
 from verify.scene.regions import parse_expression, parse_region
-from verify.scene.strict import Rules, first_broken
+from verify.scene.strict import Rule, Rules, first_broken
 from verify.scene.tables import SceneTables
 
 _MOST = 1e10  # nodes of a mesh (25 TB in the plane), and time steps
@@ -34,30 +36,28 @@ _IN_TIME = "belongs to a dynamic analysis"
 _AFTER_END = "{:g} s is after the end, {:g} s"
 _EXACT = "'exact' needs an [exact] solution"
 _NO_CUT = "no cut '{}'{}"
-_OWN_SURFACE = "a plane body or membrane is its own surface"
 
 
 def first_fault_of_parts(scene: SceneTables) -> str | None:
     """Say in one line which parts of a scene do not fit together; None if all do."""
-    for path, by_kind in _TABLES:
+    for path, rows in _BY_LIST:
         for place, parts in _entries(scene, path):
-            rules = by_kind.get("", ()) + by_kind.get(getattr(parts[-1], "kind", "no kind"), ())
+            kinds = ("*", getattr(parts[-1], "kind", "*"))
+            rules = tuple(rule for kind, rule in rows if kind in kinds)
             if found := first_broken(rules, *parts, place=place):
                 return found
     return None
 
 
 def _entries(scene: SceneTables, path: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Give what the rules at a path are asked of, and its place: entries of a list one by one."""
-    found: Any = scene
-    for key in filter(None, path.split(".")):
-        found = getattr(found, key, None)  # a table that is not given has no entries
+    """Give what the rules on a list are asked of, and its place; without a path the scene alone."""
     if not path:
         yield "", (scene,)
-    elif isinstance(found, list):
-        yield from ((f"{path}[{i}]", (scene, entry)) for i, entry in enumerate(found))
-    elif found is not None:
-        yield path, (scene, found)
+        return
+    found: Any = scene
+    for key in path.split("."):
+        found = getattr(found, key, None)  # a table that is not given has no entries
+    yield from ((f"{path}[{i}]", (scene, entry)) for i, entry in enumerate(found or []))
 
 
 # ------------------------------------------------------------------- what breaks more than one rule
@@ -98,20 +98,18 @@ def _unknown_part(scene: SceneTables, where: str) -> str | None:
     return _fault_of(parse_region, where, scene.dimension)
 
 
-def _formulas(*keys: str, timed: bool = True) -> Rules:
-    """Rules that formulas can be read; where they are no finite number is found on meshes."""
+def _unreadable(scene: SceneTables, given: Any, timed: bool = True) -> str | None:
+    """Why the first formula that cannot be read is none.
 
-    def unreadable(scene: SceneTables, part: Any, key: str) -> str | None:
-        given = getattr(part, key, None)
-        texts = given if isinstance(given, list) else [given]
-        faults = [
-            _fault_of(parse_expression, text, scene.dimension, timed and not _is_static(scene))
-            for text in texts
-            if isinstance(text, str) and text != "exact"
-        ]
-        return next(filter(None, faults), None)
-
-    return tuple((key, partial(unreadable, key=key), "{}") for key in keys)
+    Where formulas are no finite number is found on meshes.
+    """
+    texts = given if isinstance(given, list) else [given]
+    faults = [
+        _fault_of(parse_expression, text, scene.dimension, timed and not _is_static(scene))
+        for text in texts
+        if isinstance(text, str) and text != "exact"
+    ]
+    return next(filter(None, faults), None)
 
 
 def _fault_of(parse: Any, *asked: Any) -> str | None:
@@ -147,6 +145,11 @@ def _too_many_steps(scene: SceneTables) -> tuple[float, float, float] | None:
     asked = scene.analysis
     steps = asked.duration / asked.time_step if asked.duration and asked.time_step else 0.0
     return (steps, asked.duration or 0.0, _MOST) if steps > _MOST else None
+
+
+def _point_elsewhere(scene: SceneTables, asked: Any) -> int | None:
+    given = scene.dimension if asked.point is None else len(asked.point)
+    return None if given == scene.dimension else scene.dimension
 
 
 def _axis_in_plane(part: Any) -> tuple[str, str] | None:
@@ -215,7 +218,7 @@ def _after_end(scene: SceneTables, time: float | None) -> tuple[float, float] | 
 
 
 # fmt: off
-_BODY: Rules = (
+_RULES: Rules = (
     ("material.plane", lambda s: s.dimension == 2 and s.material.plane is None,
      "a 2D scene needs plane = 'strain' or 'stress'"),
     ("material.plane", lambda s: s.dimension == 3 and s.material.plane is not None,
@@ -227,41 +230,30 @@ _BODY: Rules = (
     ("mesh.pattern", lambda s: s.mesh.pattern == "structured" and isinstance(s.geometry, Polygon),
      "only rectangles and boxes have structured meshes; use 'unstructured'"),
     ("supports", lambda s: not s.supports and _is_static(s), "a static scene needs at least one"),
-)
-_SUPPORT: Rules = (
-    ("components", lambda s, p: any(c >= s.dimension for c in p.held(s.dimension)),
+    ("supports[*].components", lambda s, p: any(c >= s.dimension for c in p.held(s.dimension)),
      "z in a 2D scene"),
-    ("displacement", lambda s, p: _unequal(p.displacement, len(p.held(s.dimension))), _VALUES),
-    ("rotation.centre", lambda s, p: p.rotation and len(p.rotation.centre) != s.dimension
-     and s.dimension, "expected {} coordinates"),
-    ("rotation.axis", lambda s, p: p.rotation and p.rotation.axis is None and s.dimension == 3,
-     "3D needs one"),
-    ("rotation.axis", lambda s, p: p.rotation and p.rotation.axis and s.dimension == 2,
-     "belongs to 3D scenes"),
-    ("rotation.axis", lambda s, p: p.rotation and p.rotation.axis and not any(p.rotation.axis),
-     "is zero"),
-)
-_LOADS: dict[str, Rules] = {
-    "cut_faces": (
-        ("cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
-        ("", lambda s, p: _is_membrane(s),
-         "the cuts of a membrane have no faces that a load acts on"),
-        ("cut", lambda s, p: _cut(s, p.cut).on_the_way and p.cut,
-         "'{}' is opened on the way; its faces bear no load"),
-        ("traction", lambda s, p: _unequal(p.traction, s.dimension), _VALUES),
-    ),
-    "gravity": (
-        ("acceleration", lambda s, p: _unequal(p.acceleration, s.dimension), _VALUES),
-        ("", lambda s, p: s.material.density is None, "gravity needs material.density"),
-    ),
-    "body_force": (("force", lambda s, p: _unequal(p.force, s.dimension), _VALUES),),
-    "traction": (("traction", lambda s, p: _unequal(p.traction, s.dimension), _VALUES),),
-}
-_CUT: Rules = (
-    ("", lambda s, p: p.dimension != s.dimension and (p.kind, s.dimension),
+    ("supports[*].displacement",
+     lambda s, p: _unequal(p.displacement, len(p.held(s.dimension))), _VALUES),
+    ("supports[*].rotation.centre", lambda s, p: p.rotation
+     and len(p.rotation.centre) != s.dimension and s.dimension, "expected {} coordinates"),
+    ("supports[*].rotation.axis",
+     lambda s, p: p.rotation and p.rotation.axis is None and s.dimension == 3, "3D needs one"),
+    ("supports[*].rotation.axis",
+     lambda s, p: p.rotation and p.rotation.axis and s.dimension == 2, "belongs to 3D scenes"),
+    ("supports[*].rotation.axis",
+     lambda s, p: p.rotation and p.rotation.axis and not any(p.rotation.axis), "is zero"),
+    ("loads[cut_faces].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    ("loads[cut_faces]", lambda s, p: _is_membrane(s),
+     "the cuts of a membrane have no faces that a load acts on"),
+    ("loads[cut_faces].cut", lambda s, p: _cut(s, p.cut).on_the_way and p.cut,
+     "'{}' is opened on the way; its faces bear no load"),
+    ("loads[cut_faces].traction", lambda s, p: _unequal(p.traction, s.dimension), _VALUES),
+    ("loads[gravity].acceleration", lambda s, p: _unequal(p.acceleration, s.dimension), _VALUES),
+    ("loads[gravity]", lambda s, p: s.material.density is None, "gravity needs material.density"),
+    ("loads[body_force].force", lambda s, p: _unequal(p.force, s.dimension), _VALUES),
+    ("loads[traction].traction", lambda s, p: _unequal(p.traction, s.dimension), _VALUES),
+    ("cuts[*]", lambda s, p: p.dimension != s.dimension and (p.kind, s.dimension),
      "a {} cut in a {}D scene"),
-)
-_MODEL: Rules = (
     ("material.thickness", lambda s: _is_membrane(s) and s.material.thickness is None,
      "a membrane needs it"),
     ("material.thickness", lambda s: not _is_membrane(s) and s.material.thickness is not None,
@@ -274,175 +266,138 @@ _MODEL: Rules = (
      "mesh.{}[{}]: about {:.0e} nodes in a body of {} m; expected at most {:.0e}"),
     ("analysis.time_step", _too_many_steps,
      "{:.0e} steps to the end at {:g} s; expected at most {:.0e}"),
-)
-_PART: Rules = (("where", lambda s, p: _unknown_part(s, p.where), "{}"),)
-_REGION: Rules = (
-    ("where", lambda s, p: _fault_of(parse_region, p.where, s.dimension), "{}"),
-    ("density", lambda s, p: p.density is not None and s.material.density is None,
+    ("supports[*].where", lambda s, p: _unknown_part(s, p.where), "{}"),
+    ("loads[traction].where", lambda s, p: _unknown_part(s, p.where), "{}"),
+    ("material.regions[*].where", lambda s, p: _fault_of(parse_region, p.where, s.dimension),
+     "{}"),
+    ("material.regions[*].density",
+     lambda s, p: p.density is not None and s.material.density is None,
      "material.density is missing"),
-)
-_REGIONS: Rules = (
     ("", lambda s: s.material.regions and empty_region(s, points_of_body(s)), "{}"),
-)
-_EXACT_SUPPORT: Rules = (
-    ("", lambda s, p: p.displacement == "exact" and s.exact is None, _EXACT),
-)
-_EXACT_LOAD: Rules = (("", lambda s, p: p.exact and s.exact is None, _EXACT),)
-_EXACT_FIELD: Rules = (
-    ("displacement", lambda s, p: p.displacement == "exact" and s.exact is None, _EXACT),
-    ("velocity", lambda s, p: p.velocity == "exact" and s.exact is None, _EXACT),
-)
-_NAMES: Rules = (
+    ("supports[*].displacement", lambda s, p: _unreadable(s, p.displacement), "{}"),
+    ("loads[body_force].force", lambda s, p: _unreadable(s, p.force), "{}"),
+    ("loads[traction].traction", lambda s, p: _unreadable(s, p.traction), "{}"),
+    ("loads[cut_faces].traction", lambda s, p: _unreadable(s, p.traction), "{}"),
+    ("loads[cut_faces].pressure", lambda s, p: _unreadable(s, p.pressure), "{}"),
+    ("initial.displacement",
+     lambda s: _unreadable(s, getattr(s.initial, "displacement", None), timed=False), "{}"),
+    ("initial.velocity",
+     lambda s: _unreadable(s, getattr(s.initial, "velocity", None), timed=False), "{}"),
+    ("supports[*]", lambda s, p: p.displacement == "exact" and s.exact is None, _EXACT),
+    ("loads[*]", lambda s, p: p.exact and s.exact is None, _EXACT),
+    ("initial.displacement",
+     lambda s: getattr(s.initial, "displacement", None) == "exact" and s.exact is None, _EXACT),
+    ("initial.velocity",
+     lambda s: getattr(s.initial, "velocity", None) == "exact" and s.exact is None, _EXACT),
     ("reference.kind", lambda s: s.reference.kind == "exact" and s.exact is None, _EXACT),
     ("cuts", lambda s: _twice(s.cuts), "names must differ, got {}"),
     ("quantities", lambda s: _twice(s.quantities), "names must differ, got {}"),
-)
-_POINT: Rules = (
-    ("point", lambda s, p: p.point is not None and len(p.point) != s.dimension and s.dimension,
-     "expected {} coordinates"),
-)
-_QUANTITIES: dict[str, Rules] = {
-    "displacement": (
-        *_POINT,
-        ("component", lambda s, p: "xyz".index(p.component) >= s.dimension, "z in a 2D scene"),
-    ),
-    "part": (
-        *_POINT,
-        ("component", lambda s, p: s.dimension == 2 and _axis_in_plane(p),
-         "{} in a 2D scene has {}"),
-        ("", lambda s, p: p.of != "strain_energy" and s.material.density is None and p.of,
-         "the {} of a part needs material.density"),
-        ("", lambda s, p: p.of in ("linear_momentum", "angular_momentum", "kinetic_energy")
-         and _is_static(s) and p.of, "{} belongs to a dynamic analysis"),
-        ("time", lambda s, p: _no_output(s, p.time), "{:g} s is no output time"),
-    ),
-    "opening": (
-        ("cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
-        ("at", lambda s, p: s.dimension == 2 and (p.at is None or p.point is not None),
-         "an opening in 2D is at 'at = …'"),
-        ("point", lambda s, p: s.dimension == 3 and (p.point is None or p.at is not None),
-         "an opening in 3D is at 'point = …'"),
-    ),
-    "stress_intensity": (
-        ("cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
-        ("mode", lambda s, p: p.mode == "III" and s.dimension == 2, "III belongs to 3D scenes"),
-        ("mode", lambda s, p: p.mode != "III" and s.dimension == 3 and _at_an_end(s, p),
-         "III alone is measured behind the blade of a tool_path"),
-        ("end", lambda s, p: _at_an_end(s, p) and (p.end is None or p.point is not None)
-         and s.dimension, "a factor in {}D is at 'end = …'"),
-        ("point", lambda s, p: not _at_an_end(s, p) and (p.point is None or p.end is not None)
-         and s.dimension, "a factor in {}D is at 'point = …'"),
-        ("cut", lambda s, p: _cut(s, p.cut).kind == "arc" and _cut(s, p.cut).closed and p.cut,
-         "'{}' is closed and has no end"),
-        ("cut", _no_front,
-         "factors in 3D are known along the fronts of round discs and of polygons"),
-        ("point", _off_front, "is {:.3g} m away from the front of '{}'"),
-    ),
-}
-_QUANTITY_NAME: Rules = (
-    ("name", lambda s, p: p.name in METRICS and p.name, "'{}' names an error; take another"),
-)
-_CHECK: Rules = (
-    ("metric", lambda s, p: _unknown_metric(s, p.metric), "no '{}'{}"),
-    ("metric", lambda s, p: p.metric in OF_CUTS and not s.cuts and p.metric, "{} needs a cut"),
-    ("metric", lambda s, p: p.metric == OVERLAP and p.check in ("rate", "ratio")
-     and (OVERLAP, p.check), "{} has no {}; expected a check 'error' (at most, m) or 'value'"),
-    ("metric", lambda s, p: p.metric in OF_MOTION and _is_static(s) and p.metric,
+    ("quantities[displacement].point", _point_elsewhere, "expected {} coordinates"),
+    ("quantities[displacement].component",
+     lambda s, p: "xyz".index(p.component) >= s.dimension, "z in a 2D scene"),
+    ("quantities[part].point", _point_elsewhere, "expected {} coordinates"),
+    ("quantities[part].component", lambda s, p: s.dimension == 2 and _axis_in_plane(p),
+     "{} in a 2D scene has {}"),
+    ("quantities[part]",
+     lambda s, p: p.of != "strain_energy" and s.material.density is None and p.of,
+     "the {} of a part needs material.density"),
+    ("quantities[part]", lambda s, p: p.of in OF_MOVING_PARTS and _is_static(s) and p.of,
      "{} belongs to a dynamic analysis"),
-    ("", lambda s, p: p.check == "rate" and s.mesh.count < 3,
+    ("quantities[part].time", lambda s, p: _no_output(s, p.time), "{:g} s is no output time"),
+    ("quantities[opening].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    ("quantities[opening].at",
+     lambda s, p: s.dimension == 2 and (p.at is None or p.point is not None),
+     "an opening in 2D is at 'at = …'"),
+    ("quantities[opening].point",
+     lambda s, p: s.dimension == 3 and (p.point is None or p.at is not None),
+     "an opening in 3D is at 'point = …'"),
+    ("quantities[stress_intensity].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    ("quantities[stress_intensity].mode",
+     lambda s, p: p.mode == "III" and s.dimension == 2, "III belongs to 3D scenes"),
+    ("quantities[stress_intensity].mode",
+     lambda s, p: p.mode != "III" and s.dimension == 3 and _at_an_end(s, p),
+     "III alone is measured behind the blade of a tool_path"),
+    ("quantities[stress_intensity].end", lambda s, p: _at_an_end(s, p)
+     and (p.end is None or p.point is not None) and s.dimension, "a factor in {}D is at 'end = …'"),
+    ("quantities[stress_intensity].point", lambda s, p: not _at_an_end(s, p)
+     and (p.point is None or p.end is not None), "a factor in 3D is at 'point = …'"),
+    ("quantities[stress_intensity].cut",
+     lambda s, p: _cut(s, p.cut).kind == "arc" and _cut(s, p.cut).closed and p.cut,
+     "'{}' is closed and has no end"),
+    ("quantities[stress_intensity].cut", _no_front,
+     "factors in 3D are known along the fronts of round discs and of polygons"),
+    ("quantities[stress_intensity].point", _off_front,
+     "is {:.3g} m away from the front of '{}'"),
+    ("quantities[*].name", lambda s, p: p.name in METRICS and p.name,
+     "'{}' names an error; take another"),
+    ("acceptance[*].metric", lambda s, p: _unknown_metric(s, p.metric), "no '{}'{}"),
+    ("acceptance[*].metric", lambda s, p: p.metric in OF_CUTS and not s.cuts and p.metric,
+     "{} needs a cut"),
+    ("acceptance[*].metric", lambda s, p: p.metric == OVERLAP and p.check in ("rate", "ratio")
+     and (OVERLAP, p.check), "{} has no {}; expected a check 'error' (at most, m) or 'value'"),
+    ("acceptance[*].metric", lambda s, p: p.metric in OF_MOTION and _is_static(s) and p.metric,
+     "{} belongs to a dynamic analysis"),
+    ("acceptance[*]", lambda s, p: p.check == "rate" and s.mesh.count < 3,
      "a rate needs at least three mesh levels"),
-)
-_FINDING: Rules = (
-    ("", _not_made, "no check '{} of {}' is made of '{}'; the case makes {}"),
-)
-_ADEQUACY: Rules = (
-    ("motion", lambda s, p: p.motion and _is_static(s), _IN_TIME),
-    ("kinematics", lambda s, p: p.kinematics and _is_membrane(s),
+    ("known_findings[*]", _not_made,
+     "no check '{} of {}' is made of '{}'; the case makes {}"),
+    ("adequacy.motion", lambda s: s.adequacy.motion and _is_static(s), _IN_TIME),
+    ("adequacy.kinematics", lambda s: s.adequacy.kinematics and _is_membrane(s),
      "a membrane has no linear kinematics"),
-    ("", lambda s, p: p.models and s.played_only, "{}"),
-)
-_ACTING: Rules = (("", part_without_facets, "{}"),)
-_QUANTITY_TIME: Rules = (
-    ("time", lambda s, p: _is_static(s) and getattr(p, "time", None) is not None, _IN_TIME),
-    ("time", lambda s, p: _after_end(s, getattr(p, "time", None)), _AFTER_END),
-)
-_OPENING_TIME: Rules = (
-    ("opens_at", lambda s, p: _is_static(s) and p.opens_at, _IN_TIME),
-    ("opens_at", lambda s, p: _after_end(s, p.opens_at), _AFTER_END),
-)
-_HISTORY: Rules = (
-    ("history", lambda s, p: _is_static(s) and getattr(p, "history", None) is not None, _IN_TIME),
-)
-_INITIAL_TIME: dict[str, Rules] = {
-    "": (("", lambda s, p: _is_static(s) and p.kind != "rest", _IN_TIME),),
-    "moving": (
-        ("velocity", lambda s, p: _unequal(p.velocity, s.dimension), _VALUES),
-        ("centre", lambda s, p: _unequal(p.centre, s.dimension), _VALUES),
-        ("spin", lambda s, p: isinstance(p.spin, tuple) and s.dimension == 2, "expected a number"),
-        ("spin", lambda s, p: isinstance(p.spin, float) and s.dimension == 3,
-         "expected three numbers"),
-    ),
-    "field": (
-        ("displacement", lambda s, p: _unequal(p.displacement, s.dimension), _VALUES),
-        ("velocity", lambda s, p: _unequal(p.velocity, s.dimension), _VALUES),
-    ),
-}
-_PLACES: Rules = (("", misplaced_cut, "{}"), ("", misplaced_point, "{}"))
-_TOOL: Rules = (
-    ("", lambda s, p: _is_static(s), "a tool_path takes time; it needs a dynamic analysis"),
-    ("", lambda s, p: p.ends_at > s.analysis.duration * (1.0 + 1e-12)
+    ("adequacy", lambda s: s.adequacy.models and s.played_only, "{}"),
+    ("", part_without_facets, "{}"),
+    ("quantities[*].time",
+     lambda s, p: _is_static(s) and getattr(p, "time", None) is not None, _IN_TIME),
+    ("quantities[*].time", lambda s, p: _after_end(s, getattr(p, "time", None)), _AFTER_END),
+    ("cuts[*].opens_at", lambda s, p: _is_static(s) and p.opens_at, _IN_TIME),
+    ("cuts[*].opens_at", lambda s, p: _after_end(s, p.opens_at), _AFTER_END),
+    ("supports[*].history", lambda s, p: _is_static(s) and p.history is not None, _IN_TIME),
+    ("loads[*].history",
+     lambda s, p: _is_static(s) and getattr(p, "history", None) is not None, _IN_TIME),
+    ("initial", lambda s: _is_static(s) and s.initial.kind != "rest", _IN_TIME),
+    ("initial.displacement",
+     lambda s: _unequal(getattr(s.initial, "displacement", None), s.dimension), _VALUES),
+    ("initial.velocity",
+     lambda s: _unequal(getattr(s.initial, "velocity", None), s.dimension), _VALUES),
+    ("initial.centre",
+     lambda s: _unequal(getattr(s.initial, "centre", None), s.dimension), _VALUES),
+    ("initial.spin", lambda s: s.dimension == 2
+     and isinstance(getattr(s.initial, "spin", None), tuple), "expected a number"),
+    ("initial.spin", lambda s: s.dimension == 3
+     and isinstance(getattr(s.initial, "spin", None), float), "expected three numbers"),
+    ("", misplaced_cut, "{}"),
+    ("", misplaced_point, "{}"),
+    ("cuts[tool_path]", lambda s, p: _is_static(s),
+     "a tool_path takes time; it needs a dynamic analysis"),
+    ("cuts[tool_path]", lambda s, p: p.ends_at > s.analysis.duration * (1.0 + 1e-12)
      and (p.ends_at, s.analysis.duration),
      "the tool arrives at {:g} s, after the end of the analysis at {:g} s"),
-)
-_REPLAY: Rules = (
-    ("", lambda s, p: s.analysis.duration is None or s.analysis.time_step is None,
+    ("replay", lambda s: s.replay and (s.analysis.duration is None or s.analysis.time_step is None),
      "needs a dynamic analysis with a time_step"),
-)
-_PULL: Rules = (
-    ("at", lambda s, p: len(p.at) != s.dimension and (len(p.at), s.dimension),
+    ("replay.pulls[*].at", lambda s, p: len(p.at) != s.dimension and (len(p.at), s.dimension),
      "{} coordinates in a {}D scene"),
-    ("cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
-    ("begin", lambda s, p: p.begin >= s.analysis.duration and (p.begin,),
+    ("replay.pulls[*].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    ("replay.pulls[*].begin", lambda s, p: p.begin >= s.analysis.duration and (p.begin,),
      "{:g} s is after the end of the analysis"),
-)
-_SURFACES: Rules = (
-    ("visual", lambda s, p: p.visual is not None and s.cell_dimension < 3, _OWN_SURFACE),
-    ("collision", lambda s, p: p.collision is not None and s.cell_dimension < 3, _OWN_SURFACE),
-)
-
-# in the order in which they are asked: later ones rest on earlier ones
-_TABLES: tuple[tuple[str, dict[str, Rules]], ...] = (
-    ("", {"": _BODY}),
-    ("supports", {"": _SUPPORT}),
-    ("loads", _LOADS),
-    ("cuts", {"": _CUT}),
-    ("", {"": _MODEL}),
-    ("supports", {"": _PART}),
-    ("loads", {"traction": _PART}),
-    ("material.regions", {"": _REGION}),
-    ("", {"": _REGIONS}),
-    ("supports", {"": _formulas("displacement")}),
-    ("loads", {"": _formulas("force", "traction", "pressure")}),
-    ("initial", {"": _formulas("displacement", "velocity", timed=False)}),
-    ("supports", {"": _EXACT_SUPPORT}),
-    ("loads", {"": _EXACT_LOAD}),
-    ("initial", {"field": _EXACT_FIELD}),
-    ("", {"": _NAMES}),
-    ("quantities", _QUANTITIES),
-    ("quantities", {"": _QUANTITY_NAME}),
-    ("acceptance", {"": _CHECK}),
-    ("known_findings", {"": _FINDING}),
-    ("adequacy", {"": _ADEQUACY}),
-    ("", {"": _ACTING}),
-    ("quantities", {"": _QUANTITY_TIME}),
-    ("cuts", {"": _OPENING_TIME}),
-    ("supports", {"": _HISTORY}),
-    ("loads", {"": _HISTORY}),
-    ("initial", _INITIAL_TIME),
-    ("", {"": _PLACES}),
-    ("cuts", {"tool_path": _TOOL}),
-    ("replay", {"": _REPLAY}),
-    ("replay.pulls", {"": _PULL}),
-    ("replay", {"": _SURFACES}),
+    ("replay.visual", lambda s: s.replay and s.replay.visual is not None and s.cell_dimension < 3,
+     "a plane body or membrane is its own surface"),
+    ("replay.collision",
+     lambda s: s.replay and s.replay.collision is not None and s.cell_dimension < 3,
+     "a plane body or membrane is its own surface"),
 )
 # fmt: on
+
+
+def _by_list() -> list[tuple[str, list[tuple[str, Rule]]]]:
+    """Join rules on the same list that follow each other: an entry is asked all of them at once."""
+    rows = []
+    for place, broken, text in _RULES:  # later rules rest on earlier ones
+        path, kind, key = re.fullmatch(r"(?:([\w.]+)\[([\w*]+)\])?\.?([\w.]*)", place).groups("")
+        rows.append((path, kind or "*", (key, broken, text)))
+    return [
+        (path, [(kind, rule) for _, kind, rule in own])
+        for path, own in groupby(rows, key=lambda row: row[0])
+    ]
+
+
+_BY_LIST = _by_list()
