@@ -218,7 +218,7 @@ def _after_end(scene: SceneTables, time: float | None) -> tuple[float, float] | 
 
 
 # fmt: off
-_RULES: Rules = (
+RULES: Rules = (
     ("material.plane", lambda s: s.dimension == 2 and s.material.plane is None,
      "a 2D scene needs plane = 'strain' or 'stress'"),
     ("material.plane", lambda s: s.dimension == 3 and s.material.plane is not None,
@@ -391,9 +391,9 @@ _RULES: Rules = (
 def _by_list() -> list[tuple[str, list[tuple[str, Rule]]]]:
     """Join rules on the same list that follow each other: an entry is asked all of them at once."""
     rows = []
-    for place, broken, text in _RULES:  # later rules rest on earlier ones
-        path, kind, key = re.fullmatch(r"(?:([\w.]+)\[([\w*]+)\])?\.?([\w.]*)", place).groups("")
-        rows.append((path, kind or "*", (key, broken, text)))
+    for place, broken, text in RULES:  # later rules rest on earlier ones
+        path, kind, key = re.split(r"\[|\]\.?", place) if "[" in place else ("", "*", place)
+        rows.append((path, kind, (key, broken, text)))
     return [
         (path, [(kind, rule) for _, kind, rule in own])
         for path, own in groupby(rows, key=lambda row: row[0])

@@ -1,0 +1,287 @@
+"""Rules between the parts of a scene: what breaks each of them, and its message."""
+
+import re
+
+import pytest
+import scenes
+from pydantic import ValidationError
+
+from verify.scene.rules import RULES
+
+PATH2 = {"kind": "tool_path", "points": [[0.0, 0.5], [0.5, 0.5]], "speed": 1.0}
+PATH3 = {
+    "kind": "tool_path",
+    "points": [[0.2, 0.5, 1.0], [0.8, 0.5, 1.0]],
+    "speed": 1.0,
+    "direction": [0.0, 0.0, -1.0],
+    "depth": 0.5,
+}
+LINE = {"kind": "polyline", "points": [[0.2, 0.5], [0.8, 0.5]]}
+ARC = {"kind": "arc", "centre": [0.5, 0.5], "radius": 0.2}
+DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 0.0, 1.0], "radius": 0.3}
+ELLIPSE = {
+    "kind": "disc",
+    "centre": [0.5, 0.5, 0.5],
+    "normal": [0.0, 0.0, 1.0],
+    "radii": [0.3, 0.2],
+    "axis": [1.0, 0.0, 0.0],
+}
+SQUARE = {
+    "kind": "polygon",
+    "points": [[0.2, 0.2, 0.5], [0.8, 0.2, 0.5], [0.8, 0.8, 0.5], [0.2, 0.8, 0.5]],
+}
+MOVES = {"kind": "dynamic", "duration": 1.0}
+HEAVY = {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0}
+HEAVY3 = {"young": 1.0, "poisson": 0.3, "density": 1.0}
+MEMBRANE = {
+    "geometry": {"kind": "file", "file": "a.vtu", "dimension": 3, "cells": "surface"},
+    "mesh": {"pattern": "given"},
+}
+THIN = {"young": 1.0, "poisson": 0.3, "thickness": 0.1}
+
+
+def held(**more):
+    return [{"where": "boundary", "displacement": [0.0, 0.0], **more}]
+
+
+def held3(**more):
+    return [{"where": "boundary", "displacement": [0.0, 0.0, 0.0], **more}]
+
+
+def factor(**more):
+    return [{"kind": "stress_intensity", "name": "K", **more}]
+
+
+def part(**more):
+    return [{"kind": "part", "name": "m", "point": [0.5, 0.9], **more}]
+
+
+# fmt: off
+BROKEN = [
+    ({"material": {"young": 1.0, "poisson": 0.3}},
+     "material.plane: a 2D scene needs plane = 'strain' or 'stress'"),
+    ({"d": 3, "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"}},
+     "material.plane: belongs to 2D scenes"),
+    ({"mesh": {"cells": [[4, 4, 4]]}}, "mesh.cells: [4, 4, 4] has 3 numbers; expected 2"),
+    ({"mesh": {"pattern": "given"}},
+     "mesh.pattern: 'given' and a geometry of kind 'file' or 'skin' belong together"),
+    ({"geometry": {"kind": "polygon", "corners": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]},
+      "mesh": {"sizes": [0.1]}},
+     "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"),
+    ({"supports": []}, "supports: a static scene needs at least one"),
+    ({"supports": held(components=["x", "z"])}, "supports[0].components: z in a 2D scene"),
+    ({"supports": [{"where": "boundary", "displacement": [0.0]}]},
+     "supports[0].displacement: 1 values; expected 2"),
+    ({"supports": held(rotation={"angle": 1.0, "centre": [0.0, 0.0, 0.0]})},
+     "supports[0].rotation.centre: expected 2 coordinates"),
+    ({"d": 3, "supports": held3(rotation={"angle": 1.0, "centre": [0.0, 0.0, 0.0]})},
+     "supports[0].rotation.axis: 3D needs one"),
+    ({"supports": held(rotation={"angle": 1.0, "centre": [0.0, 0.0], "axis": [0.0, 0.0, 1.0]})},
+     "supports[0].rotation.axis: belongs to 3D scenes"),
+    ({"d": 3, "supports": held3(rotation={"angle": 1.0, "centre": [0.0, 0.0, 0.0], "axis": [0.0,
+      0.0, 0.0]})},
+     "supports[0].rotation.axis: is zero"),
+    ({"loads": [{"kind": "cut_faces", "cut": "cat", "pressure": 1.0}], "cuts": [LINE]},
+     "loads[0].cut: no cut 'cat'; did you mean 'cut'?"),
+    ({"d": 3, **MEMBRANE, "material": THIN, "cuts": [SQUARE], "loads": [{"kind": "cut_faces",
+      "pressure": 1.0}]},
+     "loads[0]: the cuts of a membrane have no faces that a load acts on"),
+    ({"cuts": [PATH2], "analysis": MOVES, "material": HEAVY, "loads": [{"kind": "cut_faces",
+      "pressure": 1.0}]},
+     "loads[0].cut: 'cut' is opened on the way; its faces bear no load"),
+    ({"cuts": [LINE], "loads": [{"kind": "cut_faces", "traction": [1.0]}]},
+     "loads[0].traction: 1 values; expected 2"),
+    ({"material": HEAVY, "loads": [{"kind": "gravity", "acceleration": [0.0, 0.0, -9.81]}]},
+     "loads[0].acceleration: 3 values; expected 2"),
+    ({"loads": [{"kind": "gravity", "acceleration": [0.0, -9.81]}]},
+     "loads[0]: gravity needs material.density"),
+    ({"loads": [{"kind": "body_force", "force": [1.0, 2.0, 3.0]}]},
+     "loads[0].force: 3 values; expected 2"),
+    ({"loads": [{"kind": "traction", "where": "top", "traction": [1.0]}]},
+     "loads[0].traction: 1 values; expected 2"),
+    ({"cuts": [DISC]}, "cuts[0]: a disc cut in a 2D scene"),
+    ({"d": 3, **MEMBRANE}, "material.thickness: a membrane needs it"),
+    ({"material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "thickness": 0.1}},
+     "material.thickness: belongs to membranes (cells = 'surface')"),
+    ({"d": 3, **MEMBRANE, "material": THIN},
+     "analysis.kinematics: a membrane has no stiffness across itself but by its rotation; "
+     "expected 'corotational'"),
+    ({"analysis": MOVES}, "material.density: a dynamic analysis needs it"),
+    ({"mesh": {"sizes": [1e-7]}},
+     "mesh.sizes[0]: about 1e+14 nodes in a body of 1 × 1 m; expected at most 1e+10"),
+    ({"analysis": {"kind": "dynamic", "duration": 1.0, "time_step": 1e-12}, "material": HEAVY},
+     "analysis.time_step: 1e+12 steps to the end at 1 s; expected at most 1e+10"),
+    ({"supports": [{"where": "lft", "displacement": [0.0, 0.0]}]},
+     "supports[0].where: no part 'lft'; did you mean 'left'?"),
+    ({"loads": [{"kind": "traction", "where": "x > ", "traction": [1.0, 0.0]}]},
+     "loads[0].where: 'x > ' is not an inequality in x, y, z"),
+    ({"material": {**HEAVY, "regions": [{"where": "x >", "young": 2.0}]}},
+     "material.regions[0].where: 'x >' is not an inequality in x, y, z"),
+    ({"material": {"young": 1.0, "poisson": 0.3, "plane": "strain",
+      "regions": [{"where": "x > 0.5", "density": 2.0}]}},
+     "material.regions[0].density: material.density is missing"),
+    ({"material": {**HEAVY, "regions": [{"where": "x > 5", "young": 2.0}]}},
+     "material.regions[0].where: no part of the body lies in 'x > 5' alone; of regions that "
+     "overlap, the last one counts"),
+    ({"supports": [{"where": "boundary", "displacement": ["q", 0.0]}]},
+     "supports[0].displacement: 'q' in 'q' is not allowed; expected a formula in x, y"),
+    ({"loads": [{"kind": "body_force", "force": ["t", 0.0]}]},
+     "loads[0].force: 't' in 't' is not allowed; expected a formula in x, y"),
+    ({"loads": [{"kind": "traction", "where": "top", "traction": [0.0, "z"]}]},
+     "loads[0].traction: 'z' in 'z' is not allowed; expected a formula in x, y"),
+    ({"cuts": [LINE], "loads": [{"kind": "cut_faces", "traction": ["x +", 0.0]}]},
+     "loads[0].traction: 'x +' is not a formula in x, y"),
+    ({"cuts": [LINE], "loads": [{"kind": "cut_faces", "pressure": "z"}]},
+     "loads[0].pressure: 'z' in 'z' is not allowed; expected a formula in x, y"),
+    ({"analysis": MOVES, "material": HEAVY, "initial": {"kind": "field", "displacement": ["t",
+      0.0]}},
+     "initial.displacement: 't' in 't' is not allowed; expected a formula in x, y"),
+    ({"analysis": MOVES, "material": HEAVY, "initial": {"kind": "field", "velocity": ["z", 0.0]}},
+     "initial.velocity: 'z' in 'z' is not allowed; expected a formula in x, y"),
+    ({"supports": [{"where": "boundary", "displacement": "exact"}]},
+     "supports[0]: 'exact' needs an [exact] solution"),
+    ({"loads": [{"kind": "body_force", "force": "exact"}]},
+     "loads[0]: 'exact' needs an [exact] solution"),
+    ({"analysis": MOVES, "material": HEAVY, "initial": {"kind": "field", "displacement": "exact"}},
+     "initial.displacement: 'exact' needs an [exact] solution"),
+    ({"analysis": MOVES, "material": HEAVY, "initial": {"kind": "field", "velocity": "exact"}},
+     "initial.velocity: 'exact' needs an [exact] solution"),
+    ({"reference": {"kind": "exact"}}, "reference.kind: 'exact' needs an [exact] solution"),
+    ({"cuts": [LINE, LINE]}, "cuts: names must differ, got ['cut', 'cut']"),
+    ({"quantities": [{"kind": "strain_energy"}, {"kind": "strain_energy"}]},
+     "quantities: names must differ, got ['strain_energy', 'strain_energy']"),
+    ({"quantities": [{"kind": "displacement", "name": "u", "point": [0.5, 0.5, 0.5],
+      "component": "x"}]},
+     "quantities[0].point: expected 2 coordinates"),
+    ({"quantities": [{"kind": "displacement", "name": "u", "point": [0.5, 0.5],
+      "component": "z"}]},
+     "quantities[0].component: z in a 2D scene"),
+    ({"quantities": [{"kind": "part", "name": "m", "point": [0.5, 0.5, 0.5],
+      "of": "strain_energy"}]},
+     "quantities[0].point: expected 2 coordinates"),
+    ({"quantities": part(of="inertia", component="x"), "material": HEAVY},
+     "quantities[0].component: inertia in a 2D scene has z"),
+    ({"quantities": part(of="mass")}, "quantities[0]: the mass of a part needs material.density"),
+    ({"quantities": part(of="kinetic_energy"), "material": HEAVY},
+     "quantities[0]: kinetic_energy belongs to a dynamic analysis"),
+    ({"quantities": part(of="kinetic_energy", time=0.55), "material": HEAVY, "analysis": MOVES},
+     "quantities[0].time: 0.55 s is no output time"),
+    ({"quantities": [{"kind": "opening", "name": "o", "cut": "cat", "at": 0.5}], "cuts": [LINE]},
+     "quantities[0].cut: no cut 'cat'; did you mean 'cut'?"),
+    ({"quantities": [{"kind": "opening", "name": "o", "point": [0.5, 0.5, 0.5]}], "cuts": [LINE]},
+     "quantities[0].at: an opening in 2D is at 'at = …'"),
+    ({"d": 3, "quantities": [{"kind": "opening", "name": "o", "at": 0.5}], "cuts": [DISC]},
+     "quantities[0].point: an opening in 3D is at 'point = …'"),
+    ({"quantities": factor(cut="cat", end="end"), "cuts": [LINE]},
+     "quantities[0].cut: no cut 'cat'; did you mean 'cut'?"),
+    ({"quantities": factor(mode="III", end="end", radius=0.1), "cuts": [LINE]},
+     "quantities[0].mode: III belongs to 3D scenes"),
+    ({"d": 3, "quantities": factor(end="end"), "cuts": [PATH3], "analysis": MOVES,
+      "material": HEAVY3},
+     "quantities[0].mode: III alone is measured behind the blade of a tool_path"),
+    ({"quantities": factor(), "cuts": [LINE]}, "quantities[0].end: a factor in 2D is at 'end = …'"),
+    ({"d": 3, "quantities": factor(end="end"), "cuts": [DISC]},
+     "quantities[0].point: a factor in 3D is at 'point = …'"),
+    ({"quantities": factor(end="end"), "cuts": [ARC]},
+     "quantities[0].cut: 'cut' is closed and has no end"),
+    ({"d": 3, "quantities": factor(point=[0.8, 0.5, 0.5]), "cuts": [ELLIPSE]},
+     "quantities[0].cut: factors in 3D are known along the fronts of round discs and of polygons"),
+    ({"d": 3, "quantities": factor(point=[0.7, 0.5, 0.5]), "cuts": [DISC]},
+     "quantities[0].point: is 0.1 m away from the front of 'cut'"),
+    ({"d": 3, "quantities": factor(point=[0.9, 0.5, 0.5]), "cuts": [SQUARE]},
+     "quantities[0].point: is 0.1 m away from the front of 'cut'"),
+    ({"quantities": [{"kind": "maximum_displacement", "name": "energy_norm"}]},
+     "quantities[0].name: 'energy_norm' names an error; take another"),
+    ({"acceptance": [{"check": "error", "metric": "enrgy_norm", "at_most": 0.1}]},
+     "acceptance[0].metric: no 'enrgy_norm'; did you mean 'energy_norm'?"),
+    ({"acceptance": [{"check": "error", "metric": "jump_l2", "at_most": 0.1}]},
+     "acceptance[0].metric: jump_l2 needs a cut"),
+    ({"cuts": [LINE], "acceptance": [{"check": "ratio", "metric": "overlap_depth",
+      "at_most": 1.0}]},
+     "acceptance[0].metric: overlap_depth has no ratio; expected a check 'error' (at most, "
+     "m) or 'value'"),
+    ({"acceptance": [{"check": "error", "metric": "energy_drift", "at_most": 0.1}]},
+     "acceptance[0].metric: energy_drift belongs to a dynamic analysis"),
+    ({"acceptance": [{"check": "rate", "metric": "energy_norm", "at_least": 1.0}]},
+     "acceptance[0]: a rate needs at least three mesh levels"),
+    ({"known_findings": [{"solver": "xfem", "check": "rate", "metric": "energy_norm",
+      "reason": "so"}]},
+     "known_findings[0]: no check 'rate of energy_norm' is made of 'xfem'; the case makes none"),
+    ({"adequacy": {"motion": True}}, "adequacy.motion: belongs to a dynamic analysis"),
+    ({"d": 3, **MEMBRANE, "material": THIN, "analysis": {"kinematics": "corotational"},
+      "adequacy": {"kinematics": True}},
+     "adequacy.kinematics: a membrane has no linear kinematics"),
+    ({"adequacy": {"kinematics": True}, "cuts": [PATH2], "material": HEAVY, "analysis": {**MOVES,
+      "time_step": 0.1}, "replay": {}},
+     "adequacy: a tool_path with a table [replay] is for `verify play`"),
+    ({"supports": [{"where": "x > 5", "displacement": [0.0, 0.0]}]},
+     "supports[0].where: no node of the boundary lies in 'x > 5'"),
+    ({"quantities": [{"kind": "maximum_displacement", "time": 0.5}]},
+     "quantities[0].time: belongs to a dynamic analysis"),
+    ({"quantities": [{"kind": "maximum_displacement", "time": 1.5}], "material": HEAVY,
+      "analysis": MOVES},
+     "quantities[0].time: 1.5 s is after the end, 1 s"),
+    ({"cuts": [{**LINE, "opens_at": 0.5}]}, "cuts[0].opens_at: belongs to a dynamic analysis"),
+    ({"cuts": [{**LINE, "opens_at": 1.5}], "material": HEAVY, "analysis": MOVES},
+     "cuts[0].opens_at: 1.5 s is after the end, 1 s"),
+    ({"supports": held(history=[[0.0, 1.0]])},
+     "supports[0].history: belongs to a dynamic analysis"),
+    ({"loads": [{"kind": "body_force", "force": [1.0, 0.0], "history": [[0.0, 1.0]]}]},
+     "loads[0].history: belongs to a dynamic analysis"),
+    ({"initial": {"kind": "equilibrium"}}, "initial: belongs to a dynamic analysis"),
+    ({"material": HEAVY, "analysis": MOVES, "initial": {"kind": "field", "displacement": [1.0]}},
+     "initial.displacement: 1 values; expected 2"),
+    ({"material": HEAVY, "analysis": MOVES, "initial": {"kind": "field", "velocity": [1.0]}},
+     "initial.velocity: 1 values; expected 2"),
+    ({"material": HEAVY, "analysis": MOVES, "initial": {"kind": "moving", "spin": 1.0,
+      "centre": [0.0, 0.0, 0.0]}},
+     "initial.centre: 3 values; expected 2"),
+    ({"material": HEAVY, "analysis": MOVES, "initial": {"kind": "moving", "spin": [0.0, 0.0,
+      1.0]}},
+     "initial.spin: expected a number"),
+    ({"d": 3, "material": HEAVY3, "analysis": MOVES, "initial": {"kind": "moving", "spin": 1.0}},
+     "initial.spin: expected three numbers"),
+    ({"cuts": [{**LINE, "points": [[2.0, 0.5], [3.0, 0.5]]}]},
+     "cuts[0] ('cut'): lies outside the body or along its boundary; it cuts nothing"),
+    ({"quantities": [{"kind": "displacement", "name": "u", "point": [1.5, 0.5],
+      "component": "x"}]},
+     "quantities[0].point: (1.5, 0.5), which is not in the body"),
+    ({"cuts": [{**PATH2, "starts_at": 0.0, "points": [[-0.5, 0.5], [0.5, 0.5]]}]},
+     "cuts[0]: a tool_path takes time; it needs a dynamic analysis"),
+    ({"cuts": [{**PATH2, "speed": 0.1}], "material": HEAVY, "analysis": MOVES},
+     "cuts[0]: the tool arrives at 5 s, after the end of the analysis at 1 s"),
+    ({"replay": {}}, "replay: needs a dynamic analysis with a time_step"),
+    ({"cuts": [LINE], "material": HEAVY, "analysis": {**MOVES, "time_step": 0.1},
+      "replay": {"pulls": [{"at": [0.5, 0.6, 0.5], "radius": 0.1, "side": "positive",
+      "force": [0.0, 1.0, 0.0], "begin": 0.0, "duration": 1.0}]}},
+     "replay.pulls[0].at: 3 coordinates in a 2D scene"),
+    ({"cuts": [LINE], "material": HEAVY, "analysis": {**MOVES, "time_step": 0.1},
+      "replay": {"pulls": [{"at": [0.5, 0.6], "cut": "cat", "radius": 0.1, "side": "positive",
+      "force": [0.0, 1.0], "begin": 0.0, "duration": 1.0}]}},
+     "replay.pulls[0].cut: no cut 'cat'; did you mean 'cut'?"),
+    ({"cuts": [LINE], "material": HEAVY, "analysis": {**MOVES, "time_step": 0.1},
+      "replay": {"pulls": [{"at": [0.5, 0.6], "radius": 0.1, "side": "positive", "force": [0.0,
+      1.0], "begin": 1.0, "duration": 1.0}]}},
+     "replay.pulls[0].begin: 1 s is after the end of the analysis"),
+    ({"material": HEAVY, "analysis": {**MOVES, "time_step": 0.1}, "replay": {"visual": 10}},
+     "replay.visual: a plane body or membrane is its own surface"),
+    ({"material": HEAVY, "analysis": {**MOVES, "time_step": 0.1}, "replay": {"collision": 10}},
+     "replay.collision: a plane body or membrane is its own surface"),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize("changes, message", BROKEN, ids=[message for _, message in BROKEN])
+def test_a_broken_rule_is_named_with_its_place(changes, message):
+    with pytest.raises(ValidationError) as caught:
+        scenes.scene(**changes)
+    (fault,) = caught.value.errors()
+    assert fault["msg"].removeprefix("Value error, ").startswith(message)
+
+
+def test_every_rule_is_broken_by_one_of_these():
+    """A rule that nothing breaks says nothing, or its condition is misspelt."""
+    for place, _, text in RULES:
+        where = re.escape(re.sub(r"\[[\w*]+\]", "[0]", place)) + (": " if place else "")
+        said = re.compile(where + ".*".join(map(re.escape, re.split(r"{.*?}", text))))
+        assert any(said.match(message) for _, message in BROKEN), (place, text)
