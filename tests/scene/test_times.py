@@ -237,6 +237,16 @@ def test_steps_are_counted_from_output_to_output(tmp_path):
     assert steps == [10, 10, 20, 30]
 
 
+def test_the_top_speed_is_of_either_end_of_a_blade():
+    path = ToolPathCut(
+        kind="tool_path", points=[[0, 0, 0], [0.3, 0, 0], [0.3, 0.4, 0], [0.3, 0.4, 0]],
+        times=[0.0, 0.2, 0.5, 0.5], depth=2.0,
+        direction=[[0, 0, 1], [0, 0, 1], [0, 3, 4], [0, 3, 4]],
+    )  # fmt: skip
+    # the other end moves by (0, 0.4 + 1.2, -0.4) in 0.3 s
+    assert path.top_speed == pytest.approx(np.hypot(1.6, 0.4) / 0.3)
+
+
 def test_an_opening_rule_is_for_what_moves(tmp_path):
     with pytest.raises(InputError, match="opening: it belongs to a dynamic analysis"):
         load(tmp_path, STATIC + HELD + '[analysis]\nopening = "swept"\n')

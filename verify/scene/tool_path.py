@@ -137,6 +137,14 @@ class ToolPathCut(CutShape):
         blade = (self.depth or 0.0) * directions / lengths
         return np.broadcast_to(blade, (len(self.points), 3)).copy()
 
+    @property
+    def top_speed(self) -> float:
+        """Largest speed of an end of the blade, m/s."""
+        tips, blades = self._tips(), self._blades()
+        lasting = np.diff(self.moments) > 0.0
+        moves = [np.linalg.norm(np.diff(end, axis=0), axis=1) for end in (tips, tips + blades)]
+        return float(np.max(np.array(moves)[:, lasting] / np.diff(self.moments)[lasting]))
+
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Points (n, d) of the tip, each once; `spacing` does not matter to straight segments."""
         tips = np.array(self.points, dtype=float)

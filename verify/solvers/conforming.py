@@ -1,6 +1,7 @@
 """Adapters of the FEniCSx side: conforming elements at equal h, and the reference itself."""
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 from reference.boundary_values import constrained_values, support_ends
@@ -201,7 +202,7 @@ def _solve(
         if scene.analysis.kind == "static":
             fields = _equilibrium(scene, space, exact, pressure, record)
         else:
-            how = marching(level, size)
+            how = replace(marching(level, size), element=size)
             motion = TiedMotion(scene, space, exact, how, record, comm, pressure)
             fields = motion.run(trial)
         return _solution(scene, space, record, fields, size)

@@ -22,7 +22,7 @@ from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
 from verify.solvers.account import Account
 from verify.solvers.runs import Record
-from verify.solvers.timeline import march, step_sizes, timeline_of
+from verify.solvers.timeline import blade_advance, march, step_sizes, timeline_of
 
 Array = NDArray[np.float64]
 _JUST = 1e-12  # of the duration: loads are taken that much later, after a jump
@@ -49,6 +49,8 @@ class Marching:
         As of `timeline.march`.
     opening : {"late", "swept"}
         When facets behind a blade open; see docs/theory/dynamics.md.
+    element : float
+        Size of the elements, m.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Marching:
     delay: float = 0.0
     halvings: int = 0
     opening: str = "late"
+    element: float = np.nan
 
     def scheme(self) -> tuple[Scheme, bool]:
         """Give the scheme, and whether the internal force is the mean of a step."""
@@ -158,6 +161,7 @@ class TiedMotion:
         }
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["openings"] = str(self.openings)
+            record.notes |= blade_advance(self.scene, sizes, marching.element)
         linear = self.scene.analysis.kinematics == "linear"
         return {
             "times": self.timeline.outputs[: len(self.outputs)],

@@ -18,10 +18,11 @@ from verify.scene.initial import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.loads_of_scene import forces_of, is_moving
+from verify.solvers.openings_of_scene import Openings
 from verify.solvers.runs import Record
 from verify.solvers.staged_account import StagedAccount
 from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports
-from verify.solvers.timeline import Timeline, march, step_sizes
+from verify.solvers.timeline import Timeline, blade_advance, march, step_sizes
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
@@ -46,6 +47,8 @@ class OpeningBody(Protocol):
 
     Attributes
     ----------
+    openings : Openings
+        When the cuts open.
     removal : bool
         Whether openings take material away.
     rule : str
@@ -56,6 +59,7 @@ class OpeningBody(Protocol):
         What the time of `events` and `at` is listed as.
     """
 
+    openings: Openings
     removal: bool
     rule: str
     mass: str
@@ -307,6 +311,7 @@ class CutMotion:
         }
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["a tool path opens"] = self.opening.rule
+            record.notes |= blade_advance(self.scene, sizes, self.opening.openings.size)
 
 
 def _body_in_motion(scene: Scene, force: InternalForce, mass: Mass, exact: Any) -> DynamicBody:

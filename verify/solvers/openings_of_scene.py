@@ -78,6 +78,8 @@ class Openings:
         One of `verify.solvers.timeline.OPENINGS`.
     close : float
         Times that differ by no more are one, s.
+    size : float
+        Of the elements, m.
     """
 
     asked: list[Any]
@@ -85,6 +87,7 @@ class Openings:
     times: list[float]
     rule: str = "late"
     close: float = 0.0
+    size: float = np.nan
 
     def of_cells(self, phantom: PhantomMesh) -> Opened:
         """Return when each cut opens each cell that it splits: (m, cuts).
@@ -159,6 +162,7 @@ def openings_of(scene: Scene, size: float, timeline: Timeline, rule: str) -> Ope
         timeline.opens[order].tolist(),
         rule,
         timeline.close,
+        size,
     )
 
 
