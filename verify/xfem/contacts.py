@@ -106,12 +106,9 @@ def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, In
         label=phantom.label[stays],
         node_parent=node_parent,
         sub_cells=replace(sub, piece=number[into[sub.piece]]),
+        # the cut has moved past nodes, but unknowns stay on their sides
+        kept_side=phantom.node_side[np.argsort(node)[np.count_nonzero(node < 0) :]],
     )
-    # the cut has moved past nodes, but unknowns stay on their sides: this takes the place of the
-    # cached property, until a `replace` makes another mesh
-    treated.__dict__["node_side"] = phantom.node_side[
-        np.argsort(node)[np.count_nonzero(node < 0) :]
-    ]
     row, corner = np.nonzero(node[phantom.cells[gone]] < 0)
     lost = phantom.cells[gone][row, corner]
     # an unknown that several absorbed pieces used takes the mean of what they follow

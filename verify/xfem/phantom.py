@@ -117,6 +117,9 @@ class PhantomMesh:
         the cell that each may have.
     aggregation : Constraint, optional
         Corners that follow the dof nodes of a root cell.
+    kept_side : (N, cuts) int8 array, optional
+        Sides that dof nodes keep where the cut has moved past them; without it `node_side` follows
+        from the pieces.
     """
 
     mesh: SimplexMesh
@@ -130,6 +133,7 @@ class PhantomMesh:
     snapped: int
     dropped: int
     aggregation: Constraint | None = None
+    kept_side: Sides | None = None
 
     @property
     def node_count(self) -> int:
@@ -206,6 +210,8 @@ class PhantomMesh:
         """(N, cuts) side of each cut on which the material of a dof node lies."""
         if self.aggregation is not None:
             return self.corners.node_side[self.node_corner]
+        if self.kept_side is not None:
+            return self.kept_side
         share = np.where(self.split, self.fraction, 0.0)
         return node_sides(
             self.level_sets, self.node_parent, self.cells, self.label, self.piece_side, share
