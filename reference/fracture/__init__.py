@@ -6,7 +6,7 @@ They are computed from a `verify.solution.Solution` alone, so from any solver's.
 from reference.fracture.domain import DomainError
 from reference.fracture.front import CircularFront, Front, FrontCoordinates, StraightFront
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
-from reference.fracture.fronts import front_at, front_reach
+from reference.fracture.fronts import front_at, front_reach, station_count, station_spacing
 from reference.fracture.intensity import StressIntensity, stress_intensity
 from reference.fracture.tips import Tip, no_tip, tips
 
@@ -23,6 +23,8 @@ __all__ = [
     "front_intensity",
     "front_reach",
     "no_tip",
+    "station_count",
+    "station_spacing",
     "stress_intensity",
     "tips",
 ]

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 # Radii of the domains, of the reach: a straight front has no axis that they must stay away from.
 _ROUND, _STRAIGHT = (0.5, 0.65, 0.8), (0.6, 0.75, 0.9)
 _AROUND = 64  # places on the front from which distances are taken
+_STATIONS = (12, 3)  # hats of 30 degrees along a round front; along a straight one
 # Of the way to the nearer end of a straight front: where it meets a wall at an angle, a domain
 # that went all the way would leave the body on one side.
 _WAY = 0.75
@@ -35,6 +36,16 @@ def front_at(scene: Scene, asked: StressIntensityQuantity) -> tuple[Front, Array
     spoke, radius = point - np.asarray(cut.centre), float(cut.radius or 0.0)
     front = CircularFront(cut.centre, cut.normal, radius, towards=spoke)
     return front, reach * np.array(_ROUND)
+
+
+def station_count(front: Front) -> int:
+    """Return the number of hats along a front that give the factor at a point of it."""
+    return _STATIONS[0] if front.closed else _STATIONS[1]
+
+
+def station_spacing(front: Front) -> float:
+    """Distance of neighbouring hats, m; nodes farther apart leave one of them without a node."""
+    return front.length / (station_count(front) + (0 if front.closed else 1))
 
 
 def front_reach(scene: Scene, asked: StressIntensityQuantity) -> float:

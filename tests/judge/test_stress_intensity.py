@@ -354,6 +354,22 @@ def test_a_domain_fits_around_any_front_on_the_first_level_of_a_reference_of_def
         assert len(mesh.cells) < 40_000
 
 
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("thick", [0.3, 0.17])
+def test_a_front_across_a_slab_has_nodes_within_each_hat_on_the_first_level(thick):
+    """Hats are closer than elements that fit the domains: one without a node was refused."""
+    slab = scenes.box([0.6, 0.6, thick], [-0.6, -0.6, 0.0])
+    corners = [[0.0, -0.1], [-0.8, -0.1], [-0.8, thick + 0.1], [0.0, thick + 0.1]]
+    cut = {"kind": "polygon", "points": [[x, 0.1 * x, z] for x, z in corners]}
+    asked = {"kind": "stress_intensity", "name": "K", "mode": "III",
+             "point": [0.0, 0.0, 0.5 * thick]}  # fmt: skip
+    scene = scenes.scene([cut], d=3, geometry=slab, quantities=[asked], reference={"size": 0.4})
+    mesh, _ = reference_mesh(scene, 0)
+    still = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))
+    assert solution_intensity(scene, still, scene.quantities[0]) == 0.0
+    assert len(mesh.cells) < 4_000
+
+
 @pytest.mark.heavy
 @pytest.mark.fenicsx
 def test_a_small_penny_has_its_factors_on_the_first_level_of_a_reference_of_default_size():

@@ -6,9 +6,6 @@ from verify.scene import Box, Material, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Solution
 
-_STATIONS = 12  # hats of 30 degrees along a round front
-
-
 def front_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a factor at a front cannot be had from any solution of a scene, or None."""
     if not isinstance(scene.geometry, Box):
@@ -38,12 +35,12 @@ def front_factors(
     InputError
         If the mesh is too coarse for the domains.
     """
-    from reference.fracture import front_at, front_intensity
+    from reference.fracture import front_at, front_intensity, station_count
 
     front, radii = front_at(scene, asked)
-    stations, middle = (_STATIONS, 0) if front.closed else (3, 1)
+    middle = 0 if front.closed else 1
     found = front_intensity(
-        solution, material, front, radii, stations=stations, fitted=False, **moving
+        solution, material, front, radii, stations=station_count(front), fitted=False, **moving
     ).modes
     around = found[middle - 1] - 2.0 * found[middle] + found[middle + 1]
     k_1, k_2, k_3 = found[middle] - around / 12.0

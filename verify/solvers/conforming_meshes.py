@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.fracture import Front, front_at
+from reference.fracture import Front, front_at, station_spacing
 from reference.meshing import (
     ConformingMesh,
     Grading,
@@ -123,14 +123,22 @@ def _solid_grading(scene: Scene) -> Grading:
 
 
 def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
-    """Fronts at which the scene asks for factors, each with the radius of its smallest domain."""
+    """Fronts at which the scene asks for factors, each with the radius that elements must fit.
+
+    That of the smallest domain, unless a hat along the front would lie between their nodes: it is
+    two spacings wide, of which a quarter is left for nodes that are not evenly spaced.
+    """
     asked = [
         q
         for q in scene.quantities
         if isinstance(q, StressIntensityQuantity) and q.point is not None
     ]
     found = [front_at(scene, one) for one in asked]
-    return [(front, float(radii.min())) for front, radii in found if radii.min() > 0.0]
+    return [
+        (front, min(float(radii.min()), 1.5 * station_spacing(front) / _FRONT_SHARE))
+        for front, radii in found
+        if radii.min() > 0.0
+    ]
 
 
 def _way(scene: Scene, size: float) -> float | None:
