@@ -6,6 +6,7 @@ from verify.scene import Box, Material, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Solution
 
+
 def front_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a factor at a front cannot be had from any solution of a scene, or None."""
     if not isinstance(scene.geometry, Box):
