@@ -22,7 +22,7 @@ from reference.meshing.session import (
 )
 from reference.meshing.solid import solid_mesh
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene, ToolPathCut
+from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene
 
 Array = NDArray[np.float64]
 
@@ -156,7 +156,7 @@ def _fragment(gmsh: ModuleType, surface: int, curves: list[int], met: list[int])
 
 def _ways(scene: Scene) -> list[str]:
     """Names of the features that a blade cuts on its way."""
-    return [f"cut '{cut.name}'" for cut in scene.cuts if isinstance(cut, ToolPathCut)]
+    return [f"cut '{cut.name}'" for cut in scene.cuts if cut.on_the_way]
 
 
 def _set_sizes(

@@ -16,7 +16,6 @@ from verify.geometry.nearest import feet
 from verify.geometry.patches import PlanePatch
 from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
-from verify.scene.cuts import PolygonCut, SweptCut
 from verify.scene.mesh_file import read_mesh
 from verify.scene.tool_path import Cut
 
@@ -79,7 +78,7 @@ def cut_membrane(points: Array, cells: NDArray[np.int64], asked: Sequence[Cut]) 
     """
     cuts, lines = {}, {}
     for cut in asked:
-        if not isinstance(cut, PolygonCut | SweptCut):
+        if not cut.faceted:
             raise UnsupportedSceneError(
                 f"a cut of kind '{cut.kind}' through a membrane cannot be compared on yet; "
                 "polygons and swept polylines can"

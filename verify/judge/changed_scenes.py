@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from verify.compare.realised_geometry import polylines_of, triangles_of
 from verify.errors import UnsupportedSceneError
-from verify.scene import Scene, ToolPathCut
+from verify.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     UnsupportedSceneError
         If its cuts open at different times, or a part of the realised cut can be none of a scene.
     """
-    if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
+    if any(cut.on_the_way for cut in scene.cuts):
         raise UnsupportedSceneError("a realised cut does not say when the blade passes")
     opens = {float(getattr(cut, "opens_at", 0.0)) for cut in scene.cuts}
     if len(opens) > 1:

@@ -5,7 +5,7 @@ from math import inf
 
 from verify.compare.body import AnyBody
 from verify.compare.realised import cut_deviation
-from verify.scene import Scene, ToolPathCut
+from verify.scene import Scene
 from verify.solution import Solution
 
 _ON_THE_CUT = 1e-10  # of the body's size
@@ -52,4 +52,4 @@ def error_fall(
 
 def cut_on_the_way(scene: Scene) -> bool:
     """Whether a blade cuts on its way in a scene."""
-    return any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+    return any(cut.on_the_way for cut in scene.cuts)

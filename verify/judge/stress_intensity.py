@@ -13,11 +13,9 @@ from verify.scene import (
     ArcCut,
     BodyForce,
     CutFaces,
-    DiscCut,
     Gravity,
     Material,
     MeshFile,
-    PolygonCut,
     PolylineCut,
     Scene,
     ToolPathCut,
@@ -64,20 +62,13 @@ def _defect_on_faces(scene: Scene, asked: StressIntensityQuantity) -> str | None
     for load in _face_loads(scene, asked):
         if not is_uniform(load.components):
             return f"the load on the faces of cut '{asked.cut}' is not uniform"
-        if load.traction is not None and not _is_plane(scene, asked.cut):
+        if load.traction is not None and _normal(scene, asked.cut) is None:
             return f"tractions are borne by the faces of cut '{asked.cut}', which is not plane"
     return None
 
 
 def _face_loads(scene: Scene, asked: StressIntensityQuantity) -> list[CutFaces]:
     return [load for load in scene.loads if isinstance(load, CutFaces) and load.cut == asked.cut]
-
-
-def _is_plane(scene: Scene, name: str) -> bool:
-    cut = next(cut for cut in scene.final_cuts if cut.name == name)
-    if isinstance(cut, PolylineCut):
-        return len(cut.points) == 2
-    return isinstance(cut, DiscCut | PolygonCut)
 
 
 def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
@@ -176,6 +167,7 @@ def _with_free_faces(
             stress += values[0] * np.eye(d)
         else:
             normal = _normal(scene, asked.cut)
+            assert normal is not None  # else it is a defect
             stress += np.outer(values, normal) + np.outer(normal, values)
             stress -= (values @ normal) * np.outer(normal, normal)
     from reference.exact.hooke import hooke
@@ -186,16 +178,10 @@ def _with_free_faces(
     return replace(solution, displacement=solution.displacement + solution.points @ strain)
 
 
-def _normal(scene: Scene, name: str) -> Array:
-    """Give the unit normal of a plane cut, towards its positive side."""
+def _normal(scene: Scene, name: str) -> Array | None:
+    """Give the unit normal of a cut, towards its positive side; None if the cut is not plane."""
     cut = next(cut for cut in scene.final_cuts if cut.name == name)
-    if isinstance(cut, DiscCut):
-        return cut.axes()[2]
-    if isinstance(cut, PolygonCut):
-        return cut.normal
-    assert isinstance(cut, PolylineCut)
-    along = np.subtract(cut.points[1], cut.points[0])
-    return np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    return cut.plane_normal
 
 
 def _material_around(scene: Scene, tip: Array, radius: float) -> Material:

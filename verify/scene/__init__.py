@@ -2,22 +2,15 @@
 
 from verify.scene.acceptance import (
     BoundCheck,
-    DisplacementQuantity,
-    KnownFinding,
-    MaximumDisplacementQuantity,
-    OpeningQuantity,
     PartQuantity,
     RateCheck,
     RatioCheck,
-    StrainEnergyQuantity,
-    StressIntensityQuantity,
     ValueCheck,
 )
 from verify.scene.cuts import (
     ArcCut,
     CylinderCut,
     DiscCut,
-    Faces,
     PolygonCut,
     PolylineCut,
     SphereCut,
@@ -27,13 +20,11 @@ from verify.scene.cuts import (
 from verify.scene.geometry import (
     Box,
     MeshFile,
-    MeshLevels,
     Polygon,
     Rectangle,
-    ReferenceLevels,
     Skin,
 )
-from verify.scene.initial import AtRest, Equilibrium, InitialField, Moving
+from verify.scene.initial import Equilibrium, InitialField, Moving
 from verify.scene.loading import (
     case_folder,
     list_cases,
@@ -45,51 +36,38 @@ from verify.scene.loading import (
     scene_hash,
     scene_schema,
 )
-from verify.scene.materials import Material, MaterialRegion, Moduli, crossed_by_interfaces
+from verify.scene.materials import Material, crossed_by_interfaces
 from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
     Analysis,
     BodyForce,
     CutFaces,
-    Exact,
     Gravity,
     Rotation,
     Support,
     Traction,
-    is_timed,
     is_uniform,
 )
-from verify.scene.regions import Region, parse_expression, parse_region
+from verify.scene.regions import parse_expression, parse_region
 from verify.scene.scene import Scene
-from verify.scene.tables import Pull, Replay
-from verify.scene.tool_path import Cut, ToolPathCut
+from verify.scene.tables import Pull
+from verify.scene.tool_path import ToolPathCut
 
 __all__ = [
     "Analysis",
     "ArcCut",
-    "AtRest",
     "BodyForce",
     "BoundCheck",
     "Box",
-    "Cut",
     "CutFaces",
     "CylinderCut",
     "DiscCut",
-    "DisplacementQuantity",
     "Equilibrium",
-    "Exact",
-    "Faces",
     "Gravity",
     "InitialField",
-    "KnownFinding",
     "Material",
-    "MaterialRegion",
-    "MaximumDisplacementQuantity",
     "MeshFile",
-    "MeshLevels",
-    "Moduli",
     "Moving",
-    "OpeningQuantity",
     "PartQuantity",
     "Polygon",
     "PolygonCut",
@@ -98,15 +76,10 @@ __all__ = [
     "RateCheck",
     "RatioCheck",
     "Rectangle",
-    "ReferenceLevels",
-    "Region",
-    "Replay",
     "Rotation",
     "Scene",
     "Skin",
     "SphereCut",
-    "StrainEnergyQuantity",
-    "StressIntensityQuantity",
     "Support",
     "SweptCut",
     "ToolPathCut",
@@ -115,7 +88,6 @@ __all__ = [
     "case_folder",
     "crossed_by_interfaces",
     "faces_of",
-    "is_timed",
     "is_uniform",
     "list_cases",
     "load_scene",

@@ -404,9 +404,6 @@ class SweptCut(_SpatialCut):
         ]
 
 
-SpatialCut = PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut
-
-
 def _defect_of_corners(points: list[Point3]) -> str | None:
     """Why corners are not those of a plane simple polygon, or None if they are."""
     corners = np.array(points, dtype=float)

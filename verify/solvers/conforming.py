@@ -16,7 +16,7 @@ from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
+from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Regularisation, Solution
 from verify.solvers.cells_of_scene import across_interfaces
@@ -166,7 +166,7 @@ class ReferenceSolver:
         opening: str | None = None,
     ) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
-        behind = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+        behind = any(cut.on_the_way for cut in scene.cuts)
         damped = behind or scene.analysis.kinematics == "linear"
         scheme = "generalised_alpha" if damped else "energy_momentum"
         factors = any(isinstance(one, StressIntensityQuantity) for one in scene.quantities)

@@ -30,11 +30,9 @@ from verify.scene import (
     MeshFile,
     Polygon,
     PolygonCut,
-    PolylineCut,
     Rectangle,
     Scene,
     SweptCut,
-    ToolPathCut,
     read_mesh,
 )
 from verify.scene.acceptance import StressIntensityQuantity
@@ -61,7 +59,7 @@ def structure(scene: Scene, level: int) -> tuple[Counts, float]:
 def not_imprinted(scene: Scene) -> str | None:
     """Why the cuts cannot be imprinted on a given mesh, or None if they can."""
     for cut in scene.final_cuts:
-        if not isinstance(cut, PolylineCut | PolygonCut | SweptCut):
+        if not cut.faceted:
             return f"a {cut.kind} cut is not plane in parts: it is not imprinted on a given mesh"
     if isinstance(scene.geometry, Box) and scene.mesh.pattern == "unstructured":
         return "a box has no unstructured background mesh that cuts could be imprinted on"
@@ -143,7 +141,7 @@ def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
 
 def _way(scene: Scene, size: float) -> float | None:
     """Size of elements along what a blade cuts on its way, m; None if none does."""
-    on_its_way = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+    on_its_way = any(cut.on_the_way for cut in scene.cuts)
     return size * _WAY[scene.dimension] if on_its_way else None
 
 

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import PolygonCut, PolylineCut, Scene, SweptCut
+from verify.scene import Scene
 from verify.scene.held_facets import HeldFacets, held_facets, no_node, points_apart, shifted_ends
 from verify.scene.history import factor_at, first_factor
 from verify.scene.physics import PrescribedMotion
-from verify.scene.tool_path import Cut
 from verify.solution import Regularisation
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.body import MovingSupports
@@ -115,18 +114,12 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
 
 
 def _held_parts(scene: Scene, where: str, parts: "_BoundaryParts") -> HeldFacets:
-    straight = all(_is_straight(cut) for cut in scene.cuts)
+    # whether linear level sets realise all cuts as they are asked
+    straight = all(cut.faceted and cut.plane_normal is not None for cut in scene.cuts)
     depth = None if straight else _BESIDE * parts.diameter
     return held_facets(
         scene.geometry, where, parts.corners, parts.boundary.places, parts.facet, depth
     )
-
-
-def _is_straight(cut: Cut) -> bool:
-    """Whether linear level sets realise a cut as it is asked."""
-    if isinstance(cut, PolylineCut | SweptCut):
-        return len(cut.points) == 2
-    return isinstance(cut, PolygonCut)
 
 
 @dataclass(frozen=True)
