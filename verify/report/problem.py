@@ -9,9 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
+from verify.errors import InputError
+from verify.geometry.spatial import rim_edges
 from verify.report.blocks import Drawing
 from verify.report.figures.style import drawing
+from verify.scene.tool_path import Cut
 
 # what says nothing where it is so
 _USUAL: dict[str, Any] = {
@@ -76,6 +80,8 @@ _EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4)
           (3, 7))  # fmt: skip
 
 Points = NDArray[np.float64]
+
+_CUTS: TypeAdapter[Any] = TypeAdapter(Cut)
 
 
 def sketch(scene: Mapping[str, Any]) -> Drawing | None:
@@ -178,36 +184,12 @@ def _load(
 
 
 def cut_lines(cut: Mapping[str, Any]) -> list[Points]:
-    """Return the lines of a cut; none for kinds that a sketch does not know."""
-    points = np.asarray(cut.get("points") or [], dtype=float)
-    match cut.get("kind"):
-        case "polyline":
-            return [points]
-        case "tool_path" if points.shape[1] == 2 or not isinstance(cut.get("depth"), int | float):
-            return [points]
-        case "tool_path":
-            way = cut.get("direction")
-            plain = isinstance(way, list) and all(isinstance(v, int | float) for v in way)
-            reach = np.asarray(way, dtype=float) if plain else np.array([0.0, 0.0, -1.0])
-            return _swept(points, cut["depth"] * reach / (np.linalg.norm(reach) or 1.0))
-        case "polygon":
-            return [_closed(points)]
-        case "swept":
-            return _swept(points, np.asarray(cut["along"], dtype=float))
-        case "arc":
-            angles = np.deg2rad(cut["start"] + np.linspace(0.0, cut["sweep"], 60))
-            turned = np.column_stack([np.cos(angles), np.sin(angles)])
-            return [np.asarray(cut["centre"]) + cut["radius"] * turned]
-        case "disc" if cut.get("radius"):
-            normal = np.asarray(cut["normal"], dtype=float)
-            normal /= np.linalg.norm(normal)
-            first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-            first /= np.linalg.norm(first)
-            turn = np.linspace(0.0, 2 * np.pi, 60)[:, None]
-            ring = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
-            return [np.asarray(cut["centre"]) + cut["radius"] * ring]
-    return []
-
-
-def _swept(points: Points, along: Points) -> list[Points]:
-    return [_closed(np.vstack([points, points[::-1] + along]))]
+    """Return the lines of a cut: itself in the plane, its rim in space, with not-a-number gaps."""
+    try:
+        shape = _CUTS.validate_python(cut).whole()
+    except (InputError, ValidationError):  # of a blade that sweeps no plane, or of another version
+        return [np.asarray(cut["points"], dtype=float)] if cut.get("points") else []
+    if shape.dimension == 2:
+        return [shape.vertices()]
+    rim = np.pad(rim_edges(shape.facets()), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    return [rim.reshape(-1, 3)] if len(rim) else []
