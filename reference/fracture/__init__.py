@@ -3,11 +3,10 @@
 They are computed from a `verify.solution.Solution` alone, so from any solver's.
 """
 
-from reference.fracture.domain import DomainError
 from reference.fracture.front import CircularFront, Front, FrontCoordinates, StraightFront
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
 from reference.fracture.fronts import front_at, front_reach, station_count, station_spacing
-from reference.fracture.intensity import StressIntensity, stress_intensity
+from reference.fracture.intensity import DomainError, StressIntensity, stress_intensity
 from reference.fracture.tips import Tip, no_tip, tips
 
 __all__ = [

@@ -1,11 +1,22 @@
-"""Displacement gradients of a finite element field at quadrature points."""
+"""A finite element field at quadrature points of cells: gradients, stress, and the force it bears.
 
+The stress of a mixed solution has the pressure that its displacement determines. The force per
+volume that balances the stress is what is given, less the inertia.
+"""
+
+from collections.abc import Callable
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import cg
 
+from reference.exact.hooke import Hooke
+from verify.errors import InputError
+from verify.scene import Material
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -13,6 +24,9 @@ Array = NDArray[np.float64]
 # 4 in space, where a tube has a hundred times the cells of a ring
 _ORDER = {2: 6, 3: 3}
 _EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of VTK; the first three in the plane
+MIXED = "displacement and pressure"  # what a solution's note on its unknowns says
+_CHUNK = 20_000  # cells
+Force = Array | Callable[[Array], Array] | None
 
 
 class CellGradients(NamedTuple):
@@ -107,3 +121,116 @@ def _quadratic(xi: Array) -> tuple[Array, Array]:
         4 * (corner[:, i, None] * slope[:, j] + corner[:, j, None] * slope[:, i]) for i, j in ends
     ]
     return np.stack(shape, axis=1), np.stack(slopes, axis=1)
+
+
+class NodalPressure:
+    """Continuous linear pressures, p = λ div u in the mean with every one of them (Taylor–Hood).
+
+    That is the equation by which `reference.elasticity` finds both, so that this is
+    the pressure it found, though a solution keeps its displacement only. λ div u itself is off by
+    far more where ν is near ½.
+
+    Parameters
+    ----------
+    solution : Solution
+        Quadratic.
+    law : Hooke
+    step : int
+        Which output time; default the last.
+    """
+
+    def __init__(self, solution: Solution, law: Hooke, step: int = -1) -> None:
+        d = solution.dimension
+        corners, self._place = np.unique(solution.cells[:, : d + 1], return_inverse=True)
+        self._place = self._place.reshape(-1, d + 1)
+        right, measure = np.zeros(len(corners)), np.empty(len(self._place))
+        for start in range(0, len(self._place), _CHUNK):
+            cells = np.arange(start, min(start + _CHUNK, len(self._place)))
+            at = cell_gradients(solution, cells, step)
+            divergence = np.trace(at.gradient, axis1=2, axis2=3) * at.weights
+            shares = law.lame * divergence @ at.corner_shares
+            right += np.bincount(self._place[cells].ravel(), shares.ravel(), len(corners))
+            measure[cells] = at.weights.sum(axis=1)
+        ones = np.ones((d + 1, d + 1)) + np.eye(d + 1)
+        mass = measure[:, None, None] * ones / ((d + 1) * (d + 2))
+        rows = np.broadcast_to(self._place[:, :, None], mass.shape)
+        matrix = sparse.csr_matrix((mass.ravel(), (rows.ravel(), rows.swapaxes(1, 2).ravel())))
+        # a mass in units of its diagonal has a condition number of at most 10: some 30 iterations
+        jacobi = sparse.diags_array(1 / matrix.diagonal())
+        self._values, failed = cg(matrix, right, rtol=1e-12, maxiter=1000, M=jacobi)
+        if failed:
+            raise RuntimeError("the pressure of a mixed solution was not found: are cells flat?")
+
+    def stress(self, law: Hooke, cells: NDArray[np.int64], at: CellGradients) -> Array:
+        """Stress (m, q, d, d) at the quadrature points of some cells, Pa."""
+        deviatoric = Hooke(0.0, law.shear, law.dimension).stress(at.gradient)
+        pressure = self._values[self._place[cells]] @ at.corner_shares.T
+        return deviatoric + pressure[..., None, None] * np.eye(law.dimension)
+
+
+def stress_of(
+    solution: Solution, law: Hooke, step: int = -1
+) -> Callable[[NDArray[np.int64], CellGradients], Array]:
+    """Give the stress (m, q, d, d) at points of cells: with a pressure if the solution has one."""
+    if solution.notes.get("unknowns") == MIXED:
+        return partial(NodalPressure(solution, law, step).stress, law)
+    return lambda _cells, at: law.stress(at.gradient)
+
+
+NetForce = Callable[[NDArray[np.int64], CellGradients], Array]
+
+
+def net_force(
+    solution: Solution,
+    material: Material,
+    body_force: Force = None,
+    drag: float = 0.0,
+    step: int = -1,
+) -> NetForce | None:
+    """Give −div σ = f − ρ (ü + α u̇) at the quadrature points of cells, N/m³; None where it is 0.
+
+    In a domain integral inertia is a force like any other: while a crack stands still, neither the
+    singular fields nor what the integral tends to at its tip know of it.
+
+    Parameters
+    ----------
+    solution : Solution
+        One with velocities is in motion, and must carry accelerations.
+    material : Material
+    body_force : (d,) array or callable, optional
+        f, N/m³, or its values (n, d) at points (n, d).
+    drag : float
+        α, Rayleigh's damping by the mass, 1/s.
+    step : int
+        Which output time; default the last.
+
+    Raises
+    ------
+    InputError
+        If a field in motion carries no accelerations, or its material has no density.
+    """
+
+    def given(at: CellGradients) -> Array:
+        if callable(body_force):
+            points = at.points.reshape(-1, solution.dimension)
+            return np.reshape(body_force(points), at.points.shape)
+        return np.broadcast_to(0.0 if body_force is None else body_force, at.points.shape)
+
+    if solution.velocity is None and solution.acceleration is None:
+        return None if body_force is None else lambda _cells, at: given(at)
+    if solution.acceleration is None or (drag and solution.velocity is None):
+        raise InputError(
+            "the solution is in motion and carries no accelerations: its inertia is not known"
+        )
+    density = material.density
+    if density is None:
+        raise InputError("a field in motion of a material without a density")
+    rate = solution.acceleration[step]
+    if drag:
+        assert solution.velocity is not None
+        rate = rate + drag * solution.velocity[step]
+
+    def force(cells: NDArray[np.int64], at: CellGradients) -> Array:
+        return given(at) - density * (at.shape @ rate[solution.cells[cells]])
+
+    return force

@@ -6,11 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact.hooke import hooke
-from reference.fracture.balance import Force, NetForce, net_force
-from reference.fracture.cells import CellGradients, cell_gradients
+from reference.fracture.cells import (
+    CellGradients,
+    Force,
+    NetForce,
+    cell_gradients,
+    net_force,
+    stress_of,
+)
 from reference.fracture.front import Front
-from reference.fracture.front_modes import mode_field
-from reference.fracture.pressure import stress_of
+from reference.fracture.singular_fields import mode_field
 from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, square
 
 from reference.fracture import tips
-from reference.fracture.domain import ring
+from reference.fracture.intensity import ring
 from reference.meshing import background_mesh, conforming_mesh
 from reference.meshing.edge_splitting import flip_flat_cells
 from reference.meshing.grading import Grading, clear_radii, singular_points

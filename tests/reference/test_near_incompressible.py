@@ -12,8 +12,7 @@ from reference.elasticity import solve_linear
 from reference.exact import exact_solution
 from reference.exact.hooke import hooke
 from reference.fracture import stress_intensity, tips
-from reference.fracture.cells import cell_gradients
-from reference.fracture.pressure import NodalPressure
+from reference.fracture.cells import NodalPressure, cell_gradients
 from reference.space import conforming_space
 from verify.solvers import find_solver
 from verify.solvers.conforming_meshes import peer_mesh

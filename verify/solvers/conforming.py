@@ -8,7 +8,7 @@ from reference.boundary_values import constrained_values, support_ends
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import linear_system, solve_linear, wants_pressure
 from reference.exact import exact_of
-from reference.fracture.pressure import MIXED
+from reference.fracture.cells import MIXED
 from reference.inside_out import place_text
 from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.loads import load_forces

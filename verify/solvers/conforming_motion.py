@@ -12,7 +12,7 @@ from reference.dynamics_cuts import facet_openings, inherit, partly_opened
 from reference.dynamics_ledger import Ledger, momenta_of
 from reference.dynamics_release import Hold, parted_nodes
 from reference.dynamics_step import Scheme, State, Stepper, generalised_alpha, implicit_euler
-from reference.fracture.pressure import MIXED
+from reference.fracture.cells import MIXED
 from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
 from reference.ties import facing_nodes, lasting_ties
