@@ -16,7 +16,8 @@ from verify.report.figures import convergence, plots
 from verify.report.figures.convergence import error_panel, error_range
 from verify.report.figures.style import Palette, drawing
 from verify.report.opening_view import opening_figures
-from verify.report.pictures import case_pictures, scale_top
+from verify.report.pictures import case_pictures, plane_tips, scale_top
+from verify.report.problem import cut_lines
 from verify.result import (
     Metric,
     Notice,
@@ -305,3 +306,33 @@ def test_a_solution_outside_the_run_directory_is_not_read(tmp_path):
     shown = case_pictures(root, load_run(root).entries[0])
     assert not shown.all
     assert "directory" in shown.notes[0]
+
+
+def test_the_lines_of_a_cut_are_itself_in_the_plane_and_its_rim_in_space():
+    line = {"kind": "polyline", "points": [[0.2, 0.5], [0.6, 0.7]]}
+    np.testing.assert_array_equal(cut_lines(line)[0], line["points"])
+    arc = {"kind": "arc", "centre": [0.1, 0.2], "radius": 0.3, "start": 20.0, "sweep": 100.0}
+    assert np.linalg.norm(cut_lines(arc)[0] - arc["centre"], axis=1) == pytest.approx(0.3)
+    pipe = {"kind": "cylinder", "base": [0.0, 0.0, 0.1], "axis": [0.0, 0.0, 2.0], "radius": 0.3,
+            "height": 0.5}  # fmt: skip
+    (rims,) = cut_lines(pipe)
+    x, y, z = rims[np.isfinite(rims).all(axis=1)].T
+    assert np.hypot(x, y) == pytest.approx(0.3)
+    assert set(z.round(12)) == {0.1, 0.6}
+    assert cut_lines({"kind": "sphere", "centre": [0.0, 0.0, 0.0], "radius": 1.0}) == []
+    # of a version that knew another kind
+    assert len(cut_lines({"kind": "spline", "points": [[0.0, 0.0], [1.0, 1.0]]})[0]) == 2
+
+
+def test_an_end_on_the_boundary_or_on_another_cut_is_no_tip():
+    body = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+    cuts = [
+        {"kind": "polyline", "name": "a", "points": [[0.0, 0.3], [0.5, 0.6]]},
+        {"kind": "polyline", "name": "b", "points": [[0.25, 0.45], [0.2, 0.9]]},
+        {"kind": "arc", "name": "c", "centre": [0.7, 0.2], "radius": 0.1},
+    ]
+    tips = plane_tips({"geometry": body, "cuts": cuts})
+    np.testing.assert_allclose([end for end, _ in tips], [[0.5, 0.6], [0.2, 0.9]])
+    assert [length for _, length in tips] == pytest.approx(
+        [np.hypot(0.5, 0.3), np.hypot(0.05, 0.45)]
+    )

@@ -15,7 +15,7 @@ from verify.scene.strict import (
     Vector,
     none_or_both,
     one_alone,
-)  # fmt: skip
+)
 
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
 OVERLAP = "overlap_depth"  # m, largest over time: of itself the error of faces that must not meet

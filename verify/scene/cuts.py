@@ -28,7 +28,7 @@ from verify.scene.strict import (
     Strict,
     none_or_both,
     one_alone,
-)  # fmt: skip
+)
 
 Array = NDArray[np.float64]
 Facets = tuple[Array, NDArray[np.int64]]

@@ -23,7 +23,7 @@ from verify.scene.strict import (
     Strict,
     none_or_both,
     one_alone,
-)  # fmt: skip
+)
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -23,7 +23,7 @@ from verify.scene.strict import (
     Strict,
     Vector,
     none_or_both,
-)  # fmt: skip
+)
 
 Array = NDArray[np.float64]
 

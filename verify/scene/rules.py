@@ -24,7 +24,7 @@ from verify.scene.placement import (
     misplaced_point,
     part_without_facets,
     points_of_body,
-)  # fmt: skip
+)
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.strict import Rule, Rules, first_broken
 from verify.scene.tables import SceneTables

@@ -20,7 +20,7 @@ from verify.scene.strict import (
     Strict,
     Vector,
     none_or_both,
-)  # fmt: skip
+)
 from verify.scene.tool_path import Cut
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from verify.errors import InputError
 from verify.geometry.curves import Piece
@@ -27,10 +27,12 @@ from verify.scene.cuts import (
     PolylineCut,
     SphereCut,
     SweptCut,
-)  # fmt: skip
-from verify.scene.strict import Finite, Point3, Positive, Vector
+)
+from verify.scene.strict import Finite, Point3, Positive, Rules, Vector, none_or_both
 
 _SAME = 1e-9  # of a length: two this close are one
+_IN_PLANE = "belongs to a path in space; the points are plane"
+_IN_SPACE = "missing; in space the blade has a depth and a direction"
 _SEARCHES = 20  # Newton steps to a place that a turning blade sweeps
 
 Directions = Annotated[list[Point3], Field(min_length=1)]
@@ -62,48 +64,30 @@ class ToolPathCut(CutShape):
 
     on_the_way: ClassVar[bool] = True
 
-    @model_validator(mode="after")
-    def _is_a_path(self) -> "ToolPathCut":
-        dimensions = {len(point) for point in self.points}
-        if len(dimensions) > 1:
-            raise ValueError("points: some have 2 coordinates, others 3")
-        self._check_times()
-        self._check_blade()
-        tips = np.array(self.points, dtype=float)
-        if (np.linalg.norm(np.diff(tips, axis=0), axis=1).max()) == 0.0:
-            raise ValueError("points: the tool does not move")
-        if self.dimension == 2 and (defect := polyline_defect(self.vertices())):
-            raise ValueError(f"the path {defect}; begin another tool_path there")
-        return self
-
-    def _check_times(self) -> None:
-        if (self.times is None) == (self.speed is None):
-            raise ValueError("a tool path has either times or a speed")
-        if self.times is None:
-            return
-        if len(self.times) != len(self.points):
-            raise ValueError(f"{len(self.times)} times for {len(self.points)} points")
-        if any(b < a for a, b in pairwise(self.times)):
-            raise ValueError("times: time runs backwards")
-        if self.starts_at != 0.0:
-            raise ValueError("starts_at belongs to a speed; times say when it starts")
-
-    def _check_blade(self) -> None:
-        if self.dimension == 2:
-            for key in ("depth", "direction"):
-                if getattr(self, key) is not None:
-                    raise ValueError(f"{key}: belongs to a path in space; the points are plane")
-            return
-        for key in ("depth", "direction"):
-            if getattr(self, key) is None:
-                raise ValueError(f"{key}: missing; in space the blade has a depth and a direction")
-        if len(self._directions()) not in (1, len(self.points)):
-            raise ValueError(
-                f"direction: {len(self._directions())} for {len(self.points)} points; "
-                "expected one, or one per point"
-            )
-        if not np.linalg.norm(self._directions(), axis=1).all():
-            raise ValueError("direction: has no length")
+    rules: ClassVar[Rules] = (
+        ("points", lambda c: len({len(point) for point in c.points}) > 1,
+         "some have 2 coordinates, others 3"),
+        ("", none_or_both("times", "speed"), "a tool path has either times or a speed"),
+        ("", lambda c: c.times is not None and len(c.times) != len(c.points)
+         and (len(c.times), len(c.points)), "{} times for {} points"),
+        ("times", lambda c: any(b < a for a, b in pairwise(c.times or [])), "time runs backwards"),
+        ("", lambda c: c.times and c.starts_at,
+         "starts_at belongs to a speed; times say when it starts"),
+        ("depth", lambda c: c.dimension == 2 and c.depth is not None, _IN_PLANE),
+        ("direction", lambda c: c.dimension == 2 and c.direction is not None, _IN_PLANE),
+        ("depth", lambda c: c.dimension == 3 and c.depth is None, _IN_SPACE),
+        ("direction", lambda c: c.dimension == 3 and c.direction is None, _IN_SPACE),
+        ("direction", lambda c: c.dimension == 3
+         and len(c._directions()) not in (1, len(c.points))
+         and (len(c._directions()), len(c.points)),
+         "{} for {} points; expected one, or one per point"),
+        ("direction", lambda c: c.dimension == 3
+         and not np.linalg.norm(c._directions(), axis=1).all(), "has no length"),
+        ("points", lambda c: not np.linalg.norm(np.diff(c._tips(), axis=0), axis=1).any(),
+         "the tool does not move"),
+        ("", lambda c: c.dimension == 2 and polyline_defect(c.vertices()),
+         "the path {}; begin another tool_path there"),
+    )  # fmt: skip
 
     @property
     def dimension(self) -> int:
