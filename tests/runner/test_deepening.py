@@ -13,6 +13,7 @@ from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan, further_level, levels_in_vain
+from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, load_scene
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
@@ -132,3 +133,10 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
     assert f"{len(levels) + 1} finished solves of before were reused" in again.stdout
     said = json.loads((verify.folder / "out/cases/slit/result.json").read_text())["reference"]
     assert said["suffices_reason"] == result["reference"]["suffices_reason"]
+
+
+def test_a_case_without_a_comparison_is_kept_in_the_keys_of_a_case_file(scene):
+    content = unjudged_result(scene, [], "no reference", {}).scene
+    again = Scene.model_validate(content)
+    assert again.model_dump() == scene.model_dump()
+    assert content["schema"] == 1
