@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 from verify.errors import InputError
 from verify.geometry.nearest import distance_to_triangles
 from verify.geometry.spatial import area_inside, ear_clipping, overlap_area
-from verify.scene import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut, load_scene
+from verify.scene import (
+    CylinderCut,
+    DiscCut,
+    PolygonCut,
+    SphereCut,
+    SweptCut,
+    ToolPathCut,
+    faces_of,
+    load_scene,
+)
 
 CUBE = body_text("A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[2, 2, 2]]) + support_text(
     "boundary", [0, 0, 0]
@@ -157,3 +166,14 @@ def test_a_cap_has_the_area_of_a_sphere_and_its_centre_on_the_positive_side(open
     # facets of 0.01 lie within h²/2R² of the sphere
     area = 2 * np.pi * 0.4**2 * (1 - np.cos(np.deg2rad(opening)))
     assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(area, rel=1e-3)
+
+
+def test_the_face_of_a_cut_is_found_beside_a_blade_whose_normal_is_motion_times_blade():
+    blade = ToolPathCut(
+        kind="tool_path", points=[[0.2, 0.5, 1.0], [0.8, 0.5, 1.0]], speed=1.0, depth=0.5,
+        direction=(0.0, 0.0, -1.0),
+    )  # fmt: skip
+    disc = DiscCut(kind="disc", centre=(0.5, 0.5, 0.2), normal=(0.0, 0.0, 1.0), radius=0.1)
+    found = faces_of([disc, blade], np.array([[0.5, 0.45, 0.2], [0.5, 0.51, 0.8]]))
+    assert found.cut.tolist() == [0, 1]
+    np.testing.assert_allclose(found.normal, [[0, 0, 1], [0, 1, 0]], atol=1e-15)

@@ -1,12 +1,6 @@
 """The scene: what is asked of every solver. Strict, in SI units, solver-neutral."""
 
-from verify.scene.acceptance import (
-    BoundCheck,
-    PartQuantity,
-    RateCheck,
-    RatioCheck,
-    ValueCheck,
-)
+from verify.scene.acceptance import BoundCheck, PartQuantity, RateCheck, RatioCheck, ValueCheck
 from verify.scene.cuts import (
     ArcCut,
     CylinderCut,
@@ -17,13 +11,7 @@ from verify.scene.cuts import (
     SweptCut,
     faces_of,
 )
-from verify.scene.geometry import (
-    Box,
-    MeshFile,
-    Polygon,
-    Rectangle,
-    Skin,
-)
+from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle, Skin
 from verify.scene.initial import Equilibrium, InitialField, Moving
 from verify.scene.loading import (
     case_folder,

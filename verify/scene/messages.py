@@ -10,6 +10,27 @@ from verify.errors import instead
 from verify.printable import shown
 
 _FEW, _SHOWN = 30, 3
+# what pydantic expected, by the type of its error
+_WANTED = {
+    "float_type": "a finite number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "a text in quotes",
+    "string_too_short": "one line of text",
+    "string_pattern_mismatch": "one line of text",
+    "string_too_long": "at most {max_length} characters",
+    "dict_type": "a table of keys",
+    "model_type": "a table of keys",
+    "model_attributes_type": "a table of keys",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "greater_than": "a number > {gt:g}",
+    "greater_than_equal": "a number ≥ {ge:g}",
+    "less_than": "a number < {lt:g}",
+    "less_than_equal": "a number ≤ {le:g}",
+    "literal_error": "{expected}",
+}
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
@@ -79,33 +100,13 @@ def _tags(found: Any, schema: dict[str, Any]) -> str:
 
 def _wanted(fault: Any) -> str:
     """Say what pydantic expected in words of a case file (it speaks of tuples)."""
-    context = fault.get("ctx", {})
-    match fault["type"]:
-        case "float_type" | "finite_number":
-            return "a finite number"
-        case "int_type" | "int_from_float":
-            return "a whole number"
-        case "string_type":
-            return "a text in quotes"
-        case "string_too_short" | "string_pattern_mismatch":
-            return "one line of text"
-        case "string_too_long":
-            return f"at most {context['max_length']} characters"
-        case "list_type" | "tuple_type":
-            table = isinstance(fault["input"], dict)
-            return "a list of tables ([[…]], not […])" if table else "a list in brackets"
-        case "dict_type" | "model_type" | "model_attributes_type":
-            return "a table of keys"
-        case "too_short":
-            return f"at least {context['min_length']} entries"
-        case "too_long":
-            return f"at most {context['max_length']} entries"
-        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
-            sign = {"greater_than": ">", "greater_than_equal": "≥", "less_than": "<"}
-            return f"a number {sign.get(fault['type'], '≤')} {next(iter(context.values())):g}"
-        case "literal_error":
-            return str(context["expected"])
-    return str(fault["msg"]).removeprefix("Input should be ")
+    if fault["type"] in ("list_type", "tuple_type"):
+        table = isinstance(fault["input"], dict)
+        return "a list of tables ([[…]], not […])" if table else "a list in brackets"
+    text = _WANTED.get(fault["type"])
+    if text is None:
+        return str(fault["msg"]).removeprefix("Input should be ")
+    return text.format(**fault.get("ctx", {}))
 
 
 def _key(fault: Any, content: Any) -> str:
