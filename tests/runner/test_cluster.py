@@ -6,8 +6,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from verify.runner.engines import RemoteSolve
 
 pytest.importorskip("distributed")
 
@@ -83,3 +86,19 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     wait_for(lambda: not alive(solving), "the solve outlived its worker")
     solves = (verify.folder / "solves").read_text().splitlines()
     assert len(solves) == 2  # what the dead worker had finished was not solved again
+
+
+class KilledWorker(Exception):
+    """As Dask's, of several arguments."""
+
+
+@pytest.mark.parametrize("reason, said", [
+    (OSError("the network is down\nand more"), "the network is down"),
+    (ValueError(), "ValueError"),
+    (KilledWorker("solve", 3), "the workers that ran it died, several times over"),
+])  # fmt: skip
+def test_a_solve_that_the_cluster_lost_is_a_failure_with_its_reason(tmp_path, reason, said):
+    future = SimpleNamespace(done=lambda: True, status="error", exception=lambda: reason)
+    ending = RemoteSolve(future, tmp_path).poll()
+    assert ending.returncode == 1
+    assert (tmp_path / "log.txt").read_text() == f"{said}\n"

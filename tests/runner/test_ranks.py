@@ -1,6 +1,8 @@
 """References on several MPI ranks: the same answer, the same endings, nothing left running."""
 
 import time
+from threading import Timer
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -78,6 +80,19 @@ def test_one_rank_that_fails_ends_the_others_and_is_told(job, verify):
     outcome = read_json(verify.folder / "outcome.json")
     assert outcome["status"] == "failed"
     assert outcome["reason"] == "ZeroDivisionError: the pivot is zero (on rank 1)"
+
+
+@pytest.mark.parametrize("first_says", [True, False])
+def test_what_the_first_rank_says_within_a_moment_counts(tmp_path, monkeypatch, first_says):
+    monkeypatch.setattr(ranks, "_WAIT_SECONDS", 30.0 if first_says else 0.1)
+    aborted, file = [], tmp_path / "outcome.json"
+    comm = SimpleNamespace(rank=1, Abort=aborted.append)
+    said = Timer(0.2, write_json, ({"reason": "the cause"}, file))
+    if first_says:
+        said.start()
+    ranks.give_up(comm, {"reason": "what follows from it"}, file)
+    found = "the cause" if first_says else "what follows from it (on rank 1)"
+    assert (read_json(file)["reason"], aborted) == (found, [1])
 
 
 def test_ranks_that_do_not_find_each_other_are_told(monkeypatch):
