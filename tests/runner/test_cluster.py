@@ -88,8 +88,7 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     assert len(solves) == 2  # what the dead worker had finished was not solved again
 
 
-class KilledWorker(Exception):
-    """As Dask's, of several arguments."""
+KilledWorker = type("KilledWorker", (Exception,), {})  # as Dask's, of several arguments
 
 
 @pytest.mark.parametrize("reason, said", [
