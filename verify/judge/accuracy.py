@@ -5,7 +5,7 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from verify.compare.part_account import motion_history, part_metrics, part_recor
 from verify.compare.released import released_metrics
 from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.checks import result_of
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
 from verify.judge.doubtful import absurd_strain, doubtful_errors, locking_notices
 from verify.judge.intervals import error_interval
@@ -49,7 +50,7 @@ from verify.result import (
     SolveRecord,
     Status,
 )
-from verify.scene import Scene, scene_hash
+from verify.scene import Scene
 from verify.solution import Solution
 
 # A solver may drop slivers; a mesh that misses more of the body than this is another body.
@@ -123,26 +124,16 @@ def assess_accuracy(
     if record.kind == "conforming":
         levels = len(record.levels or ())
         record = replace(record, **sufficiency(scene, measured, REFERENCE, levels))
-    return CaseResult(
-        case=scene.name,
-        title=scene.title,
-        requirement=scene.requirement,
-        scene_hash=scene_hash(scene),
-        scene=scene.model_dump(mode="json", by_alias=True),
-        reference=record,
-        solves=measured,
-        rates=rates,
-        verdicts=[],
-        notices=[
-            *unavailable_quantities(scene, measured),
-            *ledger_notices([r for r in measured if r.solver != REFERENCE]),
-            *doubtful_errors(scene, [r for r in measured if r.solver != REFERENCE]),
-            *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
-            *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
-            *ringing_factors(scene, solutions.get(REFERENCE, {})),
-        ],
-        row=asdict(scene.row) if scene.row else None,
-    )
+    judged = [record for record in measured if record.solver != REFERENCE]
+    notices = [
+        *unavailable_quantities(scene, measured),
+        *ledger_notices(judged),
+        *doubtful_errors(scene, judged),
+        *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
+        *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
+        *ringing_factors(scene, solutions.get(REFERENCE, {})),
+    ]
+    return result_of(scene, record, measured, rates=rates, notices=notices)
 
 
 def _body(scene: Scene, exact: ExactField | None) -> tuple[AnyBody | None, str]:

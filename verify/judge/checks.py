@@ -1,11 +1,15 @@
 """Acceptance checks and the solvers that each is made of."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
-from verify.result import REFERENCE, SolveRecord, Status, Verdict, VerdictRecord
-from verify.scene import BoundCheck, RateCheck, RatioCheck, ValueCheck
+from verify.reference_record import ReferenceRecord
+from verify.result import REFERENCE, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
+from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck, scene_hash
+
+if TYPE_CHECKING:  # who only lists checks does not load the comparison
+    from verify.judge.intervals import Interval
 
 
 @dataclass(frozen=True)
@@ -77,12 +81,57 @@ def applied_checks(
                 yield AppliedCheck(one)
 
 
-def unjudged(check: Any, verdict: Verdict, reason: str) -> VerdictRecord:
-    """Return the verdict on a check, made of one solver, for which nothing was observed."""
-    limit = limit_text(check)
+def verdict_record(
+    check: Any, verdict: Verdict, reason: str, found: "Interval | None" = None
+) -> VerdictRecord:
+    """Return the verdict on a check, made of one solver, and what was observed, if anything was."""
+    value, low, high = (None, None, None) if found is None else (found.value, found.low, found.high)
+    solver, limit = check.solver or "", limit_text(check)
     return VerdictRecord(
-        check.check, check.solver or "", check.metric, verdict, None, None, None, limit, reason
+        check.check, solver, check.metric, verdict, value, low, high, limit, reason
     )
+
+
+def result_of(
+    scene: Scene, reference: ReferenceRecord, solves: list[SolveRecord], **known: Any
+) -> CaseResult:
+    """Return the result of a case with what is `known`, by the fields of a `CaseResult`."""
+    return CaseResult(
+        case=scene.name,
+        title=scene.title,
+        requirement=scene.requirement,
+        scene_hash=scene_hash(scene),
+        scene=scene.model_dump(mode="json", by_alias=True),
+        reference=reference,
+        solves=solves,
+        row=asdict(scene.row) if scene.row else None,
+        **{"rates": [], "verdicts": [], **known},
+    )
+
+
+def unjudged_result(
+    scene: Scene,
+    solves: list[SolveRecord],
+    reason: str,
+    provenance: dict[str, Any],
+    judge_only: Sequence[str] = (),
+) -> CaseResult:
+    """Return what is known of a case that could not be compared: an ERROR per check.
+
+    Parameters
+    ----------
+    scene : Scene
+    solves : list of SolveRecord
+    reason : str
+        Why there is no comparison, in one sentence.
+    provenance : dict
+    judge_only : sequence of str
+        As of `applied_checks`.
+    """
+    applied = applied_checks(scene.acceptance, solves, judge_only)
+    verdicts = [verdict_record(one.check, Verdict.ERROR, reason) for one in applied]
+    known = {"verdicts": verdicts, "provenance": provenance}
+    return result_of(scene, ReferenceRecord(), solves, **known)
 
 
 def limit_text(check: Any) -> str:

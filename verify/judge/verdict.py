@@ -5,11 +5,11 @@ does, UNDECIDED otherwise: the reference is too imprecise to tell. ERROR if a so
 check needs is missing, or its comparison failed.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 
-from verify.judge.checks import applied_checks, limit_text, unjudged
+from verify.judge.checks import applied_checks, verdict_record
 from verify.judge.intervals import (
     Interval,
     NotMeasuredError,
@@ -30,6 +30,7 @@ from verify.result import (
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
+Rows = Mapping[float, CaseResult]
 
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1
@@ -40,6 +41,7 @@ def judge(
     records: Sequence[SolveRecord],
     rates: Sequence[Rate],
     judge_only: Sequence[str] = (),
+    rows: Rows | None = None,
 ) -> list[VerdictRecord]:
     """Judge every acceptance check of `scene` on what was measured, for each solver by itself.
 
@@ -51,80 +53,57 @@ def judge(
     rates : sequence of Rate
     judge_only : sequence of str
         Solvers that are judged; empty: all that were asked and do not refuse the case.
+    rows : mapping of float to CaseResult, optional
+        Other rows of its family, by the value of the parameter. Without them a check against
+        another row is not decided.
 
     Returns
     -------
     list of VerdictRecord
         One per check and solver, in the order of the scene, then of the solvers in `records`.
     """
-    judges: dict[type, Callable[..., VerdictRecord]] = {
-        RateCheck: _judge_rate,
-        BoundCheck: _judge_bound,
-        RatioCheck: _judge_ratio,
-        ValueCheck: _judge_value,
-    }
     verdicts = []
     for applied in applied_checks(scene.acceptance, records, judge_only):
-        check = applied.check
-        if applied.not_judged:
-            verdicts.append(unjudged(check, Verdict.UNDECIDED, applied.not_judged))
-            continue
+        check, found = applied.check, None
         try:
-            found = judges[type(check)](check, records, rates)
-            verdicts.append(replace(found, reference_share=_reference_share(check, records)))
+            if not applied.not_judged:
+                found = _judged(check, records, rates, rows)
+                found = replace(found, reference_share=_reference_share(check, records))
         except NotMeasuredError as problem:
-            verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
-    return [_marked(scene, verdict) for verdict in verdicts]
+            found = verdict_record(check, Verdict.ERROR, str(problem))
+        found = found or verdict_record(check, Verdict.UNDECIDED, applied.not_judged)
+        verdicts.append(_marked(scene, found))
+    return verdicts
 
 
-def with_verdicts(scene: Scene, result: CaseResult, judge_only: Sequence[str] = ()) -> CaseResult:
-    """Return what was measured of a case with its verdicts; see `judge`."""
-    return replace(result, verdicts=judge(scene, result.solves, result.rates, judge_only))
-
-
-def judged_against_rows(
-    scene: Scene,
-    result: CaseResult,
-    rows: Mapping[float, CaseResult],
-    judge_only: Sequence[str] = (),
+def with_verdicts(
+    scene: Scene, result: CaseResult, judge_only: Sequence[str] = (), rows: Rows | None = None
 ) -> CaseResult:
-    """Judge the checks of a row that compare it with other rows of its family.
-
-    Parameters
-    ----------
-    scene : Scene
-    result : CaseResult
-        Of the scene; its verdicts on these checks are made anew.
-    rows : mapping of float to CaseResult
-        The rows that are known, by the value of the parameter.
-    judge_only : sequence of str
-        As of `judge`.
-    """
-    if result.reference.kind is None:  # its comparison failed, and its verdicts say so
-        return result
-    applied = applied_checks(scene.acceptance, result.solves, judge_only)
-    verdicts = []
-    for one, found in zip(applied, result.verdicts, strict=True):
-        check = one.check
-        if isinstance(check, RatioCheck) and check.row is not None and not one.not_judged:
-            found = _marked(scene, _against_row(check, result, rows))
-            found = replace(found, reference_share=_reference_share(check, result.solves))
-        verdicts.append(found)
-    return replace(result, verdicts=verdicts)
+    """Return what was measured of a case with its verdicts; see `judge`."""
+    return replace(result, verdicts=judge(scene, result.solves, result.rates, judge_only, rows))
 
 
-def _against_row(
-    check: RatioCheck, result: CaseResult, rows: Mapping[float, CaseResult]
+def _judged(
+    check: Check, records: Sequence[SolveRecord], rates: Sequence[Rate], rows: Rows | None
 ) -> VerdictRecord:
-    assert check.row is not None
-    assert check.solver is not None
-    if check.row not in rows:
-        text = f"the row {check.row:g} is not part of this run"
-        return unjudged(check, Verdict.UNDECIDED, text)
-    try:
-        return _ratio(check, result.solves, rows[check.row].solves, check.solver)
-    except NotMeasuredError as problem:
-        return unjudged(check, Verdict.ERROR, str(problem))
+    match check:
+        case RateCheck():
+            return _judge_rate(check, records, rates)
+        case BoundCheck():
+            error = _error(_levels(records, check.solver)[-1], check.metric)
+            return _decide(check, error, 0.0, check.at_most, "error on the finest level")
+        case ValueCheck():
+            return _judge_value(check, records)
+        case RatioCheck(row=None):
+            return _judge_ratio(check, records, records, check.to)
+        case RatioCheck(row=float(row)):
+            if rows is not None and row in rows:
+                return _judge_ratio(check, records, rows[row].solves, check.solver)
+            text = "the row that it is compared with is judged after it"
+            if rows is not None:
+                text = f"the row {row:g} is not part of this run"
+            return verdict_record(check, Verdict.UNDECIDED, text)
+    raise TypeError(f"{check!r} is no acceptance check")
 
 
 def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
@@ -141,16 +120,7 @@ def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
     return found
 
 
-def _judge_bound(
-    check: BoundCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
-) -> VerdictRecord:
-    error = _error(_levels(records, check.solver)[-1], check.metric)
-    return _decide(check, error, 0.0, check.at_most, "error on the finest level")
-
-
-def _judge_value(
-    check: ValueCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
-) -> VerdictRecord:
+def _judge_value(check: ValueCheck, records: Sequence[SolveRecord]) -> VerdictRecord:
     value = _metric(_levels(records, check.solver)[-1], check.metric).value
     allowed = check.relative_tolerance * abs(check.equals)
     known = Interval(value, value, value)
@@ -160,19 +130,10 @@ def _judge_value(
 
 
 def _judge_ratio(
-    check: RatioCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
-) -> VerdictRecord:
-    if check.row is not None:
-        text = "the row that it is compared with is judged after it"
-        return unjudged(check, Verdict.UNDECIDED, text)
-    return _ratio(check, records, records, check.to)
-
-
-def _ratio(
     check: RatioCheck,
     records: Sequence[SolveRecord],
     others: Sequence[SolveRecord],
-    to: str,
+    to: str | None,
 ) -> VerdictRecord:
     """Judge an error over that of the solver `to`, level by level."""
     ours, theirs = _levels(records, check.solver), _levels(others, to)
@@ -187,16 +148,16 @@ def _ratio(
         b = _error(other, check.metric)
         if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
             text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
-            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+            return verdict_record(check, Verdict.UNDECIDED, text)
         if max(a.value, b.value) <= ROUND_OFF:
             text = f"level {one.level}: both errors ({a.value:.1e}, {b.value:.1e}) are round-off"
-            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+            return verdict_record(check, Verdict.UNDECIDED, text)
         if b.low <= 0.0:
             text = (
                 f"level {one.level}: the uncertainty {b.half_width:.1e} is not below the error "
                 f"{b.value:.1e} of {to}"
             )
-            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
+            return verdict_record(check, Verdict.UNDECIDED, text)
         found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))
     all_levels = ", ".join(f"{ratio.value:.4g}" for _, ratio in found)
     decided = [
@@ -231,12 +192,12 @@ def _judge_rate(
         return _decide(check, found, low, high, f"slopes {slopes}")
     if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
         worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
-        return _record(check, Verdict.FAIL, worst, limit_text(check), rate.reason)
+        return verdict_record(check, Verdict.FAIL, rate.reason, worst)
     if rate.reason.startswith("slowing") and rate.pairwise[-1] + rate.uncertainty < low:
         least = min(rate.pairwise[-1] - rate.uncertainty, *rate.pairwise)
         at_most = Interval(rate.pairwise[-1], least, rate.pairwise[-1] + rate.uncertainty)
-        return _record(check, Verdict.FAIL, at_most, limit_text(check), rate.reason)
-    return _record(check, Verdict.UNDECIDED, None, limit_text(check), rate.reason)
+        return verdict_record(check, Verdict.FAIL, rate.reason, at_most)
+    return verdict_record(check, Verdict.UNDECIDED, rate.reason)
 
 
 def _reference_share(check: Check, records: Sequence[SolveRecord]) -> float | None:
@@ -250,13 +211,12 @@ def _reference_share(check: Check, records: Sequence[SolveRecord]) -> float | No
 
 
 def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:
-    limit = limit_text(check)
     if not isfinite(found.value):
-        return _record(check, Verdict.FAIL, None, limit, f"{text}: not finite")
+        return verdict_record(check, Verdict.FAIL, f"{text}: not finite")
     if low <= found.low and found.high <= high:
-        return _record(check, Verdict.PASS, found, limit, text)
+        return verdict_record(check, Verdict.PASS, text, found)
     if found.high < low or found.low > high:
-        return _record(check, Verdict.FAIL, found, limit, text)
+        return verdict_record(check, Verdict.FAIL, text, found)
     reason = (
         f"{text}: the uncertainty {found.half_width:.1e} is too large to tell {found.value:.4g} "
         "from the limit"
@@ -266,17 +226,7 @@ def _decide(check: Check, found: Interval, low: float, high: float, text: str) -
             f"{text}: reference uncertainty {found.half_width:.1e} is not clearly below the "
             f"error {found.value:.1e} it judges"
         )
-    return _record(check, Verdict.UNDECIDED, found, limit, reason)
-
-
-def _record(
-    check: Check, verdict: Verdict, found: Interval | None, limit: str, reason: str
-) -> VerdictRecord:
-    value, low, high = (None, None, None) if found is None else (found.value, found.low, found.high)
-    solver = check.solver or ""
-    return VerdictRecord(
-        check.check, solver, check.metric, verdict, value, low, high, limit, reason
-    )
+    return verdict_record(check, Verdict.UNDECIDED, reason, found)
 
 
 def _levels(records: Sequence[SolveRecord], solver: str | None) -> list[SolveRecord]:

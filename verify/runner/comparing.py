@@ -11,11 +11,12 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.judge.checks import unjudged_result
 from verify.result import COMPARISON_FAILED, CaseResult
 from verify.result_files import read_result
 from verify.runner.child import Child, Ending, death
 from verify.runner.directory import JUDGING
-from verify.runner.unjudged import unjudged_result
+from verify.runner.job import load_record
 from verify.scene import Scene
 
 LEAST_SECONDS = 60.0
@@ -106,7 +107,8 @@ class Comparison:
             return None
         reason, origin = f"{COMPARISON_FAILED}: {why}", self._question["provenance"]
         judged = self._question["judge_only"]
-        result = unjudged_result(self.scene, self._folders, reason, origin, judged)
+        solves = [load_record(folder) for folder in self._folders]
+        result = unjudged_result(self.scene, solves, reason, origin, judged)
         write_json(result.content(), self._folder / "result.json")
         return result
 

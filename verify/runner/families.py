@@ -50,8 +50,8 @@ class Families:
         scene = self._scenes[name]
         if not any(isinstance(c, RatioCheck) and c.row is not None for c in scene.acceptance):
             return result
-        from verify.judge.verdict import (
-            judged_against_rows,  # loads the comparison: only where needed
-        )
+        if result.reference.kind is None:  # its comparison failed, and its verdicts say so
+            return result
+        from verify.judge.verdict import with_verdicts  # loads the comparison: only where needed
 
-        return judged_against_rows(scene, result, others, self._judge_only)
+        return with_verdicts(scene, result, self._judge_only, others)
