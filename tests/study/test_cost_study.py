@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from verify.judge.work import pareto_front, time_at, work_points
+from verify.judge.cost import pareto_front, time_at, work_points
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene

@@ -1,18 +1,35 @@
-"""The ranking of the solvers of a run: one table per question, and what was left out."""
+"""The ranking of the solvers of a run: a table per question, and what was left out."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from math import isfinite
 from typing import Any
 
 from verify.compare.energy_account import ACCOUNT
+from verify.judge.cost import (
+    cost_comparisons,
+    data_profiles,
+    performance_profile,
+    why_times_are_no_sample,
+)
 from verify.judge.intervals import ERROR_METRICS
-from verify.judge.profiles import data_profiles, performance_profile
-from verify.judge.ranks_by_accuracy import accuracy_comparisons
-from verify.judge.ranks_by_cost import cost_comparisons, why_times_are_no_sample
-from verify.judge.ranks_by_stability import stability_standings
-from verify.judge.standing import compared_by_worst, item_on_finest
-from verify.ranking import Comparison, LeftOut, Ranking, ranked_solvers
-from verify.result import REFERENCE, CaseResult, Status, Verdict
+from verify.judge.standing import (
+    Item,
+    compared_by_mean,
+    compared_by_worst,
+    is_exact,
+    item_at_equal_size,
+    item_on_finest,
+)
+from verify.ranking import Comparison, LeftOut, Ranking, StabilityStanding, ranked_solvers
+from verify.result import REFERENCE, CaseResult, SolveRecord, Status, Verdict
+
+EQUAL_SIZE, FINEST = "equal size", "finest level"
+EXACT = "where a solver is exact"
+QUANTITIES = "quantities"  # all quantities of interest of all cases together
+_MAIN = ("displacement_l2", "energy_norm", "jump_l2")
+_ANSWER = ("displacement_l2", "displacement_l2_max")
+_BLOWN_UP = 1.0 - 1e-9  # relative error: as far off as a body that does not move, to round-off
 
 
 def rank_solvers(
@@ -89,7 +106,7 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
     comparisons = []
     for metric in ACCOUNT:
         items = [
-            item_on_finest(result, metric, solvers, result.case)
+            item_on_finest(result, metric, solvers)
             for result in results
             if any(s.metric(metric) for s in result.solves if s.solver in solvers)
             and not ("momentum" in metric and _acted_on(result))
@@ -101,3 +118,104 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
 
 def _acted_on(result: CaseResult) -> bool:
     return bool(result.scene.get("supports") or result.scene.get("loads"))
+
+
+def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
+    """Compare errors: the main norms, those that a case judges, and the quantities of interest.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+    solvers : sequence of str
+        Those that are ranked.
+
+    Returns
+    -------
+    list of Comparison
+        For each metric one at equal size and one on the finest level. Items in which a solver is
+        exact to round-off have no ratios: they are compared by the largest number of each solver
+        on its finest level.
+    """
+    judged = {v.metric for r in results for v in r.verdicts if v.metric in ERROR_METRICS}
+    metrics = [*_MAIN, *sorted(judged - {*_MAIN, *ACCOUNT}), QUANTITIES]
+    comparisons = []
+    for metric in metrics:
+        for view, item_of in ((EQUAL_SIZE, item_at_equal_size), (FINEST, item_on_finest)):
+            items = [
+                item_of(result, name, solvers)
+                for result in results
+                for name in _names(result, metric, solvers)
+            ]
+            if (found := compared_by_mean(metric, view, solvers, items)) is not None:
+                comparisons.append(found)
+        # of the view above that came last: on the finest level
+        exact = [i for i in items if isinstance(i, Item) and len(i.found) > 1 and is_exact(i)]
+        if (found := compared_by_worst(metric, EXACT, solvers, exact)) is not None:
+            comparisons.append(found)
+    return comparisons
+
+
+def _names(result: CaseResult, metric: str, solvers: Sequence[str]) -> list[str]:
+    """Return what a metric stands for in a case: itself, or the names of the quantities."""
+    own = [m for s in result.solves if s.solver in solvers for m in s.metrics]
+    if metric == QUANTITIES:
+        named = {m.name for m in own if m.name not in ERROR_METRICS and m.reference}
+        return sorted(named)
+    return [metric] if any(m.name == metric for m in own) else []
+
+
+def stability_standings(
+    results: Sequence[CaseResult], solvers: Sequence[str]
+) -> list[StabilityStanding]:
+    """Count how the solves of every solver ended; the least lost first."""
+    own = {name: [s for r in results for s in r.solves if s.solver == name] for name in solvers}
+    lost = {name: _lost(solves) for name, solves in own.items()}
+    known = [share for share in lost.values() if share is not None]
+    standings = []
+    for name, solves in own.items():
+        ended = [solve.status for solve in solves]
+        counts: dict[str, int] = {}
+        for entry in (e for solve in solves for e in solve.regularisations):
+            counts[entry.kind] = counts.get(entry.kind, 0) + entry.count
+        share = lost[name]
+        standings.append(
+            StabilityStanding(
+                solver=name,
+                rank=None if share is None else 1 + sum(other < share for other in known),
+                tied=share is not None and known.count(share) > 1,
+                asked=len(solves),
+                **{status.value: ended.count(status) for status in Status},
+                blown_up=sum(map(_blown_up, solves)),
+                inside_out=sum(map(_inside_out, solves)),
+                lost=share,
+                regularisations=counts,
+            )
+        )
+    return sorted(standings, key=lambda s: (s.lost is None, s.lost or 0.0))
+
+
+def _lost(solves: Sequence[SolveRecord]) -> float | None:
+    tried = [solve for solve in solves if solve.status is not Status.REFUSED]
+    bad = [s for s in tried if s.status is not Status.SOLVED or _blown_up(s)]
+    return len(bad) / len(tried) if tried else None
+
+
+def _blown_up(solve: SolveRecord) -> bool:
+    found = [m for name in _ANSWER if (m := solve.metric(name)) is not None]
+    # a body that does not move is off by 1 whatever the reference: its uncertainty may not hide it
+    return solve.status is Status.SOLVED and any(
+        not isfinite(m.value) or (m.value >= _BLOWN_UP and m.uncertainty < 0.5 * m.value)
+        for m in found
+    )
+
+
+def _inside_out(solve: SolveRecord) -> bool:
+    """Whether a note such as ``pieces inside out`` holds anything but zero."""
+    for name, said in solve.notes.items():
+        if name.endswith("inside out"):
+            try:
+                if float(said) != 0.0:
+                    return True
+            except ValueError:
+                return True
+    return False

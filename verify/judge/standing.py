@@ -1,14 +1,16 @@
 """Standing of solvers in one comparison: ranks from intervals, ties where they overlap."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
-from verify.judge.intervals import Interval, NotMeasuredError, error_interval
+from verify.judge.intervals import ERROR_METRICS, Interval, NotMeasuredError, error_interval
 from verify.judge.rates import ROUND_OFF
 from verify.ranking import Comparison, LeftOut, Standing
 from verify.result import CaseResult, SolveRecord, Status
+
+_SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a size exactly
 
 
 @dataclass(frozen=True)
@@ -148,8 +150,8 @@ def _undecided(item: Item) -> str:
     return f"undecided, the uncertainty is not below the value: {', '.join(said)}" if said else ""
 
 
-def item_on_finest(result: CaseResult, name: str, solvers: Sequence[str], label: str) -> Item:
-    """Take a metric of every solver on its finest level; the item is called `label`."""
+def item_on_finest(result: CaseResult, name: str, solvers: Sequence[str]) -> Item:
+    """Take a metric of every solver on its finest level."""
     found, missing = {}, {}
     for solver in solvers:
         own = [s for s in result.solves if s.solver == solver]
@@ -162,7 +164,39 @@ def item_on_finest(result: CaseResult, name: str, solvers: Sequence[str], label:
             missing[solver] = _why(last, name)
         else:
             found[solver] = interval
-    return Item(label, found, missing)
+    return Item(label_of(result, name), found, missing)
+
+
+def item_at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Item | LeftOut:
+    """Take the finest level that all have who have any, if their sizes agree there."""
+    finest = item_on_finest(result, name, solvers)
+    errors = {
+        solver: {
+            s.level: (s, error)
+            for s in result.solves
+            if s.solver == solver and (error := interval_of(s, name)) is not None
+        }
+        for solver in solvers
+    }
+    present = {solver: levels for solver, levels in errors.items() if levels}
+    common = set.intersection(*(set(levels) for levels in present.values())) if present else set()
+    for level in sorted(common, reverse=True):
+        if _same([levels[level][0].size for levels in present.values()]):
+            missing = {s: why for s, why in finest.missing.items() if s not in present}
+            found = {solver: levels[level][1] for solver, levels in present.items()}
+            return Item(label_of(result, name), found, missing)
+    why = "no level on which all have it, with element sizes that agree within 10 %"
+    return LeftOut(label_of(result, name), "", why)
+
+
+def _same(sizes: Iterable[float | None]) -> bool:
+    known = [size or 0.0 for size in sizes]
+    return min(known) > 0.0 and max(known) / min(known) - 1 <= _SAME_SIZE
+
+
+def label_of(result: CaseResult, name: str) -> str:
+    """Return what an item is called: its case, and the quantity if it is one."""
+    return result.case if name in ERROR_METRICS else f"{result.case}, {name}"
 
 
 def interval_of(solve: SolveRecord, name: str) -> Interval | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.judge.work import WorkPoint, pareto_front, time_at, work_points
+from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
 from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.scene import PolylineCut, Scene
 from verify.study.record import Finding, Study

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.cost import work_points
 from verify.judge.system_numbers import critical_step, with_uncut_twin
-from verify.judge.work import work_points
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import Scene
 from verify.solvers import find_solver
