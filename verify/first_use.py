@@ -149,7 +149,7 @@ def _comparison() -> None:
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
-        distance_to_segments(points, points, points)
+        distance_to_segments(points, np.stack([points, points], axis=1))
     sheet = _flat_membrane()
     still = np.zeros((1, *sheet.points.shape))
     SolutionField(Solution(sheet.points, sheet.cells, still)).cells_at(sheet.points)

@@ -3,7 +3,7 @@
 import pytest
 import scenes
 
-from verify.judge.doubtful import locking_notices
+from verify.judge.notices import locking_notices
 from verify.solvers import find_solver
 
 

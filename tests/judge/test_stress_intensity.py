@@ -11,10 +11,10 @@ from reference.exact import exact_solution
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.notices import unavailable_quantities
 from verify.judge.quantities import Measured, unit_of
 from verify.judge.reference import conforming_reference, exact_reference
 from verify.judge.stress_intensity import exact_intensity, solution_intensity
-from verify.judge.unavailable import unavailable_quantities
 from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene

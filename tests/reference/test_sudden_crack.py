@@ -10,10 +10,10 @@ from reference.exact.hooke import Hooke, hooke
 from reference.exact.moving_cracks import sudden_intensity, sudden_slip
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
+from verify.judge.notices import ringing_factors
 from verify.judge.quantities import Measured
 from verify.judge.reference import known_quantity, size_of
 from verify.judge.richardson import extrapolate
-from verify.judge.ringing import ringing_factors
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.conforming import _RADIUS_OF_JUMPS

@@ -104,7 +104,7 @@ class Body:
 
     def tip_distance(self, points: Array) -> Array:
         """Distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
-        return np.asarray(distance_to_segments(points, self.tips, self.tips))
+        return np.asarray(distance_to_segments(points, self.tips[:, None].repeat(2, axis=1)))
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.compare.sides import AskedCut, distance_to_cut
-from verify.compare.simplices import Simplices
+from verify.compare.simplices import Simplices, facet_normals
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def sides_of_cells(
     nodes = np.ascontiguousarray(solution.cells[:, : shape.corners.shape[1]])
     facets = solution.cut_facets
     cell, corner, facet = _cells_on_facets(solution.points, nodes, facets, same)
-    normal = _normals(facets)
+    normal = np.nan_to_num(facet_normals(facets))  # 0 of a point
     beside = _beside_facets(shape, cell, corner, facet, facets, normal)
     cut, along, margin = _orientations(facets, normal, cuts, 0.5 * reach, same)
     centre = shape.corners.mean(axis=1)
@@ -102,17 +102,6 @@ def _cells_on_facets(
     facet = facet_of[number[len(facets) :]]
     kept = facet >= 0
     return row[kept], corner[kept], facet[kept]
-
-
-def _normals(facets: Array) -> Array:
-    """Return unit normals (f, d) of segments or of triangles in space; 0 of a point."""
-    edge = facets[:, 1:] - facets[:, :1]
-    if facets.shape[1] == 2:
-        normal = np.column_stack([-edge[:, 0, 1], edge[:, 0, 0]])
-    else:
-        normal = np.cross(edge[:, 0], edge[:, 1])
-    length = np.linalg.norm(normal, axis=1)[:, None]
-    return np.asarray(normal / np.where(length > 0.0, length, 1.0))
 
 
 def _beside_facets(

@@ -14,16 +14,14 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.cell_tree import build_cell_tree
 from verify.compare.cut_line import CutRule
 from verify.compare.facet_kernels import distance_to_segments, nearest_segments
 from verify.compare.integration import cut_rules
-from verify.compare.locate import ROUND_OFF
+from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_kernels import nearest_triangles
 from verify.compare.sides import distance_to_cut
 from verify.compare.simplex_rule import points_in
-from verify.compare.simplices import simplices, triangle_frames
+from verify.compare.simplices import simplices
 from verify.compare.solid import SolidBody
 from verify.compare.splitting import heights
 from verify.geometry.curves import Arc
@@ -157,7 +155,7 @@ def _to_realised(
     free = _free_faces(facets, body, same)
     away, foot, nearest = _nearest_facets(points, facets, same)
     to_face = free if facets.shape[1] == 3 else np.repeat(free, 2, axis=1)
-    end = distance_to_segments(points, *_ends(to_face)) <= away + same
+    end = distance_to_segments(points, to_face) <= away + same
     if isinstance(body, MembraneBody) and normals is not None:  # the surfaces may be apart
         away = np.abs(np.sum((points - foot) * normals, axis=1))
     return away, end, nearest
@@ -167,7 +165,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
     """Distances (n,) of points from a cut as asked, feet (n, d), and whether it ends there (n,)."""
     if isinstance(body, MembraneBody):
         ends = body.lines[cut].ends
-        away, foot, _ = nearest_segments(points, *_ends(ends))
+        away, foot, _ = nearest_segments(points, ends)
     else:
         pieces = body.cuts[cut]
         feet = np.array([piece.foot(points) for piece in pieces])
@@ -181,7 +179,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
     if isinstance(body, Body):
         ends = np.array([piece.point(np.array([0.0, 1.0])) for piece in body.cuts[cut]])
     free = np.repeat(_free_faces(ends, body, same), 2, axis=1)
-    end = distance_to_segments(points, *_ends(free)) <= away + same
+    end = distance_to_segments(points, free) <= away + same
     if isinstance(body, MembraneBody):  # the surfaces may be apart
         away, _ = distance_to_cut(body.cuts[cut], points)
     return away, foot, end
@@ -192,10 +190,6 @@ def _ends_aside(facets: Array, body: AnyBody, cut: str, limit: float, same: floa
     free = _free_faces(facets, body, same).mean(axis=1)
     away, _, end = _to_asked(free, body, cut, same)
     return bool((~end & (away > limit)).any())
-
-
-def _ends(segments: Array) -> tuple[Array, Array]:
-    return np.ascontiguousarray(segments[:, 0]), np.ascontiguousarray(segments[:, 1])
 
 
 def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
@@ -216,17 +210,9 @@ def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
 def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, Array, Ints]:
     """Distance (n,) of points (n, d), the foot (n, d) on segments, and the nearest facet (n,)."""
     if facets.shape[1] == 2:
-        return nearest_segments(np.ascontiguousarray(points), *_ends(facets))
+        return nearest_segments(points, facets)
     thick = np.flatnonzero(heights(facets) > same)
-    corners = np.ascontiguousarray(facets[thick])
-    shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
-    no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
-    found, away = nearest_triangles(
-        np.ascontiguousarray(points), np.zeros((0, 3)), no_sides[0],
-        tree.over(corners, shape.normals),
-        np.ascontiguousarray(triangle_frames(corners)[:, 2]), no_sides[1], same,
-    )  # fmt: skip
+    found, away = nearest_of_triangles(points, facets[thick], same)
     return away, points, thick[found]
 
 

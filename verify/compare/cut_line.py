@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
+from verify.compare.facet_kernels import nearest_segments
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_cuts import SurfaceLines, nearest_on_lines
+from verify.compare.membrane_cuts import SurfaceLines
 from verify.compare.slabs import graded_breaks
 
 Array = NDArray[np.float64]
@@ -159,7 +160,7 @@ def membrane_cut_rule(body: MembraneBody, spacing: float) -> CutRule:
 def nearest_on_membrane_cut(body: MembraneBody, cut: str, point: Array) -> CutRule:
     """Take the point of a cut that is nearest to `point` (3,), as a rule of weight 1."""
     lines = body.lines[cut]
-    foot, which = nearest_on_lines(point[None], lines.ends)
+    _, foot, which = nearest_segments(point[None], lines.ends)
     return _beside(lines, which, foot, np.ones(1), AWAY * body.size)
 
 

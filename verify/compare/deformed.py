@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from verify.compare.cell_tree import CellTree, build_cell_tree
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.simplices import EDGES, Simplices, simplices
+from verify.compare.simplices import Simplices, facet_nodes, facet_normals, simplices
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def faces_of(solution: Solution, field: SolutionField) -> Faces:
     """
     d, cells = solution.dimension, solution.cells
     opposite = range(d + 1)
-    local = [_facet_nodes(d, corner, solution.order) for corner in opposite]
+    local = [facet_nodes(d, corner, solution.order) for corner in opposite]
     nodes = np.concatenate([cells[:, own] for own in local])
     behind = np.tile(np.arange(len(cells)), d + 1)
     apex = np.concatenate([cells[:, corner] for corner in opposite])
@@ -106,17 +106,6 @@ def faces_of(solution: Solution, field: SolutionField) -> Faces:
         nodes = nodes[:, parts].reshape(-1, d)
         behind, across = (np.repeat(a, len(parts)) for a in (behind, across))
     return Faces(nodes, behind, across)
-
-
-def facet_normals(corners: Array) -> Array:
-    """Return unit normals (f, d) of facets (f, d, d), by the order of their corners."""
-    edges = corners[:, 1:] - corners[:, :1]
-    if corners.shape[2] == 2:
-        across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
-    else:
-        across = np.cross(edges[:, 0], edges[:, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
 
 def deformed_cells(
@@ -160,16 +149,6 @@ def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[
 def _turn(corners: Array) -> Array:
     """Signed volume (m,), up to a factor."""
     return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-
-
-def _facet_nodes(d: int, corner: int, order: int) -> list[int]:
-    """Local nodes of the facet opposite to a corner; of order 2 with its mid-edge nodes."""
-    own = [k for k in range(d + 1) if k != corner]
-    if order == 1:
-        return own
-    ends = [(own[0], own[1])] if d == 2 else [(own[0], own[1]), (own[1], own[2]), (own[0], own[2])]
-    pairs = [tuple(sorted(edge)) for edge in EDGES[d]]
-    return own + [d + 1 + pairs.index(edge) for edge in ends]
 
 
 def _swapped(d: int, order: int) -> list[int]:

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
+from verify.compare.lumping import assembled
 from verify.compare.simplex_rule import simplex_rule
 from verify.compare.simplices import EDGES, simplices
 from verify.errors import InputError
@@ -118,10 +119,7 @@ class Extension:
         for at, weight in zip(*simplex_rule(k, solution.order), strict=True):
             slopes = _slopes(at, shape.gradients, solution.order)
             local += (weight * shape.volume)[:, None, None] * (slopes @ np.swapaxes(slopes, 1, 2))
-        rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
-        columns = np.tile(nodes, nodes.shape[1]).ravel()
-        size = self._places.max() + 1
-        matrix = csr_array((local.ravel(), (rows, columns)), shape=(size, size))
+        matrix = assembled(local, nodes, int(self._places.max()) + 1)
         # a place of cells without volume alone has no equation
         alone = np.where(matrix.diagonal() > 0.0, 0.0, 1.0)
         return csr_array(matrix + diags_array(alone))

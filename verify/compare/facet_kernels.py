@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 _Floats = NDArray[np.float64]
 
 
-def distance_to_segments(points: _Floats, starts: _Floats, ends: _Floats) -> _Floats:
-    """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d); infinite without any."""
-    return nearest_segments(points, starts, ends)[0]
+def distance_to_segments(points: _Floats, segments: _Floats) -> _Floats:
+    """Distance (n,) of points (n, d) to the nearest segment (k, 2, d); infinite without any."""
+    return nearest_segments(points, segments)[0]
 
 
 def nearest_segments(
-    points: _Floats, starts: _Floats, ends: _Floats
+    points: _Floats, segments: _Floats
 ) -> tuple[_Floats, _Floats, NDArray[np.int64]]:
     """Distance (n,) of points (n, d) to the nearest segment, its foot (n, d), and which it is (n,).
 
@@ -21,7 +21,8 @@ def nearest_segments(
     """
     distance, foot = np.empty(len(points)), np.array(points, dtype=float)
     which = np.empty(len(points), dtype=np.int64)
-    _nearest(points, starts, ends, distance, foot, which)
+    starts, ends = (np.ascontiguousarray(segments[:, k]) for k in (0, 1))
+    _nearest(np.ascontiguousarray(points), starts, ends, distance, foot, which)
     return distance, foot, which
 
 

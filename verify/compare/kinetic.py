@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.simplex_rule import simplex_rule
-from verify.compare.simplices import simplices
+from verify.compare.simplices import EDGES, simplices
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
@@ -120,6 +120,5 @@ def shape_functions(place: Array, k: int, order: int) -> Array:
     """Values (q, n) of the nodes' shape functions at barycentric points (q, k + 1)."""
     if order == 1:
         return place
-    ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: k * (k + 1) // 2]
-    edges = [4 * place[:, a] * place[:, b] for a, b in ends]
+    edges = [4 * place[:, a] * place[:, b] for a, b in EDGES[k]]
     return np.column_stack([place * (2 * place - 1), *edges])

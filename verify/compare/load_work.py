@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from verify.compare.kinetic import shape_functions
 from verify.compare.separated import boundary_facets
 from verify.compare.simplex_rule import simplex_rule
-from verify.compare.simplices import EDGES
+from verify.compare.simplices import facet_nodes
 from verify.compare.splitting import measures
 from verify.scene import BodyForce, Scene, Traction
 from verify.scene.history import factor_at
@@ -101,12 +101,6 @@ def boundary_nodes_of_facets(solution: Solution) -> Ints:
     """Nodes (b, f) of the facets of the outer boundary, corners first, then those of edges."""
     k = solution.cell_dimension
     cell, opposite = boundary_facets(solution)
-    rest = np.array([[j for j in range(k + 1) if j != i] for i in range(k + 1)])
-    columns = rest
-    if solution.order == 2:
-        mid = {frozenset(edge): k + 1 + i for i, edge in enumerate(EDGES[k])}
-        ends = EDGES[2] if k == 3 else ((0, 1),)
-        rows = [[mid[frozenset((own[a], own[b]))] for a, b in ends] for own in rest.tolist()]
-        columns = np.column_stack([rest, np.array(rows)])
+    columns = np.array([facet_nodes(k, corner, solution.order) for corner in range(k + 1)])
     nodes: Ints = np.take_along_axis(solution.cells[cell], columns[opposite], axis=1)
     return nodes

@@ -12,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
+from verify.compare.locate_kernels import (
+    evaluate_linear,
+    evaluate_quadratic,
+    find_cells,
+    no_sides,
+)
 from verify.compare.membrane_kernels import nearest_triangles
 from verify.compare.simplices import simplices, straight_or_raise, triangle_frames
 from verify.errors import InputError
@@ -80,7 +85,7 @@ class SolutionField:
         self._across = (
             np.ascontiguousarray(triangle_frames(shape.corners)[:, 2]) if membrane else None
         )
-        self._sides = np.zeros((len(self._cells), 0), dtype=np.int8)
+        self._sides = no_sides(self._cells)
         self._set_nodal(solution.displacement[step])
 
     def _set_nodal(self, displacement: Array) -> None:
@@ -137,7 +142,7 @@ class SolutionField:
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
         """Sides (n, 0) of cuts that are wanted: no cut is known here."""
-        return np.zeros((len(points), 0), dtype=np.int8)
+        return no_sides(points)
 
     def inner_points(self, cells: NDArray[np.int64]) -> Array:
         """Points (n, d) on the sides of the cuts on which given cells (n,) lie: their centres."""
@@ -165,3 +170,27 @@ class SolutionField:
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Displacement gradient (n, d, d) at `points` (n, d)."""
         return self.evaluate(points, near)[1]
+
+
+def nearest_of_triangles(
+    points: Array, corners: Array, tolerance: float
+) -> tuple[NDArray[np.int64], Array]:
+    """Find the triangle (n,) in space nearest to each of `points` (n, 3), and its distance (n,).
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    corners : (m, 3, 3) array
+        Of triangles with an area.
+    tolerance : float
+        Of triangles nearer than this to each other, that one whose edges are farthest, m.
+    """
+    corners = np.ascontiguousarray(corners)
+    shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
+    found: tuple[NDArray[np.int64], Array] = nearest_triangles(
+        np.ascontiguousarray(points), np.zeros((0, 3)), no_sides(points),
+        tree.over(corners, shape.normals),
+        np.ascontiguousarray(triangle_frames(corners)[:, 2]), no_sides(corners), tolerance,
+    )  # fmt: skip
+    return found

@@ -1,5 +1,7 @@
 """Kernels: find the cell that holds a point, and evaluate a P1 or P2 field in it."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -179,6 +181,18 @@ def box_distance2(x, lower, upper):
         if gap > 0.0:
             distance2 += gap * gap
     return distance2
+
+
+def no_sides(places: NDArray[Any]) -> NDArray[np.int8]:
+    """Sides (n, 0) of points or of cells, of which there are n, where no cut is known."""
+    return np.zeros((len(places), 0), dtype=np.int8)
+
+
+def holding_cells(points: Floats, searched: SearchedCells, tolerance: float, **how: bool) -> Ints:
+    """Find the cell (n,) that each point (n, d) lies deepest in; see `find_cells`."""
+    points = np.ascontiguousarray(points, dtype=float)
+    sides = no_sides(searched.corners)
+    return find_cells(points, points[:0], no_sides(points), searched, sides, tolerance, **how)
 
 
 def find_cells(

@@ -84,6 +84,11 @@ def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
     nodes, count = solution.cells, len(solution.points)
     mass = density * simplices(solution.points, nodes).volume
     local = mass[:, None, None] * _consistent(solution.cell_dimension, solution.order)
+    return assembled(local, nodes, count)
+
+
+def assembled(local: Array, nodes: NDArray[np.int64], count: int) -> csr_array:
+    """Matrix (count, count) of those (m, k, k) of cells with given nodes (m, k)."""
     rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
     columns = np.tile(nodes, nodes.shape[1]).ravel()
     return csr_array((local.ravel(), (rows, columns)), shape=(count, count))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.cell_tree import build_cell_tree
-from verify.compare.membrane_cuts import SHORT, SurfaceLines, nearest_on_lines, surface_lines
-from verify.compare.membrane_kernels import nearest_triangles
+from verify.compare.facet_kernels import nearest_segments
+from verify.compare.locate import nearest_of_triangles
+from verify.compare.membrane_cuts import SHORT, SurfaceLines, surface_lines
 from verify.compare.simplex_body import SimplexBody
-from verify.compare.simplices import simplices, triangle_frames
+from verify.compare.simplices import triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.geometry.nearest import feet
 from verify.geometry.patches import PlanePatch
@@ -45,21 +45,13 @@ class MembraneBody(SimplexBody):
 
     def frames_at(self, points: Array) -> Array:
         """Two tangents and the normal (n, 3, 3) of the triangles that points (n, 3) lie in."""
-        corners = np.ascontiguousarray(self.corners)
-        frames = triangle_frames(corners)
-        shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
-        no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
-        found = nearest_triangles(
-            points, np.zeros((0, 3)), no_sides[0], tree.over(corners, shape.normals),
-            np.ascontiguousarray(frames[:, 2]), no_sides[1], 1e-10 * self.size,
-        )[0]  # fmt: skip
-        return frames[found]
+        found, _ = nearest_of_triangles(points, self.corners, 1e-10 * self.size)
+        return triangle_frames(self.corners[found])
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3) on the lines of the cuts, and whether they are tips (n,)."""
         ends = np.concatenate([lines.ends for lines in self.lines.values()])
-        foot, _ = nearest_on_lines(points, ends)
+        _, foot, _ = nearest_segments(points, ends)
         return foot, self.tip_distance(foot) <= _SAME * self.size
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import UnsupportedSceneError
-from verify.geometry.nearest import feet
 from verify.geometry.patches import PlanePatch
 
 Array = NDArray[np.float64]
@@ -77,18 +76,6 @@ def surface_lines(
             rows.append((ends, *ways[which].swapaxes(0, 1)))
         _refuse_folds(points, cells, level, patch, name, SHORT * size)
     return SurfaceLines(*(np.concatenate(column) for column in zip(*rows, strict=True)))
-
-
-def nearest_on_lines(points: Array, ends: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Nearest points (n, 3) on segments (s, 2, 3), s > 0, and the segments (n,) they are on."""
-    best, which = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
-    foot = np.array(points, copy=True)
-    for k, (a, b) in enumerate(ends):
-        candidate = feet(points, a, b)
-        distance = np.linalg.norm(points - candidate, axis=1)
-        closer = distance < best
-        foot[closer], best[closer], which[closer] = candidate[closer], distance[closer], k
-    return foot, which
 
 
 def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:

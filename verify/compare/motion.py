@@ -18,21 +18,39 @@ from verify.solution import Solution
 Array = NDArray[np.float64]
 
 
-class Sampled:
-    """`field`, with its values kept per array of points (by identity; arrays must not change)."""
+_Found = dict[tuple[int, int], tuple[Array, Array | None, NDArray[np.int64]]]
 
-    def __init__(self, field: Field) -> None:
-        self._field = field
+
+class Sampled:
+    """A field with its values kept per array of points (by identity; arrays must not change).
+
+    Parameters
+    ----------
+    field : Field
+    found : dict, optional
+        Cells of arrays of points, if it is a solution's: kept for all of its output times.
+    """
+
+    def __init__(self, field: Field, found: _Found | None = None) -> None:
+        self._field, self._found = field, {} if found is None else found
         self._kept: dict[tuple[int, int, str], tuple[Array, Array | None, Array]] = {}
+
+    def cells(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
+        """Cells (n,) of a solution that hold `points` (n, d), on the side of `near`."""
+        assert isinstance(self._field, SolutionField)
+        key = id(points), id(near)
+        if key not in self._found:  # holds the arrays, so that their ids stay theirs
+            self._found[key] = points, near, self._field.cells_at(points, near)
+        return self._found[key][2]
 
     def _at(self, what: str, points: Array, near: Array | None) -> Array:
         key = id(points), id(near)
         if (*key, what) not in self._kept:
-            evaluate = getattr(self._field, "evaluate", None)
-            if evaluate is None:  # a formula: only what is asked for
+            if isinstance(self._field, SolutionField):
+                both = self._field.in_cells(points, self.cells(points, near))
+                found = dict(zip(("displacement", "gradient"), both, strict=True))
+            else:  # a formula: only what is asked for
                 found = {what: getattr(self._field, what)(points, near)}
-            else:
-                found = dict(zip(("displacement", "gradient"), evaluate(points, near), strict=True))
             for name, values in found.items():  # holds the arrays, so ids stay theirs
                 self._kept[(*key, name)] = points, near, values
         return self._kept[(*key, what)][2]
@@ -113,7 +131,7 @@ class SolutionMotion:
 
     def differs(self, other: "SolutionMotion", points: Array) -> NDArray[np.bool_]:
         """Whether another motion of the same solution is of another cell at points (n, d)."""
-        own, others = (_Located(m._field, m._found).cells(points, points) for m in (self, other))
+        own, others = (Sampled(m._field, m._found).cells(points, points) for m in (self, other))
         return np.asarray(own != others)
 
     def at(self, time: float | None = None) -> Field:
@@ -128,7 +146,7 @@ class SolutionMotion:
         when = float(times[-1] if time is None else time)
         if self._last is None or self._last[0] != when:
             field = self._field.with_nodal(self.nodal(when))
-            self._last = when, Sampled(_Located(field, self._found))
+            self._last = when, Sampled(field, self._found)
         return self._last[1]
 
     def nodal(self, time: float | None = None) -> Array:
@@ -189,28 +207,3 @@ class ExactMotion:
 def field_at(exact: Any, time: float | None) -> Any:
     """Return an exact field at a time, s: itself where there is no time or it stands still."""
     return exact.at(time) if time is not None and hasattr(exact, "at") else exact
-
-
-_Found = dict[tuple[int, int], tuple[Array, Array | None, NDArray[np.int64]]]
-
-
-class _Located:
-    """A solution's field that keeps the cells of arrays of points, which must not change."""
-
-    def __init__(self, field: SolutionField, found: _Found) -> None:
-        self._field, self._found = field, found
-
-    def cells(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
-        key = id(points), id(near)
-        if key not in self._found:  # holds the arrays, so that their ids stay theirs
-            self._found[key] = points, near, self._field.cells_at(points, near)
-        return self._found[key][2]
-
-    def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
-        return self._field.in_cells(points, self.cells(points, near))
-
-    def displacement(self, points: Array, near: Array | None = None) -> Array:
-        return self.evaluate(points, near)[0]
-
-    def gradient(self, points: Array, near: Array | None = None) -> Array:
-        return self.evaluate(points, near)[1]

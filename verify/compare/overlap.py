@@ -17,12 +17,12 @@ from verify.compare.deformed import (
     Faces,
     deformed_cells,
     faces_of,
-    facet_normals,
     is_glued,
 )
 from verify.compare.locate import SolutionField
-from verify.compare.locate_kernels import find_cells
+from verify.compare.locate_kernels import holding_cells
 from verify.compare.overlap_kernels import facet_distances, first_exits, nearest_before
+from verify.compare.simplices import facet_normals
 from verify.errors import UnsupportedSceneError
 from verify.solution import Solution
 
@@ -177,8 +177,7 @@ class OverlapSearch:
         a cell is on the inner side of the faces of its own part, and of no other.
         """
         shape = cells.shape
-        off = points[:, None] - np.roll(shape.corners[held], -1, axis=1)
-        height = np.sum(shape.normals[held] * off, axis=2)
+        height = shape.heights(points, held)
         # barycentric: height over a facet, over that of the opposite corner
         shares = height * np.linalg.norm(shape.gradients[held], axis=2)
         places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
@@ -191,12 +190,8 @@ class OverlapSearch:
         return found
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
-        no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(cells.nodes))]
         searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
-        return find_cells(
-            np.ascontiguousarray(points), points[:0], no_sides[0], searched, no_sides[1],
-            _INSIDE * self._size, nearest=False,
-        )  # fmt: skip
+        return holding_cells(points, searched, _INSIDE * self._size, nearest=False)
 
 
 def _smallest_height(corners: Array) -> Array:

@@ -16,7 +16,7 @@ from verify.compare.body import AnyBody
 from verify.compare.cell_sides import sides_of_cells
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.locate_kernels import find_cells
+from verify.compare.locate_kernels import holding_cells
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_field import MembraneField
 from verify.compare.sides import asked_cuts, asked_sides
@@ -126,11 +126,6 @@ class SidedField(SolutionField):
 
     def _in_material(self, points: Array) -> NDArray[np.bool_]:
         """Whether points (n, d) lie in a cell: in a hole that a method left nothing is stored."""
-        free, sides = (np.zeros((len(a), 0), dtype=np.int8) for a in (points, self._cells))
         tolerance = ROUND_OFF * self.scale
-        at = find_cells(
-            np.ascontiguousarray(points), points[:0], free, self._searched, sides, tolerance
-        )
-        off = points[:, None] - np.roll(self.shape.corners[at], -1, axis=1)
-        height = np.sum(self.shape.normals[at] * off, axis=2)
+        height = self.shape.heights(points, holding_cells(points, self._searched, tolerance))
         return np.asarray(height.min(axis=1, initial=np.inf) >= -tolerance)

@@ -23,10 +23,6 @@ from verify.result import Metric
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
-RELEASED = (
-    "released", "released_to_cut", "released_to_scheme", "released_to_damping",
-    "released_to_kinetic", "released_to_strain", "released_to_short_waves", "released_mismatch",
-)  # fmt: skip
 _UNIT = "J/m²"
 _PERIODS = 4.0  # shortest waves last up to that many h/c
 

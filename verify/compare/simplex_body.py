@@ -62,8 +62,7 @@ class SimplexBody:
 
     def tip_distance(self, points: Array) -> Array:
         """Distance (n,) of points (n, 3) to the nearest front; infinite without one."""
-        starts, ends = (np.ascontiguousarray(self.front[:, k]) for k in (0, 1))
-        return np.asarray(distance_to_segments(np.ascontiguousarray(points), starts, ends))
+        return distance_to_segments(points, self.front)
 
     def frames_at(self, points: Array) -> Array | None:
         """Two tangents and the normal (n, 3, 3) of a surface at points (n, 3); a solid has none."""

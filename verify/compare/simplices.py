@@ -16,7 +16,11 @@ Array = NDArray[np.float64]
 
 _CORNERS = {3: 3, 6: 3, 4: 4, 10: 4}  # by the nodes of a cell
 # corners at the ends of each mid-edge node, in VTK's order; by the dimension of the cells
-EDGES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))}
+EDGES = {
+    1: ((0, 1),),
+    2: ((0, 1), (1, 2), (2, 0)),
+    3: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+}
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,11 @@ class Simplices:
     gradients: Array
     normals: Array
     degenerate: NDArray[np.bool_]
+
+    def heights(self, points: Array, cells: NDArray[np.int64]) -> Array:
+        """Heights (n, k+1) of points (n, d) over the facets of given cells (n,), m."""
+        off = points[:, None] - np.roll(self.corners[cells], -1, axis=1)
+        return np.asarray(np.sum(self.normals[cells] * off, axis=2))
 
 
 def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
@@ -100,6 +109,27 @@ def in_frames(gradient: Array, frames: Array) -> Array:
     the gradient of what it becomes by way of the nearest points.
     """
     return np.asarray(frames @ gradient @ np.swapaxes(frames[:, :2], 1, 2))
+
+
+def facet_normals(corners: Array) -> Array:
+    """Return unit normals (f, d) of facets (f, d, d), by the order of their corners."""
+    edges = corners[:, 1:] - corners[:, :1]
+    if corners.shape[2] == 2:
+        across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
+    else:
+        across = np.cross(edges[:, 0], edges[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+
+
+def facet_nodes(d: int, corner: int, order: int) -> list[int]:
+    """Local nodes of the facet opposite to a corner; of order 2 with its mid-edge nodes."""
+    own = [k for k in range(d + 1) if k != corner]
+    if order == 1:
+        return own
+    ends = [(own[0], own[1])] if d == 2 else [(own[0], own[1]), (own[1], own[2]), (own[0], own[2])]
+    pairs = [tuple(sorted(edge)) for edge in EDGES[d]]
+    return own + [d + 1 + pairs.index(edge) for edge in ends]
 
 
 def straight_or_raise(points: Array, cells: NDArray[np.int64]) -> None:

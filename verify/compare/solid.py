@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.locate_kernels import find_cells
+from verify.compare.locate_kernels import holding_cells
 from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplices import simplices
 from verify.errors import UnsupportedSceneError
@@ -103,15 +103,10 @@ def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
     shape = simplices(points, cells)
     tree = build_cell_tree(shape.corners.min(axis=1), shape.corners.max(axis=1))
     searched = tree.over(shape.corners, shape.normals)
-    no_sides = np.zeros((len(cells), 0), dtype=np.int8)
     margin = _MARGIN * float(np.linalg.norm(np.ptp(points, axis=0)))
 
     def inside(x: Array) -> NDArray[np.bool_]:
-        x = np.ascontiguousarray(x, dtype=float)
-        at = find_cells(
-            x, np.zeros((0, 3)), np.zeros((len(x), 0), dtype=np.int8), searched, no_sides, margin
-        )
-        height = np.sum(shape.normals[at] * (x[:, None] - np.roll(shape.corners[at], -1, 1)), 2)
+        height = shape.heights(x, holding_cells(x, searched, margin))
         return np.asarray(height.min(axis=1) >= -margin)
 
     return inside

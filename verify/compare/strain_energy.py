@@ -1,6 +1,6 @@
 """Energies: of a solution, of a field, of a difference from an exact field, above a frequency."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -81,19 +81,25 @@ def _integrated(
     """Integrate over each cell a density of points and of gradients of fields there."""
     solution, shape = field.solution, field.shape
     order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
-    every = np.arange(len(solution.cells))
-    found = np.zeros(len(solution.cells))
+    every, found = np.arange(len(solution.cells)), np.zeros(len(solution.cells))
     membrane = solution.cell_dimension < solution.dimension
     frames = triangle_frames(shape.corners) if membrane else None
-    for weights, share in zip(*simplex_rule(solution.cell_dimension, order), strict=True):
-        points = np.einsum("k,mka->ma", weights, shape.corners)
+    for points, measure in _points_of_cells(field, order):
 
         def gradient(of: SolutionField, points: Array = points) -> Array:
             value = of.in_cells(points, every)[1]
             return value if frames is None else in_frames(value, frames)
 
-        found += share * shape.volume * density(points, gradient)
+        found += measure * density(points, gradient)
     return found
+
+
+def _points_of_cells(field: SolutionField, order: int) -> Iterator[tuple[Array, Array]]:
+    """Yield a point (m, d) in each cell and the measure (m,) that it stands for."""
+    shape = field.shape
+    rule = simplex_rule(field.solution.cell_dimension, order)
+    for weights, share in zip(*rule, strict=True):
+        yield np.einsum("k,mka->ma", weights, shape.corners), share * shape.volume
 
 
 def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
@@ -133,9 +139,7 @@ def difference_energy(
     every = np.arange(len(solution.cells))
     near = field.shape.corners.mean(axis=1)
     kinetic = strain = 0.0
-    for weights, share in zip(*simplex_rule(solution.cell_dimension, _ORDER), strict=True):
-        points = np.einsum("k,mka->ma", weights, field.shape.corners)
-        measure = share * field.shape.volume
+    for points, measure in _points_of_cells(field, _ORDER):
         off = field.in_cells(points, every)[1] - exact.gradient(points, near)
         strain += float(measure @ law.at(points).energy_density(off))
         slip = moving.in_cells(points, every)[0] - exact.velocity(points, near)
@@ -171,10 +175,8 @@ def short_wave_energy(solution: Solution, period: float, density: Density) -> fl
     field, energy = SolutionField(solution), 0.0
     every = np.arange(len(solution.cells))
     order = 2 if solution.order == 1 else 3
-    for weights, share in zip(*simplex_rule(solution.cell_dimension, order), strict=True):
-        points = np.einsum("k,mka->ma", weights, field.shape.corners)
+    for points, measure in _points_of_cells(field, order):
         for one in fast:
             slip = field.with_nodal(one).in_cells(points, every)[0]
-            mass = density * share * field.shape.volume
-            energy += 0.5 * float(mass @ np.sum(slip**2, axis=1))
+            energy += 0.5 * float((density * measure) @ np.sum(slip**2, axis=1))
     return energy / len(fast)

@@ -24,8 +24,14 @@ from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
-from verify.judge.doubtful import absurd_strain, doubtful_errors, locking_notices
 from verify.judge.intervals import error_interval
+from verify.judge.notices import (
+    absurd_strain,
+    doubtful_errors,
+    locking_notices,
+    ringing_factors,
+    unavailable_quantities,
+)
 from verify.judge.quantities import Measured, unit_of
 from verify.judge.rates import observed_rate, shifted_ends
 from verify.judge.reference import (
@@ -36,9 +42,7 @@ from verify.judge.reference import (
     conforming_reference,
     exact_reference,
 )
-from verify.judge.ringing import ringing_factors
 from verify.judge.sufficiency import sufficiency
-from verify.judge.unavailable import unavailable_quantities
 from verify.printable import one_line
 from verify.reference_record import ReferenceRecord
 from verify.result import (

@@ -1,14 +1,16 @@
-"""Answers that mean little: errors above 100 % beside ratios, absurd strains, locking."""
+"""Notices beside the verdicts: answers that mean little, and quantities that cannot be had."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from reference.moduli import wave_speed
 from verify.compare.hooke import Law
 from verify.compare.strain_energy import strain_energy
 from verify.judge.intervals import NotMeasuredError, error_interval
-from verify.result import Notice, NoticeKind, SolveRecord
+from verify.result import Notice, NoticeKind, SolveRecord, Status, finest_of
 from verify.scene import RatioCheck, Scene
+from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Solution
 
 _ALL = 1.0  # relative error of a solver that answers zero
@@ -19,6 +21,10 @@ _ABSURD = 10.0
 # SIAM J. Numer. Anal. 29, 1992, 1261): h counts as so much more than at ν = 0.3. Below two such
 # elements across, a body cannot bend. Up to ν = 0.45 a pressure does not pay.
 _COMPRESSIBLE, _NEARLY, _ACROSS = 0.3, 0.45, 2.0
+# Of h/c. Quadratic elements carry waves down to about 2h; those turn by π times this per step, and
+# what turns by less than about 1 the time scheme no longer damps. They do not leave a graded mesh.
+# A suddenly pressed crack, K off: 5e-4 at 0.3, 1e-3 at 0.22, 3e-2 at 0.11.
+_SHORT = 0.25
 
 
 def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
@@ -30,8 +36,7 @@ def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice
         return []
     found = []
     metrics = dict.fromkeys(check.metric for check in scene.acceptance)
-    finest = {r.solver: r for r in sorted(records, key=lambda one: one.level)}
-    for record in finest.values():
+    for record in finest_of(records).values():
         for metric in filter(None, map(record.metric, metrics)):
             try:
                 error = error_interval(metric)
@@ -107,3 +112,84 @@ def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]
             )
             found.append(Notice(NoticeKind.WARNING, "locking", name, text))
     return found
+
+
+def ringing_factors(scene: Scene, levels: Mapping[int, Solution]) -> list[Notice]:
+    """Warn of the factors of a reference whose steps are far shorter than a wave takes across h.
+
+    Parameters
+    ----------
+    scene : Scene
+    levels : mapping of int to Solution
+        Of a conforming reference: every level halves step and elements. Empty without one.
+    """
+    names = [one.name for one in scene.quantities if isinstance(one, StressIntensityQuantity)]
+    duration = scene.analysis.duration
+    if not names or not levels or duration is None:
+        return []
+    solution = levels[max(levels)]
+    steps = solution.iterations.get("steps")
+    if not steps:
+        return []
+    step, across = duration / steps, float(solution.size / wave_speed(scene.material))
+    if step >= _SHORT * across:
+        return []
+    text = (
+        f"the mean step of the reference, {step:.3g} s, is {step / across:.2g} of the time in "
+        f"which a pressure wave crosses its elements, {across:.3g} s: short waves stay between "
+        "elements of different sizes and ring in these factors. Fewer outputs, a longer time_step "
+        "or a smaller reference.size help"
+    )
+    return [Notice(NoticeKind.WARNING, ", ".join(names), "reference", text)]
+
+
+def unavailable_quantities(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
+    """Make a notice of each quantity that a solver's answer, on some level, does not have.
+
+    Parameters
+    ----------
+    scene : Scene
+    records : sequence of SolveRecord
+        Measured. What failed is said elsewhere; its quantities are not missed here.
+    """
+    solved = [record for record in records if record.status is Status.SOLVED]
+    solvers = list(dict.fromkeys(record.solver for record in solved))
+    notices = []
+    for asked in scene.quantities:
+        said: dict[str | None, str | None] = {
+            solver: _reason([r for r in solved if r.solver == solver], asked.name)
+            for solver in solvers
+        }
+        texts = set(said.values())
+        if len(solvers) > 1 and len(texts) == 1 and None not in texts:
+            said = {None: texts.pop()}
+        notices += [
+            Notice(NoticeKind.UNAVAILABLE, asked.name, solver, text)
+            for solver, text in said.items()
+            if text is not None
+        ]
+    return notices
+
+
+def _reason(own: Sequence[SolveRecord], name: str) -> str | None:
+    """Why one solver's answers lack a quantity, with the levels if it is not all of them."""
+    lacking: dict[str, list[int]] = {}
+    for record in own:
+        if record.metric(name) is None:
+            reason = record.notes.get(name, "it was not measured")
+            lacking.setdefault(reason, []).append(record.level)
+    if not lacking:
+        return None
+    if len(lacking) == 1 and len(next(iter(lacking.values()))) == len(own):
+        return next(iter(lacking))
+    parts = [f"on {_named_levels(levels)}: {reason}" for reason, levels in lacking.items()]
+    having = [record.level for record in own if record.metric(name) is not None]
+    return "; ".join(parts) + (f" ({_named_levels(having)} {_has(having)} it)" if having else "")
+
+
+def _named_levels(levels: Sequence[int]) -> str:
+    return f"level{'s' * (len(levels) > 1)} {', '.join(map(str, sorted(levels)))}"
+
+
+def _has(levels: Sequence[int]) -> str:
+    return "have" if len(levels) > 1 else "has"
