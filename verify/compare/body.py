@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.membrane_body import MembraneBody, membrane_of
+from verify.compare.sides import distance_to_cut
 from verify.compare.solid import SolidBody, solid_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
@@ -108,14 +109,8 @@ class Body:
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""
-        best = np.full(len(points), np.inf)
-        foot = np.array(points, copy=True)
-        for pieces in self.cuts.values():
-            for piece in pieces:
-                candidate = piece.point(piece.nearest(points))
-                distance = np.linalg.norm(points - candidate, axis=1)
-                closer = distance < best
-                foot[closer], best[closer] = candidate[closer], distance[closer]
+        pieces = [piece for cut in self.cuts.values() for piece in cut]
+        foot = distance_to_cut(pieces, points)[1]
         return foot, self.tip_distance(foot) <= 1e-10 * self.size
 
 

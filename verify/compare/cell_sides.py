@@ -133,7 +133,7 @@ def _orientations(
     cosine, doubt = np.zeros((2, len(cuts), count))
     shift = 1e4 * step * normal  # the level is a distance: its slope is a cosine
     for k, pieces in enumerate(cuts):
-        away, nearest = distance_to_cut(pieces, probes.reshape(-1, d))
+        away, _, nearest = distance_to_cut(pieces, probes.reshape(-1, d))
         for number, piece in enumerate(pieces):
             at = np.flatnonzero(nearest.reshape(count, each)[:, -1] == number)
             centre = probes[at, -1]

@@ -181,7 +181,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
     free = np.repeat(_free_faces(ends, body, same), 2, axis=1)
     end = distance_to_segments(points, free) <= away + same
     if isinstance(body, MembraneBody):  # the surfaces may be apart
-        away, _ = distance_to_cut(body.cuts[cut], points)
+        away = distance_to_cut(body.cuts[cut], points)[0]
     return away, foot, end
 
 

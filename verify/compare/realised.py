@@ -19,7 +19,7 @@ from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.locate_kernels import holding_cells
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_field import MembraneField
-from verify.compare.sides import asked_cuts, asked_sides
+from verify.compare.sides import asked_sides
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class SidedField(SolutionField):
     ) -> None:
         super().__init__(solution, step)
         self._cut = cut
-        self._cuts, self._size = asked_cuts(body), body.size
+        self._cuts, self._size = list(body.cuts.values()), body.size
         same = ROUND_OFF * body.size
         self._reach = 2.0 * max(cut_deviation(solution, body), deviation, same)
         self._sides = sides_of_cells(solution, self.shape, self._cuts, self._reach, same)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.body import AnyBody
 from verify.geometry.curves import Piece
 from verify.geometry.patches import Patch
 
@@ -17,11 +16,6 @@ AskedCut = Sequence[Piece | Patch]
 _SAME = 1e-12
 # A point is beside a piece if the way to its foot is normal to the piece, up to this angle².
 _NORMAL = 1e-9
-
-
-def asked_cuts(body: AnyBody) -> list[AskedCut]:
-    """Pieces of each cut of a body as asked, in the plane curves and in space patches."""
-    return list(body.cuts.values())
 
 
 def asked_sides(cuts: Sequence[AskedCut], points: Array, reach: Array, size: float) -> Sides:
@@ -38,11 +32,12 @@ def asked_sides(cuts: Sequence[AskedCut], points: Array, reach: Array, size: flo
     return sides
 
 
-def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Distance (n,) of points to a cut as asked, m, and the piece (n,) that is nearest."""
-    away = np.array([_distance(piece, points) for piece in pieces])
-    nearest = np.asarray(away.argmin(axis=0))
-    return away[nearest, np.arange(len(points))], nearest
+def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Distances (n,) of points to a cut as asked, m, feet (n, d), and the nearest pieces (n,)."""
+    feet = np.array([piece.foot(points) for piece in pieces])
+    away = np.linalg.norm(points - feet, axis=2)
+    nearest, rows = away.argmin(axis=0), np.arange(len(points))
+    return away[nearest, rows], feet[nearest, rows], np.asarray(nearest)
 
 
 def _distance(piece: Piece | Patch, points: Array) -> Array:

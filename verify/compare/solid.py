@@ -40,16 +40,10 @@ class SolidBody(SimplexBody):
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3) on the cuts as asked, and whether they are ends of these (n,)."""
-        best, end = np.full(len(points), np.inf), np.zeros(len(points), dtype=bool)
-        foot = np.array(points, copy=True)
-        for patch in self.patches:
-            candidate, rim = patch.nearest(points)
-            distance = np.linalg.norm(points - candidate, axis=1)
-            closer = distance < best
-            foot[closer], best[closer], end[closer] = (
-                candidate[closer], distance[closer], rim[closer],
-            )  # fmt: skip
-        return foot, end
+        found = [patch.nearest(points) for patch in self.patches]
+        feet, rims = (np.array(column) for column in zip(*found, strict=True))
+        nearest = np.linalg.norm(points - feet, axis=2).argmin(axis=0), np.arange(len(points))
+        return feet[nearest], rims[nearest]
 
 
 def solid_of(scene: Scene) -> SolidBody:
