@@ -61,7 +61,7 @@ def _over_scenes(arguments: argparse.Namespace, announce: Callable[[str], None])
     """Run the study of slivers or of energy over the cases and solvers that are asked for."""
     from verify.runner.selection import select_cases
     from verify.study.energy import energy_study
-    from verify.study.measured_scenes import variant_of
+    from verify.study.measured_scenes import Making, variant_of
     from verify.study.slivers import sliver_study
 
     slivers = arguments.study == "slivers"
@@ -71,4 +71,5 @@ def _over_scenes(arguments: argparse.Namespace, announce: Callable[[str], None])
     scenes = select_cases(cases, expression, "quick" if quick else "heavy")
     variants = [variant_of(text) for text in arguments.solvers or ("xfem", "conforming")]
     study = sliver_study if slivers else energy_study
-    return study(scenes, variants, announce, arguments.processes, arguments.quick)
+    making = Making(arguments.out / f"{arguments.study}-parts", announce, arguments.processes)
+    return study(scenes, variants, making, arguments.quick)

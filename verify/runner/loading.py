@@ -125,10 +125,11 @@ def _loaded(name: str, parameters: Mapping[str, Any]) -> dict[str, str]:
         check_parameters(solver_in(name), solver, parameters)
     except InputError as error:
         return {"bad_parameter": str(error)}
-    return {"source": "" if module_of(name) else _source(solver)}  # ours is known by its code
+    return {"source": "" if module_of(name) else source_of(solver)}  # ours is known by its code
 
 
-def _source(solver: Any) -> str:
+def source_of(solver: Any) -> str:
+    """Return the digest of the file that defines a solver, and of those that it says it needs."""
     with suppress(OSError, TypeError):  # of no file, or of one that is not there
         source = inspect.getsourcefile(type(solver))
         files = [Path(source)] if source else []

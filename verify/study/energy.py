@@ -1,19 +1,19 @@
 """The energy study: what any solver keeps of energy, momenta and mass in motions."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from time import perf_counter
-from typing import Any
 
 from verify.errors import InputError
 from verify.result import Verdict
-from verify.scene import Scene, scene_content
+from verify.scene import Scene
 from verify.study.measured_scenes import (
     AT_MOST,
+    Making,
     MeasuredStudy,
     Measurement,
     Variant,
     measured_families,
-    measured_scenes,
+    measured_scene,
     missing_solutions,
 )
 from verify.study.record import Finding
@@ -27,8 +27,7 @@ _BESIDE = ("energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch
 def energy_study(
     scenes: Sequence[Scene],
     variants: Sequence[Variant],
-    announce: Callable[[str], None] = lambda text: None,
-    processes: int = 1,
+    making: Making,
     quick: bool = False,
 ) -> MeasuredStudy:
     """Run every motion with every solver, and measure what is kept.
@@ -38,25 +37,24 @@ def energy_study(
     scenes : sequence of Scene
         Those that do not move are left out.
     variants : sequence of Variant
-    announce, processes, quick
-        As of `verify.study.slivers.sliver_study`.
+    making : Making
+    quick : bool
+        For the record.
 
     Raises
     ------
     InputError
         If no scene moves.
-    ChildProcessError
-        If a process is killed.
     """
-    cases: dict[str, list[dict[str, Any]]] = {}
+    cases: dict[str, list[Scene]] = {}
     for scene in scenes:
         if scene.analysis.kind == "dynamic":
             name = scene.row.family if scene.row else scene.name
-            cases.setdefault(name, []).append(scene_content(scene))
+            cases.setdefault(name, []).append(scene)
     if not cases:
         raise InputError("no case with a dynamic analysis; see `verify list`")
     start = perf_counter()
-    every = measured_families(measured_scenes, cases, variants, announce, processes)
+    every = measured_families(measured_scene, cases, variants, making)
     return MeasuredStudy(
         findings=list(_findings(every)), seconds=perf_counter() - start, quick=quick,
         measurements=every,

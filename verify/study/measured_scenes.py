@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,12 @@ from verify.judge.accuracy import assess_accuracy
 from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
-from verify.scene import Scene, ValueCheck, restore_scene
+from verify.runner.tasks import Failure, Limits, Task, made
+from verify.scene import Scene, ValueCheck, restore_scene, scene_content
 from verify.solution import handed_over
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import checked_refusal
 from verify.solvers.named import one_name, parameters_in, solver_in
-from verify.study.in_processes import in_processes
 from verify.study.record import Finding, Study
 
 AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
@@ -108,75 +109,100 @@ class MeasuredStudy(Study):
         return [asdict(one) for one in self.measurements]
 
 
-def measured_scenes(
-    variant: Variant, contents: Sequence[dict[str, Any]], further: Further | None = None
-) -> list[Measurement]:
-    """Solve scenes on their finest level and measure what the comparison measures of each.
+def measured_scene(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
+    """Solve a scene on its finest level and measure what the comparison measures of it.
 
     Parameters
     ----------
-    variant : Variant
-    contents : sequence of dict
-        As `verify.scene.scene_content` writes them.
-    further : callable, optional
-        What else is measured: it yields (quantity, unit, value, reason).
+    variant : dict
+        Values of a `Variant`.
+    content : dict
+        As `verify.scene.scene_content` writes it.
+    """
+    return measurements(Variant(**variant), restore_scene(content))
 
-    Notes
-    -----
+
+def measurements(
+    variant: Variant, scene: Scene, further: Further | None = None
+) -> list[Measurement]:
+    """Measure a scene, and what `further` yields: (quantity, unit, value, reason).
+
     Whatever a solver raises is a row with its reason.
     """
-    solver = variant.found()
-    found = []
-    for content in contents:
-        scene = restore_scene(content)
-        family = scene.row.family if scene.row else scene.name
-        size = scene.row.value if scene.row else None
-        level = scene.mesh.count - 1
-        rows: list[Row]
-        try:
-            if refusal := checked_refusal(solver.refuses(scene)):
-                raise UnsupportedSceneError(refusal)
-            rows = list(_solved(solver, variant, scene, level))
-        except Exception as problem:  # a guest may raise anything
-            rows = [("solution", "", None, one_line(f"{type(problem).__name__}: {problem}"))]
-        if further is not None:
-            rows += further(solver, variant, scene, level)
-        found += [Measurement(family, size, variant.label, *row) for row in rows]
-    return found
+    solver, level = variant.found(), scene.mesh.count - 1
+    rows: list[Row]
+    try:
+        if refusal := checked_refusal(solver.refuses(scene)):
+            raise UnsupportedSceneError(refusal)
+        rows = list(_solved(solver, variant, scene, level))
+    except Exception as problem:  # a guest may raise anything
+        rows = [("solution", "", None, one_line(f"{type(problem).__name__}: {problem}"))]
+    if further is not None:
+        rows += further(solver, variant, scene, level)
+    return [Measurement(*_place(scene), variant.label, *row) for row in rows]
+
+
+def _place(scene: Scene) -> tuple[str, float | None]:
+    return (scene.row.family, scene.row.value) if scene.row else (scene.name, None)
+
+
+@dataclass(frozen=True)
+class Making:
+    """How a study makes its parts.
+
+    Attributes
+    ----------
+    folder : Path
+        In which they are kept, for the next time.
+    announce : callable
+        Told what has ended.
+    processes : int
+        Side by side.
+    """
+
+    folder: Path
+    announce: Callable[[str], None] = lambda text: None
+    processes: int = 1
 
 
 def measured_families(
-    measure: Callable[[Variant, list[dict[str, Any]]], list[Measurement]],
-    families: Mapping[str, list[dict[str, Any]]],
+    measure: Callable[[dict[str, Any], dict[str, Any]], list[Measurement]],
+    families: Mapping[str, Sequence[Scene]],
     variants: Sequence[Variant],
-    announce: Callable[[str], None],
-    processes: int,
+    making: Making,
 ) -> list[Measurement]:
     """Measure the scenes of every family by every variant, side by side, in their order.
 
     Parameters
     ----------
     measure : callable
-        Of a variant and the contents of a family's scenes; as `measured_scenes`.
-    families : mapping of str to list of dict
-        Contents of scenes by family.
+        Of a variant and the content of a scene; as `measured_scene`.
+    families : mapping of str to sequence of Scene
     variants : sequence of Variant
-    announce : callable
-        Told what is done.
-    processes : int
+    making : Making
 
-    Raises
-    ------
-    ChildProcessError
-        If a process is killed.
+    Notes
+    -----
+    A part that ran out of time or memory, or died, is a row with its reason.
     """
-    parts = [(variant, rows) for rows in families.values() for variant in variants]
-    found: dict[int, list[Measurement]] = {}
-    for index, measured in in_processes(measure, parts, processes):
-        found[index] = measured
-        name = f"{measured[0].family}, {parts[index][0].label}"
-        announce(f"{name}: {len(found)} of {len(parts)} parts")
-    return [one for index in sorted(found) for one in found[index]]
+    parts = [(v, scene) for rows in families.values() for v in variants for scene in rows]
+    tasks = [
+        Task(
+            f"{scene.name} {variant.label}",
+            measure,
+            {"variant": asdict(variant), "content": scene_content(scene)},
+            (variant.label,),
+        )
+        for variant, scene in parts
+    ]
+    found = made(tasks, making.folder, making.announce, Limits(making.processes))
+    rows = []
+    for (variant, scene), own in zip(parts, found, strict=True):
+        if isinstance(own, Failure):
+            where = *_place(scene), variant.label
+            own = [Measurement(*where, "solution", "", None, own.reason)]
+        rows += own
+    return rows
 
 
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from itertools import chain
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -11,12 +11,13 @@ from typing import Any
 from scipy.special import betainc
 
 from verify.result import Verdict
+from verify.runner.tasks import Task, all_made
 from verify.study.calibration.families import families
-from verify.study.calibration.kept import KeptTrials
 from verify.study.calibration.series import series_families
-from verify.study.calibration.trial import NORMS, Trial, trials
+from verify.study.calibration.trial import NORMS, Trial, trials_of
 from verify.study.record import Finding, Study
 
+FOLDER = "calibration-parts"
 COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked for
 WASTED = 10.0  # an error bar that is so many times the error judges little
 SIGNIFICANCE = 0.05  # of the binomial test that rejects a share
@@ -60,16 +61,28 @@ def calibration_study(
         Is told what is being solved.
     seed : int
         Of all random numbers.
-    directory : Path, optional
+    directory : Path
         Where trials are kept scene by scene, so that a run that is broken off can be resumed.
+
+    Raises
+    ------
+    ChildProcessError
+        If a scene cannot be solved; what was found of the others is kept.
     """
-    start, kept = perf_counter(), KeptTrials(directory, seed)
+    start = perf_counter()
     announce(f"seed {seed}")
     found = [one for family in series_families(quick) for one in family.trials(seed)]
-    for family in families(quick):
-        announce(f"{family.name}, {family.scenes} scenes of {family.levels} levels")
-        for index in range(family.scenes):
-            found += kept.of(family.name, index, partial(trials, family, index, seed))
+    tasks = [
+        Task(
+            f"{family.name}, scene {index}",
+            trials_of,
+            {"family": family.name, "index": index, "seed": seed},
+            ("reference",),
+        )
+        for family in families(quick)
+        for index in range(family.scenes)
+    ]
+    found += chain.from_iterable(all_made(tasks, directory / FOLDER, announce))
     findings = calibration_findings(found, quick)
     return CalibrationStudy(
         findings=findings, seconds=perf_counter() - start, trials=found, quick=quick, seed=seed

@@ -16,7 +16,7 @@ from verify.judge.reference import (
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
-from verify.study.calibration.families import Family
+from verify.study.calibration.families import Family, families
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 _LEVELS = 3  # that a reference is made of
@@ -64,6 +64,12 @@ class Trial:
     def ratio(self) -> float:
         """Stated over true."""
         return self.stated / self.true if self.true > 0.0 else float("inf")
+
+
+def trials_of(family: str, index: int, seed: int) -> list[Trial]:
+    """Judge a scene of the family of this name."""
+    (one,) = (own for own in families(quick=False) if own.name == family)
+    return trials(one, index, seed)
 
 
 def trials(family: Family, index: int, seed: int) -> list[Trial]:

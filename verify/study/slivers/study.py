@@ -1,6 +1,6 @@
 """The sliver study: families of scenes whose cuts come ever nearer to nodes, by any solver."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
@@ -19,14 +19,15 @@ from verify.judge.system_numbers import (
     with_uncut_twin,
 )
 from verify.printable import one_line, words_of
-from verify.scene import Box, Rectangle, Scene, scene_content
+from verify.scene import Box, Rectangle, Scene, restore_scene
 from verify.solvers import Solver
 from verify.study.measured_scenes import (
+    Making,
     MeasuredStudy,
     Measurement,
     Variant,
     measured_families,
-    measured_scenes,
+    measurements,
 )
 from verify.study.slivers.findings import findings, growth
 from verify.study.slivers.step_by_running import step_by_running
@@ -51,8 +52,7 @@ class SliverStudy(MeasuredStudy):
 def sliver_study(
     scenes: Sequence[Scene],
     variants: Sequence[Variant],
-    announce: Callable[[str], None] = lambda text: None,
-    processes: int = 1,
+    making: Making,
     quick: bool = False,
 ) -> SliverStudy:
     """Solve every row of every family with every solver, and measure.
@@ -62,9 +62,7 @@ def sliver_study(
     scenes : sequence of Scene
         Rows of families.
     variants : sequence of Variant
-    announce : callable, optional
-        Told what is done.
-    processes : int
+    making : Making
         Side by side; nothing that is measured is a time.
     quick : bool
         For the record.
@@ -73,17 +71,15 @@ def sliver_study(
     ------
     InputError
         If no scene is a row of a family.
-    ChildProcessError
-        If a process is killed.
     """
-    families: dict[str, list[dict[str, Any]]] = {}
+    families: dict[str, list[Scene]] = {}
     for scene in scenes:
         if scene.row is not None:
-            families.setdefault(scene.row.family, []).append(scene_content(scene))
+            families.setdefault(scene.row.family, []).append(scene)
     if not families:
         raise InputError("no case with a list of values for a parameter; see `verify list`")
     start = perf_counter()
-    every = measured_families(_measured, families, variants, announce, processes)
+    every = measured_families(measured_row, families, variants, making)
     growths = _growths(every)
     return SliverStudy(
         findings=list(findings(every, growths)), seconds=perf_counter() - start, quick=quick,
@@ -91,8 +87,9 @@ def sliver_study(
     )  # fmt: skip
 
 
-def _measured(variant: Variant, rows: list[dict[str, Any]]) -> list[Measurement]:
-    return measured_scenes(variant, rows, _further)
+def measured_row(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
+    """Measure a scene as `measured_scene` does, and the system of its solver."""
+    return measurements(Variant(**variant), restore_scene(content), _further)
 
 
 def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:

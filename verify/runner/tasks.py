@@ -1,0 +1,217 @@
+"""Calls of functions as jobs: each in a watched process, and kept, so that it is made once.
+
+For what a study measures and no comparison of a run does: systems of slivers, trials of the
+reference, tables. ``python -m verify.runner.tasks TASK.json`` makes one; what it found lies beside
+with the key of what was asked, and the code of it.
+"""
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from time import sleep
+from typing import Any, get_type_hints
+
+from verify.errors import InputError
+from verify.json_files import read_json, write_json
+from verify.printable import words_of
+from verify.processes import die_with_parent, start_server
+from verify.result_files import checked
+from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.directory import emptied, folder_name
+from verify.runner.fingerprint import code_of_solver, digest_of
+from verify.runner.loading import source_of
+from verify.runner.outcome import death
+from verify.solvers import find_solver
+from verify.solvers.interface import is_built_in
+from verify.solvers.named import solver_in
+from verify.source_digest import code_digest
+from verify.whole_files import write_whole
+
+_FOUND, _WHY = "found.json", "why.json"
+_LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class Task:
+    """Call of a function of a module; of two that ask the same one is made.
+
+    Attributes
+    ----------
+    name : str
+        In messages.
+    function : callable
+        Its annotation says what it returns: numbers, texts, and dataclasses of them.
+    arguments : mapping of str to object
+        Plain data.
+    solvers : tuple of str
+        That it runs: what it finds depends on their code.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    arguments: Mapping[str, Any]
+    solvers: tuple[str, ...] = ()
+
+    def question(self) -> dict[str, Any]:
+        """Return what is asked, as plain data."""
+        place = {"module": self.function.__module__, "function": self.function.__name__}
+        return {**place, "arguments": self.arguments}
+
+    def key(self) -> str:
+        """Return the hash of what is asked and of all code that answers."""
+        code = [code_digest(__name__, self.function.__module__)]
+        for name in self.solvers:
+            guest = "" if is_built_in(name) else source_of(find_solver(solver_in(name)))
+            code += [code_of_solver(name), guest]
+        return digest_of([self.question(), code])
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How many tasks run side by side, and the limits of each: wall time (s), memory (bytes)."""
+
+    jobs: int = 1
+    timeout: float = 1800.0
+    memory: float | None = None
+
+    @property
+    def bytes(self) -> float:
+        """Limit of memory: by default 80 % of the machine's, shared."""
+        whole = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        return self.memory or 0.8 * whole / self.jobs
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a task has found nothing: what it raised, or how its process died."""
+
+    reason: str
+
+
+def made(
+    tasks: Sequence[Task],
+    folder: Path,
+    announce: Callable[[str], None] = lambda text: None,
+    limits: Limits | None = None,
+) -> list[Any]:
+    """Make the tasks that are not kept in `folder`; return what each has found, or a `Failure`.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    folder : Path
+        Each has a folder of its own in it.
+    announce : callable
+        Told what has ended.
+    limits : Limits, optional
+    """
+    limits, found = limits or Limits(), dict[int, Any]()
+    running: dict[int, tuple[Child, Path]] = {}
+    waiting = list(enumerate(tasks))
+    start_server()
+    try:
+        while waiting or running:
+            while waiting and len(running) < limits.jobs:
+                number, task = waiting.pop(0)
+                place = folder / _folder_name(task)
+                if (place / _FOUND).exists() and (known := _kept(task, place)) is not None:
+                    found[number] = known
+                else:
+                    running[number] = _started(task, place, limits), place
+            for number, (child, place) in list(running.items()):
+                if (ending := child.poll()) is not None:
+                    del running[number]
+                    found[number] = _ended(tasks[number], place, ending, limits)
+                    announce(f"{tasks[number].name}: {len(found)} of {len(tasks)} parts")
+            if running:
+                sleep(POLL_SECONDS)
+    finally:
+        for child, _ in running.values():
+            child.kill()
+    return [found[number] for number in range(len(tasks))]
+
+
+def all_made(
+    tasks: Sequence[Task],
+    folder: Path,
+    announce: Callable[[str], None] = lambda text: None,
+    limits: Limits | None = None,
+) -> list[Any]:
+    """Make tasks of which none may fail.
+
+    Raises
+    ------
+    ChildProcessError
+        If one does; what the others found is kept.
+    """
+    found = made(tasks, folder, announce, limits)
+    for task, one in zip(tasks, found, strict=True):
+        if isinstance(one, Failure):
+            raise ChildProcessError(f"{task.name}: {one.reason}")
+    return found
+
+
+def main(task_file: Path) -> None:
+    """Make the task of a file, and write beside it what was found, or why nothing was."""
+    die_with_parent()
+    task = read_json(task_file)
+    if task["guest"]:  # found from where the study was started
+        sys.path.append(os.getcwd())
+    try:
+        function = getattr(import_module(task["module"]), task["function"])
+        content = {"key": task["key"], "found": function(**task["arguments"])}
+        # numbers that are not finite stay what they are
+        write_whole(task_file.with_name(_FOUND), json.dumps(content, default=_plain))
+    except Exception as problem:  # a guest may raise anything
+        traceback.print_exc()
+        write_json({"reason": words_of(problem)}, task_file.with_name(_WHY))
+
+
+def _folder_name(task: Task) -> str:
+    return f"{folder_name(task.name)[:_LONGEST_NAME]}-{digest_of(task.question())[:8]}"
+
+
+def _started(task: Task, place: Path, limits: Limits) -> Child:
+    emptied(place)
+    own = all(map(is_built_in, task.solvers))
+    write_json({**task.question(), "key": task.key(), "guest": not own}, place / "task.json")
+    files = place / "task.json", place / "log.txt"
+    return Child(__name__, *files, limits.timeout, limits.bytes, own=own)
+
+
+def _kept(task: Task, place: Path) -> Any:
+    """Return what was found; None if it is not there, damaged, or of another question or code."""
+    try:
+        content = read_json(place / _FOUND)
+        if content.get("key") != task.key():
+            return None
+        kind = get_type_hints(task.function)["return"]
+        return checked(kind, content["found"], "answer", str(place))
+    except (InputError, KeyError):
+        return None
+
+
+def _ended(task: Task, place: Path, ending: Ending, limits: Limits) -> Any:
+    if (known := _kept(task, place)) is not None:
+        return known
+    try:
+        return Failure(str(read_json(place / _WHY)["reason"]))
+    except (InputError, KeyError):
+        _, why = death(place / "log.txt", ending, limits.timeout, limits.bytes)
+        return Failure(why)
+
+
+def _plain(value: Any) -> Any:
+    """Return plain data for a dataclass or a number of numpy."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return value.tolist()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())
