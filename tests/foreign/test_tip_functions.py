@@ -12,8 +12,8 @@ from verify.cli import main
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
 from verify.result_files import read_result
-from verify.scene import load_scene, scene_content
-from verify.study.measured_scenes import measured_scenes, variant_of
+from verify.scene import load_scene
+from verify.study.measured_scenes import measurements, variant_of
 
 
 @pytest.fixture
@@ -96,9 +96,8 @@ def test_tip_functions_have_the_orders_of_a_smooth_field():
         )
         for cells in ((16, 16), (32, 32))
     ]
-    found = measured_scenes(
-        variant_of("getfem tip=functions"), [scene_content(one) for one in scenes]
-    )
+    variant = variant_of("getfem tip=functions")
+    found = [one for scene in scenes for one in measurements(variant, scene)]
     for error, order in (("displacement_l2", 1.75), ("energy_norm", 0.8)):
         coarse, fine = (one.value for one in found if one.quantity == error)
         assert coarse / fine >= 2**order, error

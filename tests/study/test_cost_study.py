@@ -1,8 +1,6 @@
-"""Studies of cost: solvers of known cost, growing cuts; bars of the reference; processes."""
+"""Studies of cost: solvers of known cost, growing cuts; bars of the reference."""
 
 import math
-import operator
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +12,11 @@ from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
 from verify.study.calibration.families import families
-from verify.study.calibration.kept import KeptTrials
 from verify.study.calibration.motion_scenes import released, stretched, wave
 from verify.study.calibration.series import series_families
 from verify.study.calibration.study import binomial_tail, calibration_findings
 from verify.study.calibration.trial import Trial, trials
 from verify.study.cost import cost_study, growing_scenes
-from verify.study.in_processes import in_processes
 
 STRIP = "statics/tissue_strip"
 
@@ -184,30 +180,6 @@ def test_half_widths_cover_series_of_mixed_orders():
     assert [f.verdict for f in findings] == [Verdict.PASS] * (2 + 4)
 
 
-def test_a_calibration_that_was_broken_off_goes_on_with_the_trials_it_has(tmp_path, monkeypatch):
-    about = {"commit": "abc", "dirty": False, "versions": {"numpy": "2"}}
-    monkeypatch.setattr("verify.study.calibration.kept.provenance", lambda: about)
-    trial, asked = made([2.0])[0], []
-
-    def solve(ratio):
-        asked.append(ratio)
-        return made([ratio])
-
-    KeptTrials(tmp_path, 28).of("airy", 0, lambda: solve(2.0))
-    again = KeptTrials(tmp_path, 28)
-    assert again.of("airy", 0, lambda: solve(3.0)) == [trial]
-    again.of("airy", 1, lambda: solve(4.0))
-    assert asked == [2.0, 4.0]
-    for seed, change in ((29, {}), (28, {"commit": "abd"}), (28, {"dirty": True})):
-        monkeypatch.setattr(
-            "verify.study.calibration.kept.provenance", lambda now=about | change: now
-        )
-        assert not KeptTrials(tmp_path, seed).scenes, change
-    monkeypatch.setattr("verify.study.calibration.kept.provenance", lambda: about)
-    (tmp_path / "calibration.trials.json").write_text("{", encoding="utf-8")
-    assert not KeptTrials(tmp_path, 28).scenes
-
-
 @pytest.mark.parametrize("run", [0.3, 0.9, 1.7, 2.2, 3.5])
 def test_waves_in_bars_are_those_of_central_differences_at_the_critical_step(run):
     # at Courant number 1 central differences move a wave without error
@@ -271,27 +243,3 @@ def test_bars_of_a_curved_cut_cover_what_its_facets_are_off():
     for name in ("displacement_l2", "energy_norm", "jump_l2"):
         (one,) = (t for t in found if t.quantity == name)
         assert one.true <= one.stated < 10 * one.true
-
-
-FACTORS = [(2, 3), (5, 7), (11, 13)]
-
-
-def killed(*part):
-    os._exit(9)
-
-
-@pytest.mark.parametrize("processes", [1, 2])
-def test_every_call_is_answered_whatever_the_number_of_processes(processes):
-    found = dict(in_processes(operator.mul, FACTORS, processes))
-    assert found == {0: 6, 1: 35, 2: 143}
-
-
-@pytest.mark.parametrize("processes", [1, 2])
-def test_what_a_call_raises_is_raised(processes):
-    with pytest.raises(ZeroDivisionError):
-        list(in_processes(operator.truediv, [(1, 0)], processes))
-
-
-def test_a_killed_process_is_an_error_that_says_so():
-    with pytest.raises(ChildProcessError, match="was killed"):
-        list(in_processes(killed, [()], 2))

@@ -21,15 +21,13 @@ from verify.json_files import read_json, write_json
 from verify.printable import words_of
 from verify.processes import die_with_parent, start_server
 from verify.result_files import checked
-from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.child import POLL_SECONDS, Child, Ending, death
 from verify.runner.directory import emptied, folder_name
-from verify.runner.fingerprint import code_of_solver, digest_of
+from verify.runner.fingerprint import code_digest, code_of_solver, digest_of
 from verify.runner.loading import source_of
-from verify.runner.outcome import death
 from verify.solvers import find_solver
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import solver_in
-from verify.source_digest import code_digest
 from verify.whole_files import write_whole
 
 _FOUND, _WHY = "found.json", "why.json"

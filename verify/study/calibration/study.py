@@ -49,7 +49,7 @@ class CalibrationStudy(Study):
 
 
 def calibration_study(
-    quick: bool, announce: Callable[[str], None], seed: int, directory: Path | None = None
+    quick: bool, announce: Callable[[str], None], seed: int, directory: Path
 ) -> CalibrationStudy:
     """Have the reference state its uncertainty where its true error is known.
 

@@ -1,0 +1,130 @@
+"""Tasks: every call is answered once, within its limits, whatever becomes of those who asked."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from verify.runner import tasks
+from verify.runner.tasks import Failure, Limits, Task, all_made, made
+
+
+@dataclass(frozen=True)
+class Product:
+    """What is found."""
+
+    value: float
+    of: tuple[int, int]
+
+
+def product(a: int, b: int, log: str) -> list[Product]:
+    with open(log, "a", encoding="utf-8") as file:
+        file.write(f"{a}\n")
+    return [Product(float("inf") if a == 0 else a * b, (a, b))]
+
+
+def slow(a: int, log: str) -> float:
+    product(a, 1, log)
+    time.sleep(0.0 if a < 3 or Path(log).with_name("go").exists() else 600.0)
+    return 0.1 * a
+
+
+def stuck(log: str) -> float:
+    raise ValueError(f"not {log}") if log else SystemExit(3)
+
+
+def greedy(log: str) -> float:
+    return float(sum(bytearray(400_000_000)[::4096])) + time.sleep(60)
+
+
+def asked(log):
+    return [int(line) for line in log.read_text(encoding="utf-8").split()]
+
+
+@pytest.fixture
+def found_by_name(monkeypatch):
+    """A process finds this module by its name, as it does those of the project."""
+    here = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    monkeypatch.setenv("PYTHONPATH", here)
+    monkeypatch.setattr(tasks, "code_digest", lambda *modules: "this code")
+
+
+def products(log, numbers=(2, 0, 5)):
+    return [
+        Task(f"{a} b", product, {"a": a, "b": 3, "log": str(log)}, ("a:Guest",)) for a in numbers
+    ]
+
+
+@pytest.fixture
+def guest(monkeypatch, found_by_name):
+    """Each in a fresh process: what is forked has its path from the server."""
+    monkeypatch.setattr(tasks, "code_of_solver", lambda name: name)
+    monkeypatch.setattr(tasks, "find_solver", lambda name: name)
+
+
+def test_every_call_is_answered_in_order_and_made_once(tmp_path, guest, monkeypatch):
+    log, said = tmp_path / "log", []
+    found = made(products(log), tmp_path / "kept", said.append, Limits(2))
+    inf = float("inf")
+    assert found == [[Product(6, (2, 3))], [Product(inf, (0, 3))], [Product(15, (5, 3))]]
+    assert said[-1].endswith("3 of 3 parts")
+    again = made(products(log, (5, 2, 7)), tmp_path / "kept", limits=Limits(2))
+    assert [one[0].value for one in again] == [15.0, 6.0, 21.0]
+    assert sorted(asked(log)) == [0, 2, 5, 7]
+    monkeypatch.setattr(tasks, "code_digest", lambda *modules: "other code")
+    made(products(log, (2,)), tmp_path / "kept")
+    assert sorted(asked(log)) == [0, 2, 2, 5, 7]
+
+
+def test_what_fails_says_why_and_costs_the_others_nothing(tmp_path, guest):
+    limits = Limits(jobs=4, timeout=20.0, memory=300e6)
+    log = str(tmp_path / "log")
+    four = [
+        Task("raises", stuck, {"log": "x"}, ("a:Guest",)),
+        Task("leaves", stuck, {"log": ""}, ("a:Guest",)),
+        Task("is large", greedy, {"log": ""}, ("a:Guest",)),
+        Task("is well", product, {"a": 2, "b": 3, "log": log}, ("a:Guest",)),
+    ]
+    raised, left, large, well = made(four, tmp_path / "kept", limits=limits)
+    assert raised == Failure("ValueError: not x")
+    assert isinstance(left, Failure)
+    assert "exit code 3" in left.reason
+    assert large == Failure("killed above 300 MB")
+    assert well == [Product(6.0, (2, 3))]
+    with pytest.raises(ChildProcessError, match="raises: ValueError: not x"):
+        all_made(four[:1], tmp_path / "kept")
+
+
+RUN = """
+from pathlib import Path
+import sys
+import test_tasks as t
+from verify.runner import tasks
+tasks.code_digest = lambda *modules: "this code"
+tasks.code_of_solver = tasks.find_solver = lambda name: name
+folder = Path(sys.argv[1])
+log = str(folder / "log")
+calls = [t.Task(str(a), t.slow, {"a": a, "log": log}, ("a:Guest",)) for a in (1, 2, 3, 4)]
+print(t.made(calls, folder / "kept"))
+"""
+
+
+def test_what_was_killed_goes_on_with_what_is_missing(tmp_path, guest):
+    """Killed by signal 9 in the third of four parts."""
+    command = [sys.executable, "-c", RUN, str(tmp_path)]
+    first = subprocess.Popen(command, stdout=subprocess.PIPE)
+    log, start = tmp_path / "log", time.monotonic()
+    while not (log.exists() and asked(log)[-1:] == [3]):
+        assert time.monotonic() - start < 120.0
+        time.sleep(0.05)
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    (tmp_path / "go").touch()
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert eval(again.stdout) == [0.1, 0.2, 0.1 * 3, 0.4]
+    assert asked(log) == [1, 2, 3, 3, 4]
