@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scenes
 from case_texts import support_text, weight_text
 from tool_path_scenes import (
     BODIES,
@@ -274,3 +275,36 @@ def test_three_meshes_of_the_strip(solver, case, most, parameters):
         pytest.importorskip("dolfinx_solver")
     swept = halved(solver, case, (0, 1, 2), most, **parameters)
     assert swept < 0.5 * l2_and_cut_work(solver, case, 2, **parameters)[0]
+
+
+@pytest.mark.heavy
+def test_the_account_of_ten_thousand_steps_with_twenty_blades_closes():
+    """Explicit steps, which solve nothing: what is left is round-off, 1e-16 per step at most."""
+    cuts = [
+        {
+            "kind": "tool_path",
+            "name": f"cut {k}",
+            "points": [[0.03 + 0.047 * k, -0.05], [0.04 + 0.047 * k, 0.55 if k % 2 else 0.4]],
+            "times": [0.1 + 0.09 * k, 0.25 + 0.09 * k],
+        }
+        for k in range(20)
+    ]
+    scene = scenes.scene(
+        cuts,
+        geometry=scenes.box([1.0, 0.6]),
+        mesh={"cells": [[20, 12]]},
+        material={"young": 1e4, "poisson": 0.3, "density": 1e3, "plane": "strain"},
+        supports=[{"where": "top", "displacement": [0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0, -2.0]}],
+        analysis={
+            "kind": "dynamic", "duration": 2.2, "time_step": 2.2e-4, "outputs": 3,
+            "opening": "swept",
+        },
+    )  # fmt: skip
+    found = find_solver("xfem").solve(scene, 0, 0, scheme="central_differences")
+    ledger = found.ledger
+    assert found.iterations["steps"] == 10_000
+    largest = max(np.abs(ledger["kinetic"]).max(), np.abs(ledger["strain"]).max())
+    largest = max(largest, np.ptp(ledger["gravity"]))
+    assert np.ptp(ledger["total"]) < 1e-12 * largest
+    assert (np.diff(ledger["cut_work"]) > 0.0).all()
