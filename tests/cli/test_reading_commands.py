@@ -11,11 +11,10 @@ import time
 
 import pytest
 
-from verify.cli import main
-from verify.cli.parser import build_parser
-from verify.cli.solver_parameters import of_one_solver, of_solvers
+from verify.cli import build_parser, main
+from verify.cli.progress import said_to_wait
+from verify.cli.run import of_one_solver, of_solvers
 from verify.cli.streams import print_line, printable_streams
-from verify.cli.waiting import said_to_wait
 from verify.scene import list_cases, load_scene, load_scenes
 
 COMMANDS = ("list", "describe", "run", "report", "check", "schema")

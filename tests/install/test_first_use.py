@@ -14,7 +14,7 @@ from verify.threads import ONE_THREAD
 def test_without_numba_a_run_ends_with_one_line_that_names_the_cure(tmp_path, root):
     code = (
         "import sys; sys.modules['numba'] = None\n"
-        "from verify.cli.main import main\n"
+        "from verify.cli import main\n"
         f"sys.exit(main(['run', 'statics/f1_patch', '--out', {str(tmp_path / 'out')!r}]))"
     )
     done = subprocess.run(

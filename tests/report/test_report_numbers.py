@@ -9,8 +9,8 @@ from page_parser import parsed
 from synthetic_run import make_run
 from synthetic_studies import HOSTILE, STUDIES
 
-from verify.cli import run_ranking as runner_ranking
-from verify.cli.run_ranking import rank_run
+from verify.cli import ranking as runner_ranking
+from verify.cli.ranking import rank_run
 from verify.conformance import CheckResult, State
 from verify.report import load_run, render
 from verify.report.figures import plots as figures

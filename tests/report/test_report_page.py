@@ -14,7 +14,7 @@ import pytest
 from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
-from verify.cli.verdict_text import verdict_lines
+from verify.cli.run_text import verdict_lines
 from verify.report import load_run, render
 from verify.report.exports import COLUMNS
 from verify.result import SolveRecord, Status, Verdict

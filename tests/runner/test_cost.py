@@ -5,7 +5,7 @@ import json
 import pytest
 
 from verify.cli import main
-from verify.cli.cost_text import suites_line
+from verify.cli.run_text import suites_line
 from verify.runner.cost import case_cost, solver_costs
 from verify.scene import list_cases, load_scenes
 from verify.solvers.body_of_scene import background_mesh

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from verify.cli import run_ranking
+from verify.cli import ranking
 from verify.errors import InputError
 from verify.reference_record import ReferenceRecord
 from verify.report.figures.style import Palette
@@ -255,6 +255,6 @@ def test_a_guest_whose_file_changes_is_checked_for_conformance_again(tmp_path, m
     found = []
     for text in ("class A: ...", "class A: pass"):
         (tmp_path / "guest_of_a_test.py").write_text(text)
-        found.append(run_ranking._source_of_guest("guest_of_a_test:A x=1"))
+        found.append(ranking._source_of_guest("guest_of_a_test:A x=1"))
     assert len({*found, ""}) == 3
-    assert run_ranking._source_of_guest("xfem") == ""
+    assert ranking._source_of_guest("xfem") == ""

@@ -1,5 +1,103 @@
 """The command ``verify``. Importing it is quick: a command imports what it needs when it runs."""
 
-from verify.cli.main import main
+import os
+import sys
+from collections.abc import Sequence
+from textwrap import indent
+from typing import TYPE_CHECKING
 
-__all__ = ["main"]
+from verify import __version__
+from verify.cli.streams import printable_streams
+from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
+from verify.threads import pin_to_one_thread
+from verify.whole_files import DISK_FAILURES
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["build_parser", "main"]
+
+_EXAMPLES = """\
+examples:
+  verify list                                 the cases that come with the project
+  verify describe statics/f3_inclined         what a case asks, in words
+  verify run statics/f1_patch --out out       solve, compare, judge, report
+  verify run -k demo --out out -j 2           all cases that mention 'demo', 2 at a time
+  verify check my_case.toml                   validate an own case file without running
+  verify run my_case.toml --out mine          run it
+  verify report out                           render the report again
+
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (default: that of the process) and return its exit code."""
+    pin_to_one_thread()
+    with printable_streams():
+        return _run(argv)
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    from verify.cli.signatures import call
+
+    arguments = build_parser().parse_args(argv)
+    try:
+        code = call(arguments)
+        if sys.stdout is not None:  # closed by `>&-`
+            sys.stdout.flush()
+    except (InputError, UnsupportedSceneError) as error:
+        return _fail(str(error), 2)
+    except ModuleNotFoundError as error:
+        if error.name != "numba":  # all else that may be missing is asked for by name
+            raise
+        return _fail(
+            "this command needs numba, which is not installed: python -m pip install numba", 3
+        )
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except BrokenPipeError:  # `verify list | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except ChildProcessError as error:
+        return _fail(str(error), 3)
+    except OSError as error:
+        if isinstance(error, PermissionError) and error.filename:
+            return _fail(f"{error.filename}: {error.strerror}", 2)
+        if error.errno not in DISK_FAILURES:
+            raise
+        where = f" ({error.filename})" if error.filename else ""
+        return _fail(
+            f"{error.strerror}{where}; what is finished stays, the same command resumes it", 3
+        )
+    return code
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"verify: error: {one_line(message)}", file=sys.stderr)
+    return code
+
+
+def build_parser() -> "argparse.ArgumentParser":
+    """Build the parser from the functions that are commands."""
+    from inspect import cleandoc
+
+    from verify.cli import baseline, cache, extend, look, play, run, solvers, study
+    from verify.cli.signatures import Member, Parser, add_commands
+
+    codes = (run.run.__doc__ or "").partition("exit codes:\n")[2]
+    parser = Parser(
+        prog="verify",
+        description="Verify cutting simulations: solve scenes, compare, judge, report.",
+        epilog=f"{_EXAMPLES}exit codes:\n{indent(cleandoc(codes), '  ')}",
+    )
+    parser.add_argument("--version", action="version", version=f"verify {__version__}")
+    groups: dict[str, list[Member]] = {
+        "run": [look.check, run.run, play.play],
+        "look": [look.list_, look.describe, look.report, look.paraview],
+        "compare": [study, baseline],
+        "extend": [look.schema, extend.export, extend.import_, extend.conform, solvers],
+        "look after": [cache, look.doctor, look.completion],
+    }
+    add_commands(parser, groups)
+    return parser

@@ -1,7 +1,9 @@
-"""Standard output and error that let no escape sequence of others through to the terminal."""
+"""What is printed: no escape sequence of others reaches the terminal; JSON; the command line."""
 
+import json
 import os
 import re
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,3 +65,13 @@ def print_line(text: str) -> None:
 def in_colour(line: str) -> str:
     """Return a line with its first verdict in colour."""
     return _VERDICT.sub(lambda m: f"\x1b[{_COLOURS[m[1]]}m{m[1]}\x1b[0m", line, count=1)
+
+
+def print_json(content: Any, ensure_ascii: bool = True) -> None:
+    """Print an answer as JSON."""
+    print(json.dumps(content, indent=2, ensure_ascii=ensure_ascii))
+
+
+def command_line() -> str:
+    """Return the command as it was typed, for the record."""
+    return shlex.join(["verify", *sys.argv[1:]])

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -46,7 +47,7 @@ def _study(arguments: argparse.Namespace) -> int:
         study = _over_scenes(arguments, announce)
     written = write_study(arguments.out, arguments.study, study, command)
     page = render_study(arguments.out, arguments.study)
-    if arguments.json:
+    if arguments.as_json:
         said = [asdict(finding) for finding in study.findings]
         print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
         return 0
@@ -71,5 +72,6 @@ def _over_scenes(arguments: argparse.Namespace, announce: Callable[[str], None])
     scenes = select_cases(cases, expression, "quick" if quick else "heavy")
     variants = [variant_of(text) for text in arguments.solvers or ("xfem", "conforming")]
     study = sliver_study if slivers else energy_study
-    making = Making(arguments.out / f"{arguments.study}-parts", announce, arguments.processes)
+    processes = arguments.processes or len(os.sched_getaffinity(0))
+    making = Making(arguments.out / f"{arguments.study}-parts", announce, processes)
     return study(scenes, variants, making, arguments.quick)

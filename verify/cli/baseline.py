@@ -1,0 +1,195 @@
+"""Hold a finished run against stored values: did anything get worse?
+
+Examples
+--------
+  verify run -k quick --out out
+  verify baseline save out --file baseline.json
+  verify baseline check out --file baseline.json
+  verify baseline update out --file baseline.json --only statics/f1_patch:strain_energy
+  verify baseline diff old-run new-run
+
+exit codes of check and update:
+  0  everything within its tolerances
+  1  something is worse, or an update contradicts the independent value
+  2  bad input
+  3  something could not be checked: its solve failed, its case was not run or changed
+  5  with --strict: something is undecided
+exit codes of diff: 0, or 1 if a verdict became worse
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from verify.cli.signatures import Actions, Arg, AsJson, Run
+from verify.cli.streams import print_json
+
+if TYPE_CHECKING:
+    from verify.baseline import Baseline, Row
+
+File = Annotated[Path, Arg("the baseline, to be committed", "FILE")]
+FILE = Path("baseline.json")
+
+
+def save(run: Run, *, file: File = FILE, as_json: AsJson = False) -> int:
+    """Add what the file does not know yet; nothing in it changes."""
+    from verify.baseline import (
+        Baseline,
+        check_run,
+        exit_code_of,
+        read_baseline,
+        read_run,
+        save_run,
+        write_baseline,
+    )  # fmt: skip
+    from verify.result import Verdict
+
+    measured = read_run(run)
+    before = read_baseline(file) if file.exists() else Baseline()
+    after, notes = save_run(before, measured)
+    write_baseline(after, file)
+    added = _size(after) - _size(before)
+    rows = [row for row in check_run(after, measured, partial=True) if row.axis != "own"]
+    bad = [row for row in rows if row.verdict is Verdict.FAIL]
+    code = exit_code_of(bad)
+    if as_json:
+        answer = {"exit": code, "file": str(file), "added": added, "notes": notes}
+        print_json({**answer, "rows": [asdict(row) for row in bad]})
+        return code
+    for note in notes:
+        print(note)
+    _print_rows(bad)
+    print(f"{file}: {added} values added, {_size(before)} kept as they were")
+    return code
+
+
+def check(
+    run: Run,
+    *,
+    file: File = FILE,
+    strict: Annotated[bool, Arg("what is undecided: exit code 5")] = False,
+    partial: Annotated[
+        bool, Arg("leave out cases of the file that the run was not asked for")
+    ] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Compare a finished run with the file."""
+    from verify.baseline import check_run, exit_code_of, read_baseline, read_run
+    from verify.result import Verdict
+
+    baseline = read_baseline(file)
+    rows = check_run(baseline, read_run(run), partial)
+    code = exit_code_of(rows, strict)
+    if as_json:
+        print_json({"exit": code, "rows": [asdict(row) for row in rows]})
+        return code
+    _print_rows([row for row in rows if row.verdict is not Verdict.PASS])
+    counts = Counter((row.axis, row.verdict) for row in rows)
+    for axis in ("own", "meaning", "independent", "reference", "speed"):
+        said = ", ".join(f"{counts[axis, v]} {v}" for v in Verdict if counts[axis, v])
+        if said:
+            print(f"{axis:<12} {said}")
+    open_ended = sum(
+        1
+        for case in baseline.cases.values()
+        for quantity in case.quantities.values()
+        if quantity.independent is None or quantity.independent.tolerance is None
+    )
+    if open_ended:
+        print(
+            f"{open_ended} quantities have no tolerance against an independent value and are "
+            "held against the last own value only"
+        )
+    return code
+
+
+def update(
+    run: Run,
+    *,
+    file: File = FILE,
+    only: Annotated[
+        Sequence[str],
+        Arg(
+            "what to move: CASE:METRIC or CASE:SOLVER/LEVEL/METRIC; repeat for several; "
+            "without it the difference is shown and nothing is moved",
+            "CASE:METRIC",
+        ),
+    ] = (),
+    as_json: AsJson = False,
+) -> int:
+    """Move own values that are named, never the independent ones."""
+    from verify.baseline import read_baseline, read_run, update_from, write_baseline
+
+    after, moves = update_from(read_baseline(file), read_run(run), only)
+    moved = [move for move in moves if move.state == "moved"]
+    if moved:
+        write_baseline(after, file)
+    code = 1 if any(move.state == "refused" for move in moves) else 0
+    if as_json:
+        answer = {"exit": code, "file": str(file), "moved": len(moved)}
+        print_json({**answer, "moves": [asdict(move) for move in moves]})
+        return code
+    for move in moves:
+        old, new = f"{move.old:.10g}", "–" if move.new is None else f"{move.new:.10g}"
+        change = f" ({move.new / move.old - 1:+.3e})" if move.new is not None and move.old else ""
+        print(f"{move.state:<8} {move.case}:{move.quantity}: {old} → {new}{change}")
+        if move.reason:
+            print(f"         {move.reason}")
+    rest = "" if only else "; name what shall move with --only CASE:METRIC"
+    print(f"{file}: {len(moved)} own values moved, no independent one{rest}")
+    return code
+
+
+def diff(
+    run: Annotated[Path, Arg("directory of a finished run", "OLD")],
+    other: Annotated[Path, Arg("directory of a finished run", "NEW")],
+    *,
+    as_json: AsJson = False,
+) -> int:
+    """Show which verdicts differ between two runs."""
+    from verify.baseline import read_run, verdict_changes
+    from verify.baseline.difference import any_worse, meaning_lines
+
+    old, new = read_run(run), read_run(other)
+    changes = verdict_changes(old, new)
+    code = 1 if any_worse(changes) else 0
+    if as_json:
+        answer = {"exit": code, "old": old.origin, "new": new.origin}
+        meaning = {"meaning": list(meaning_lines(old, new))}
+        print_json({**answer, **meaning, "changes": [asdict(c) for c in changes]})
+        return code
+    for side, name in ((old, "old"), (new, "new")):
+        commit = str(side.origin.get("commit") or "no commit")[:12]
+        dirty = ", with local changes" if side.origin.get("dirty") else ""
+        print(f"{name}: {side.directory} ({commit}{dirty}, {side.origin.get('date')})")
+    for line in meaning_lines(old, new):
+        print(line)
+    for change in changes:
+        verdicts = f"{change.old or '–'} → {change.new or '–'}"
+        numbers = " → ".join(
+            "–" if x is None else f"{x:.6g}" for x in (change.old_observed, change.new_observed)
+        )
+        print(f"{change.direction:<6} {change.case}: {change.check}: {verdicts} ({numbers})")
+        print(f"       {change.reason}")
+    counts = Counter(change.direction for change in changes)
+    said = ", ".join(f"{count} {direction}" for direction, count in counts.items())
+    print(said or "no verdict changed")
+    return code
+
+
+def _size(baseline: "Baseline") -> int:
+    return sum(len(case.quantities) + len(case.speed) for case in baseline.cases.values())
+
+
+def _print_rows(rows: Sequence["Row"]) -> None:
+    for row in rows:
+        place = f"{row.case}:{row.quantity}" if row.quantity else row.case
+        numbers = ""
+        if row.now is not None and row.stored is not None:
+            numbers = f"{row.now:.10g}, stored {row.stored:.10g}: "
+        print(f"{row.verdict:<9} {row.axis:<11} {place}: {numbers}{row.reason}")
+
+
+ACTIONS = Actions((save, check, update, diff))

@@ -1,0 +1,213 @@
+"""Commands for solvers of others: their files, their answers, what they must keep to."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from verify.cli.signatures import Arg, Case, Out, Strict, Timeout, count, positive
+from verify.cli.streams import command_line, print_json
+
+if TYPE_CHECKING:
+    from verify.conformance import CheckResult
+
+
+def export(
+    case: Case,
+    *,
+    out: Out,
+    levels: Annotated[
+        Sequence[int],
+        Arg(
+            "only this mesh level, 0 is the coarsest; repeat for several (default: all)",
+            "K",
+            ("--level",),
+        ),
+    ] = (),
+    conforming: Annotated[
+        bool, Arg("also write meshes that conform to the cuts, with their nodes doubled")
+    ] = False,
+    template: Annotated[
+        Literal["python"] | None,
+        Arg(
+            "also write a program that answers the case, on a reader and writer that need "
+            "numpy alone (with --conforming)"
+        ),
+    ] = None,
+    as_json: Annotated[bool, Arg("print the files as JSON", flags=("--json",))] = False,
+) -> int:
+    """Write a case as files for another program: meshes, cuts, supports, loads.
+
+    Examples
+    --------
+      verify export statics/f3_inclined --out f3
+      verify export my_case.toml --out mine --level 0 --conforming
+      verify export statics/f3_inclined --out f3 --template python
+
+    The program answers in f3/level-<k>/solution.json and .vtu;
+    see docs/guide/your-solver.md.
+    """  # fmt: skip
+    from verify.exchange import export_case
+    from verify.foreign.template import write_template
+    from verify.scene import load_scene
+
+    scene = load_scene(case)
+    files = export_case(scene, out, levels or None, conforming or template is not None)
+    if template:
+        files += write_template(out)
+    if as_json:
+        print_json({"case": scene.name, "files": [str(file) for file in files]})
+        return 0
+    for file in files:
+        print(file)
+    print(
+        f"answer in {out}/level-<k>/solution.json and .vtu, then: "
+        f"verify import {case} {out} --solver NAME --out RUN"
+    )
+    return 0
+
+
+def import_(
+    case: Case,
+    answers: Annotated[Path, Arg("directory with level-<k>/solution.json", "DIR")],
+    *,
+    solver: Annotated[str, Arg("what the program is called in the report", "NAME")],
+    out: Annotated[
+        Path,
+        Arg(
+            "run directory; one of an earlier import of the same case keeps the other programs",
+            "RUN",
+        ),
+    ],
+    beside: Annotated[
+        Sequence[str],
+        Arg(
+            "solver to run beside it; repeat for several (default: those that checks compare "
+            "with, and the reference)",
+            "NAME",
+        ),
+    ] = (),
+    judged_as: Annotated[
+        str | None,
+        Arg(
+            "checks that the case makes of this solver by its name are made of the program too",
+            "NAME",
+        ),
+    ] = None,
+    timeout: Annotated[
+        float, Arg("wall seconds after which a solve beside it is killed", "S", read=positive)
+    ] = 600.0,
+    repetitions: Annotated[
+        int, Arg("timed repetitions of the solves beside it", "N", read=count)
+    ] = 1,
+    strict: Strict = False,
+    as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False,
+) -> int:
+    """Compare and judge the answers of another program.
+
+    Examples
+    --------
+      verify import statics/f3_inclined f3 --solver freefem --out run
+      verify import statics/f3_inclined f3 --solver freefem --beside xfem --out run
+
+    Exit codes are those of `verify run`.
+    """
+    from verify.cli.progress import progress_on
+    from verify.cli.ranking import rank_run
+    from verify.cli.run_text import verdict_lines
+    from verify.exchange import read_answers
+    from verify.exchange.comparison import compare_answers
+    from verify.report import render
+    from verify.runner import Options, RunStoppedError, exit_code
+    from verify.runner.checking import check_solver_name
+    from verify.scene import load_scene
+
+    for name in beside:
+        check_solver_name(name, "--beside")
+    scene = load_scene(case)
+    found = read_answers(scene, answers)
+    options = Options(solvers=tuple(beside), repetitions=repetitions, timeout=timeout)
+    with progress_on(sys.stderr) as progress:
+        try:
+            result = compare_answers(
+                scene, found, solver, out, options, progress, judged_as, command_line()
+            )
+        except RunStoppedError as stop:
+            progress.close()
+            print(f"verify: {stop}; the same command resumes it", file=sys.stderr)
+            return 128 + stop.signum
+    rank_run(out, [result], {}, False, timeout, print)
+    page, code = render(out), exit_code([result], strict)
+    if as_json:
+        verdicts = [asdict(record) for record in result.verdicts]
+        answer = {"exit": code, "report": str(page), "case": result.case, "verdicts": verdicts}
+        print_json({**answer, "notices": [asdict(notice) for notice in result.notices]})
+        return code
+    for line in verdict_lines([result]):
+        print(line)
+    print(f"report: {page}")
+    return code
+
+
+def conform(
+    solver: Annotated[
+        str, Arg("name of a solver, or module:Class", "'SOLVER [PARAMETER=VALUE …]'")
+    ],
+    *,
+    parameters: Annotated[
+        Sequence[str],
+        Arg("parameter of the solver; repeat for several", "NAME=VALUE", ("--set",)),
+    ] = (),
+    checks: Annotated[
+        Sequence[str],
+        Arg("only this check; repeat for several (default: all)", "NAME", ("--check",)),
+    ] = (),
+    timeout: Timeout = 120.0,
+    as_json: Annotated[bool, Arg("print the checks as JSON", flags=("--json",))] = False,
+) -> int:
+    """Check a solver on what holds for every right solver, before it is ranked.
+
+    Examples
+    --------
+      verify conform xfem
+      verify conform xfem --set tip=partial
+      verify conform my_module:MySolver --json
+
+    exit codes:
+      0  every check that the solver did not refuse passes, or is off as it states
+      1  a check fails
+      2  no such solver, or it cannot be loaded
+      3  the solver crashed, hung or failed on a scene that it did not refuse
+      4  it refused everything
+    """
+    from verify.processes import start_server
+
+    if ":" not in solver:
+        start_server()  # it loads while this process does
+    from verify.cli.progress import said_to_wait
+    from verify.cli.run import of_one_solver
+    from verify.conformance import conform, exit_code_of
+    from verify.solvers.named import one_name, parameters_of, solver_in
+
+    name = one_name(solver)
+    given = parameters_of(name, {solver_in(name): of_one_solver(parameters)})
+    with said_to_wait(sys.stderr, f"conformance of {name}"):
+        results = conform(name, given, timeout, checks)
+    code = exit_code_of(results)
+    if as_json:
+        answer = {"solver": name, "parameters": given, "exit": code}
+        print_json({**answer, "checks": [asdict(result) for result in results]})
+        return code
+    width = max(len(result.name) for result in results)
+    for result in results:
+        print(f"{result.name:<{width}}  {result.state:<8} {_number(result):<19} {result.claim}")
+        if result.reason:
+            print(f"{'':<{width}}  {result.reason}")
+    return code
+
+
+def _number(result: "CheckResult") -> str:
+    if result.observed is None or result.limit is None:
+        return ""
+    return f"{result.observed:.1e} {'≤' if result.state == 'pass' else '>'} {result.limit:.1e}"

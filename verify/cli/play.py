@@ -1,0 +1,192 @@
+"""``verify play``: a cutting scene step by step, drawn off-screen or shown in a window."""
+
+import csv
+import io
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from verify.cli.signatures import Arg, Case, positive
+from verify.cli.streams import print_json
+from verify.errors import InputError, UnsupportedSceneError
+
+if TYPE_CHECKING:
+    from verify.scene import Scene
+    from verify.simulator import Stage, StepRecord
+    from verify.simulator.animation import Frame
+
+
+def play(
+    case: Case,
+    *,
+    out: Annotated[
+        Path | None,
+        Arg(
+            "draw off-screen into this file: .gif, .mp4 (needs ffmpeg), or .png (the last frame)",
+            "FILE",
+        ),
+    ] = None,
+    window: Annotated[bool, Arg("open a window")] = False,
+    stroke: Annotated[Path, Arg("window: where the stroke of the mouse is written", "TOML")] = Path(
+        "stroke.toml"
+    ),
+    frames: Annotated[int, Arg("frames drawn", "N")] = 48,
+    zoom: Annotated[
+        float,
+        Arg("look at the wound, F times as near (default: 1, the whole body)", "F", read=positive),
+    ] = 1.0,
+    records: Annotated[Path | None, Arg("write what every step cost and did", "CSV")] = None,
+    as_json: Annotated[bool, Arg("print the summary as JSON", flags=("--json",))] = False,
+) -> int:
+    """Play a cutting scene as a simulator would, and show or draw it.
+
+    Examples
+    --------
+      verify play thesis/hand_straight --out hand.gif
+      verify play thesis/square_dissected --out square.gif --records steps.csv
+      verify play thesis/hand_straight            in a window, where there is a display
+      verify play my_case.toml --window --stroke my_stroke.toml
+
+    In a window the left mouse button is the scalpel; the stroke is written as a tool_path
+    that can be pasted into a case file.
+    """
+    has_display = _check_outputs(out, window, frames, records)
+    from verify.scene import load_scene
+
+    scene = load_scene(case)
+    from verify.simulator import stage_of
+
+    try:
+        stage = stage_of(scene)
+    except UnsupportedSceneError as reason:
+        raise InputError(f"cannot be played: {reason}", str(scene.file or scene.name)) from None
+    if window or (out is None and has_display):
+        from verify.simulator.window import play_in_window
+
+        play_in_window(stage, scene.title, stroke)
+        return 0
+    summary = _played(stage, scene, out, frames, zoom, records)
+    print_json(summary) if as_json else print(_words(summary))
+    return 0
+
+
+def _check_outputs(out: Path | None, window: bool, frames: int, records: Path | None) -> bool:
+    """Refuse early what cannot be drawn or written; return whether there is a display."""
+    if frames < 2:
+        raise InputError(f"--frames {frames}: expected at least 2")
+    if out is not None and out.suffix not in (".gif", ".mp4", ".png"):
+        raise InputError(f"--out {out}: expected a name that ends in .gif, .mp4 or .png")
+    if out is not None and out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError("--out: MP4 needs the program ffmpeg, which is not in the path")
+    for path in (out, records):
+        if path is not None and not path.resolve().parent.is_dir():
+            raise InputError(f"no directory '{path.parent}' to write into")
+    has_display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    if window and not has_display:
+        raise InputError("--window: there is no display; use --out FILE.gif")
+    if out is None and not has_display and records is None:
+        raise InputError("there is no display to show it on; use --out FILE.gif")
+    return has_display
+
+
+def _played(
+    stage: "Stage", scene: "Scene", out: Path | None, count: int, zoom: float, records: Path | None
+) -> dict[str, Any]:
+    """Play without a window, write what is asked for, and return the summary."""
+    from verify.simulator import PHASES, Session, quality_of
+    from verify.simulator.animation import Frame
+    from verify.simulator.session import Spread
+    from verify.whole_files import asked_place, write_whole
+
+    session = Session(stage)
+    every = max(1, round(stage.steps / (count - 1)))
+    frames = [Frame(0.0, session.picture(), session.blades())]
+    while not session.finished:
+        record = session.step()
+        if out is not None and (record.step % every == 0 or session.finished):
+            frames.append(Frame(record.time, session.picture(), session.blades(), session.hooks()))
+    taken, quality = session.records, quality_of(session)
+    step = Spread.of(record.total_seconds for record in taken)
+    cutting = Spread.of(record.total_seconds for record in taken if record.newly_split)
+    if out is not None:
+        with asked_place(out):
+            _draw(frames, stage, scene, out, zoom)
+    if records is not None:
+        with asked_place(records):
+            write_whole(records, _table(taken))
+    return {
+        "case": scene.name,
+        "steps": len(taken),
+        "elements": len(stage.mesh.cells),
+        "split": int(session.cutter.body.split_cells.sum()),
+        "unknowns": int(session.displacement.size),
+        "median_seconds": {
+            **{phase: Spread.of(r.seconds[phase] for r in taken).median for phase in PHASES},
+            "step": step.median,
+        },
+        "median_seconds_of_a_cutting_step": cutting.median,
+        "seconds_of_95_percent_of_the_steps": step.most,
+        "seconds_of_the_slowest_step": step.largest,
+        "steps_within": step.within,
+        "volume_error": quality.volume_error,
+        "loose_edges": quality.loose_edges,
+        "inverted_elements": quality.inverted_elements,
+        "inverted_facets": quality.inverted_facets,
+        "stray_facets": quality.stray_facets,
+        "largest_stretch": quality.largest_stretch,
+        "out": str(out) if out else None,
+    }
+
+
+def _draw(frames: "list[Frame]", stage: "Stage", scene: "Scene", out: Path, zoom: float) -> None:
+    """Draw the last frame, or all as fast as it happened."""
+    from verify.simulator.animation import (
+        Underlay,
+        view_of,
+        write_animation,
+        write_film,
+        write_picture,
+    )
+
+    skin = scene.geometry.kind == "skin"
+    under = Underlay(frames[0].picture, scene.material.thickness or 0.0) if skin else None
+    view = view_of(frames, underlay=under, zoom=zoom)
+    if out.suffix == ".png":
+        write_picture(frames[-1], view, out)
+        return
+    rate = min(50.0, len(frames) / stage.duration)  # no faster than a screen shows
+    (write_film if out.suffix == ".mp4" else write_animation)(frames, view, out, rate)
+
+
+def _table(records: "list[StepRecord]") -> str:
+    """Return what every step cost and did as CSV."""
+    from verify.simulator import PHASES
+
+    text = io.StringIO()
+    table = csv.writer(text)
+    table.writerow(
+        ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
+         "potential", "work", "dissipated", "contacts"]
+    )  # fmt: skip
+    for r in records:
+        delay = r.delay.mean() if len(r.delay) else ""
+        table.writerow(
+            [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic, r.strain,
+             r.potential, r.work, r.dissipated, r.contacts]
+        )  # fmt: skip
+    return text.getvalue()
+
+
+def _words(summary: dict[str, Any]) -> str:
+    median = summary["median_seconds"]["step"]
+    shares = ", ".join(f"{share:.0%} within {n}" for n, share in summary["steps_within"].items())
+    lines = [
+        f"{summary['case']}: {summary['steps']} steps, {summary['split']} of "
+        f"{summary['elements']} elements split, {summary['unknowns']} unknowns",
+        f"a step took {median * 1e3:.2f} ms (median, compilation and account included): {shares}",
+        f"volume off by {summary['volume_error']:.0e}, {summary['loose_edges']} loose edges, "
+        f"{summary['inverted_elements']} elements and {summary['inverted_facets']} facets inside "
+        f"out, {summary['stray_facets']} facets astray",
+    ]
+    return "\n".join([*lines, *([f"drawn: {summary['out']}"] if summary["out"] else [])])

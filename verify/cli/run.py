@@ -1,0 +1,329 @@
+"""``verify run``: select, run, rank, render, and say what came out."""
+
+import contextlib
+import shlex
+import sys
+import tempfile
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from verify.cli.signatures import (
+    Arg,
+    Repetitions,
+    Strict,
+    Timeout,
+    count,
+    positive,
+)
+from verify.cli.streams import command_line, print_json, print_line
+from verify.errors import InputError
+
+if TYPE_CHECKING:
+    from verify.result import CaseResult
+    from verify.runner import Options
+    from verify.runner.run import RunSummary
+    from verify.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Options of ``verify run``."""
+
+    expression: Annotated[
+        str | None,
+        Arg(
+            "words with and, or, not, parentheses, looked for in name, title and tags",
+            "EXPR",
+            ("-k",),
+        ),
+    ] = None
+    out: Annotated[Path, Arg("run directory", "DIR")] = Path("verify-results")
+    quick: Annotated[bool, Arg("only cases tagged quick", exclusive=True)] = False
+    heavy: Annotated[bool, Arg("also cases tagged heavy", exclusive=True)] = False
+    jobs: Annotated[int, Arg("processes at the same time", "N", ("-j", "--jobs"), count)] = 1
+    timeout: Timeout = 600.0
+    memory: Annotated[
+        float | None,
+        Arg(
+            "resident memory above which a solve is killed "
+            "(default: 80 %% of the machine's, shared by the processes)",
+            "GB",
+            read=positive,
+        ),
+    ] = None
+    solvers: Annotated[
+        Sequence[str],
+        Arg(
+            "solver to compare, or module:Class; with parameters it is a row of its "
+            "own; repeat for several (default: those that the case names)",
+            "'NAME [PARAMETER=VALUE …]'",
+            ("--solver",),
+        ),
+    ] = ()
+    judge: Annotated[
+        Sequence[str],
+        Arg(
+            "solver that is judged; repeat for several (default: each that is asked and does "
+            "not refuse the case); the others are compared and ranked only",
+            "NAME",
+        ),
+    ] = ()
+    parameters: Annotated[
+        Sequence[str],
+        Arg(
+            "parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several",
+            "SOLVER.NAME=VALUE",
+            ("--set",),
+        ),
+    ] = ()
+    repetitions: Repetitions = 3
+    strict: Strict = False
+    cluster: Annotated[
+        str | None,
+        Arg(
+            "solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file",
+            "ADDRESS",
+        ),
+    ] = None
+    ranks: Annotated[
+        int, Arg("MPI ranks of each reference, here or on its worker", "N", read=count)
+    ] = 1
+    references: Annotated[
+        Path | None,
+        Arg("judge by the references in this file (`verify cache export`); solve none", "BUNDLE"),
+    ] = None
+    no_cache: Annotated[bool, Arg("solve references again, and keep none")] = False
+    conform: Annotated[
+        bool | None,
+        Arg(
+            "check every solver with the suite of `verify conform` before ranking "
+            "(default: if more than two are ranked)"
+        ),
+    ] = None
+    no_report: Annotated[bool, Arg("leave the report to `verify report DIR`")] = False
+    as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False
+
+
+def run(
+    cases: Annotated[
+        Sequence[str], Arg("name, pattern or file of a case (default: all)", "CASE")
+    ] = (),
+    *,
+    asked: RunOptions,
+) -> int:
+    """Solve, compare and judge cases, and render the report.
+
+    Examples
+    --------
+      verify run statics/f1_patch --out out
+      verify run my_case.toml --out mine --solver xfem --timeout 60
+      verify run -k "demo and not tissue" --out out -j 2
+      verify run "statics/*" --quick --out out --strict --json > verdicts.json
+
+    Which suite first: -k demo (a minute) shows that all works here; then --quick (minutes); without
+    a selection all cases run that are not tagged heavy.
+
+    A run that was stopped is resumed by the same command: finished solves are reused if their
+    scene, their solver's parameters and the code are the same. Each solve runs in a process of its
+    own, on one thread. With -j above 1 the timings are marked as contended.
+
+    exit codes:
+      0  every verdict is PASS (or UNDECIDED, without --strict; or a known finding of its case)
+      1  a verdict is FAIL, of whichever solver; goes before 3: it stands whatever others would say
+      2  bad input or usage; nothing was run, nothing was written
+      3  a solve failed, timed out, ran out of memory, or could not be stored
+      4  nothing ran: no case matches, or every solver refused
+      5  with --strict: something is UNDECIDED, refused, warned of, or without any verdict
+      128+n  stopped by signal n (130: Ctrl-C); what is finished stays
+    """
+    if not asked.solvers or any(":" not in name for name in asked.solvers):
+        from verify.processes import start_server
+
+        start_server()  # it loads while this process does
+    if find_spec("numba") is None:  # this process does without, those that it starts do not
+        raise ModuleNotFoundError("No module named 'numba'", name="numba")
+    from verify.cli.run_text import costs_of, run_line, suites_line, verdict_lines
+    from verify.runner import exit_code, select_cases
+    from verify.runner.run import NOTHING_RAN
+
+    names, parameters = _solvers_of(asked)
+    weight = "quick" if asked.quick else "heavy" if asked.heavy else "normal"
+    scenes = select_cases(cases, asked.expression, weight)
+    if not scenes:
+        print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
+        return NOTHING_RAN
+    options = _options(asked, names, parameters)
+    if not asked.no_report:
+        threading.Thread(target=_load_report).start()  # while processes solve
+    costs = [(scene, costs_of(scene, options)) for scene in scenes]
+    expected = run_line(costs, options.jobs)
+    if not (cases or asked.expression or asked.quick):
+        expected = f"{suites_line(costs, options.jobs)}\n{expected}"
+    done = _solved(asked, scenes, options, expected)
+    if isinstance(done, int):
+        return done
+    summary, report = done
+    code = exit_code(summary.results, asked.strict)
+    if asked.as_json:
+        answer = [_answer(result) for result in summary.results]
+        print_json({"exit": code, "report": report, "cases": answer})
+        return code
+    for line in verdict_lines(summary.results):
+        print_line(line)
+    if summary.reused:
+        print(f"{summary.reused} finished solves of before were reused")
+    if report:
+        print(f"report: {report}")
+    return code
+
+
+def _solvers_of(asked: RunOptions) -> tuple[list[str], dict[str, dict[str, Any]]]:
+    """Return the solvers that are asked for, and the parameters of each."""
+    from verify.runner.checking import check_solver_name
+    from verify.solvers.named import one_name, parameters_of
+
+    names = [
+        name for entry in asked.solvers for part in entry.split(",") if (name := one_name(part))
+    ]
+    for name in names:
+        check_solver_name(name, "--solver")
+    parameters = of_solvers(asked.parameters)
+    for name in parameters:
+        check_solver_name(name, "--set")
+    parameters |= {name: parameters_of(name, parameters) for name in names if " " in name}
+    return names, parameters
+
+
+def _options(
+    asked: RunOptions, names: list[str], parameters: dict[str, dict[str, Any]]
+) -> "Options":
+    from verify.runner import Options
+    from verify.runner.fingerprint import cache_folder
+    from verify.solvers.named import one_name
+
+    return Options(
+        solvers=tuple(dict.fromkeys(names)),
+        repetitions=asked.repetitions,
+        parameters=parameters,
+        jobs=asked.jobs,
+        timeout=asked.timeout,
+        memory=asked.memory * 1e9 if asked.memory else None,
+        cache=None if asked.no_cache else cache_folder(),
+        references=asked.references,
+        cluster=asked.cluster,
+        ranks=asked.ranks,
+        judge_only=tuple(dict.fromkeys(map(one_name, asked.judge))),
+    )
+
+
+def _solved(
+    asked: RunOptions, scenes: "list[Scene]", options: "Options", expected: str
+) -> "tuple[RunSummary, str | None] | int":
+    """Solve, rank and render; return the exit code of a run that was stopped."""
+    from verify.cli.progress import progress_on
+    from verify.cli.ranking import rank_run
+    from verify.runner import RunStoppedError, run_cases
+
+    beside = not asked.no_report and options.jobs > 1 and len(scenes) > 1
+    with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:
+
+        def announce(text: str) -> None:
+            progress.say(text)
+            progress.doing(text)
+
+        progress.doing("checking cases and solvers")
+        try:
+            summary = run_cases(scenes, asked.out, options, progress, command_line(), drawings)
+        except RunStoppedError as stop:
+            progress.close()
+            print(
+                f"verify: {stop}; the same command resumes it, "
+                f"`verify report {shlex.quote(str(asked.out))}` renders what is finished",
+                file=sys.stderr,
+            )
+            return 128 + stop.signum
+        given = options.parameters
+        rank_run(asked.out, summary.results, given, asked.conform, asked.timeout, announce)
+        progress.doing(f"the report of {len(summary.results)} cases")
+        return summary, None if asked.no_report else _rendered(asked.out, drawings)
+
+
+def _answer(result: "CaseResult") -> dict[str, Any]:
+    return {
+        "case": result.case,
+        "verdict": result.verdict,
+        "verdicts": [asdict(record) for record in result.verdicts],
+        "notices": [asdict(notice) for notice in result.notices],
+        "solves": [
+            {"solver": s.solver, "level": s.level, "status": s.status, "reason": s.reason}
+            for s in result.solves
+        ],
+    }
+
+
+@contextlib.contextmanager
+def _drawings(beside: bool) -> Iterator[Path | None]:
+    """Give a folder for the cases that are drawn beside solves; None if none is."""
+    if not beside:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="verify-") as folder:
+        yield Path(folder)
+
+
+def _load_report() -> None:
+    with contextlib.suppress(Exception):  # it is said when the report is to be written
+        import_module("verify.report").load()
+
+
+def _rendered(directory: Path, drawings: Path | None) -> str:
+    from verify.report import render
+
+    return str(render(directory, drawings=drawings))
+
+
+def of_one_solver(given: Iterable[str]) -> dict[str, Any]:
+    """Read ``tip=partial`` … as the parameters of one solver.
+
+    Raises
+    ------
+    InputError
+        If one is not of this form.
+    """
+    return dict(_split(text, text, "--set tip=partial") for text in given)
+
+
+def of_solvers(given: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Read ``xfem.tip=partial`` … as the parameters of several solvers.
+
+    The solver ends at the last dot before the equals sign, so that ``module:Class`` works too.
+
+    Raises
+    ------
+    InputError
+        If one is not of this form.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for text in given:
+        example = "--set xfem.scheme=implicit_euler"
+        key, equals, value = text.partition("=")
+        solver, dot, name = key.rpartition(".")
+        if not dot or not solver:
+            raise InputError(f"--set {text}: expected SOLVER.NAME=VALUE, e.g. {example}")
+        name, parsed = _split(f"{name}{equals}{value}", text, example)
+        found.setdefault(solver, {})[name] = parsed
+    return found
+
+
+def _split(text: str, given: str, example: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals or not name.isidentifier():
+        raise InputError(f"--set {given}: expected NAME=VALUE, e.g. {example}")
+    from verify.solvers.named import plain_value
+
+    return name, plain_value(value)
