@@ -6,6 +6,8 @@ import time
 import pytest
 from command_line import without_waits
 
+from verify.runner.child import Ending, death
+
 ENDINGS = {
     "Refusing": ("refused", "it only does beams"),
     "RefusingLate": ("refused", "it found a knot"),
@@ -100,3 +102,18 @@ def alive_in_group(leader):
         if int(fields[2]) == leader and fields[0] != "Z":
             return True
     return False
+
+
+@pytest.mark.parametrize("ending, status, said", [
+    (Ending(-9, 1.0, 1.0, starved=True), "memory", "killed by the system, which was out of memory"),
+    (Ending(-9, 1.0, 1.0), "failed", "killed from outside (signal 9), not for memory"),
+    (Ending(9, 1.0, 1.0, starved=True), "failed", "its last words (exit code 9)"),
+    (Ending(-11, 1.0, 1.0), "failed", "its last words (signal 11)"),
+    (Ending(0, 1.0, 1.0), "failed", "its last words (exit code 0, without an answer)"),
+    (Ending(-9, 1.0, 1.0, "timeout"), "timeout", "killed after 3 s"),
+])  # fmt: skip
+def test_an_end_without_an_outcome_is_told_from_how_the_process_ended(
+    tmp_path, ending, status, said
+):
+    (tmp_path / "log.txt").write_text("its last words\n")
+    assert death(tmp_path / "log.txt", ending, 3.0, 1e9) == (status, said)
