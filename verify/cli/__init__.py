@@ -3,18 +3,17 @@
 import os
 import sys
 from collections.abc import Sequence
+from inspect import cleandoc
 from textwrap import indent
-from typing import TYPE_CHECKING
+from typing import Annotated, Literal
 
 from verify import __version__
+from verify.cli.signatures import Arg, Member, Parser, add_commands, arguments_of, call
 from verify.cli.streams import printable_streams
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
 from verify.threads import pin_to_one_thread
 from verify.whole_files import DISK_FAILURES
-
-if TYPE_CHECKING:
-    import argparse
 
 __all__ = ["build_parser", "main"]
 
@@ -39,8 +38,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    from verify.cli.signatures import call
-
     arguments = build_parser().parse_args(argv)
     try:
         code = call(arguments)
@@ -78,12 +75,9 @@ def _fail(message: str, code: int) -> int:
     return code
 
 
-def build_parser() -> "argparse.ArgumentParser":
+def build_parser() -> Parser:
     """Build the parser from the functions that are commands."""
-    from inspect import cleandoc
-
     from verify.cli import baseline, cache, extend, look, play, run, solvers, study
-    from verify.cli.signatures import Member, Parser, add_commands
 
     codes = (run.run.__doc__ or "").partition("exit codes:\n")[2]
     parser = Parser(
@@ -97,7 +91,34 @@ def build_parser() -> "argparse.ArgumentParser":
         "look": [look.list_, look.describe, look.report, look.paraview],
         "compare": [study, baseline],
         "extend": [look.schema, extend.export, extend.import_, extend.conform, solvers],
-        "look after": [cache, look.doctor, look.completion],
+        "look after": [cache, look.doctor, completion],
     }
     add_commands(parser, groups)
     return parser
+
+
+def completion(
+    shell: Annotated[Literal["bash", "zsh"], Arg("the shell that shall read it")],
+) -> int:
+    """Print a script that completes commands, options and cases in a shell.
+
+    Examples
+    --------
+      verify completion bash > ~/.local/share/bash-completion/completions/verify
+      verify completion zsh > ~/.zfunc/_verify
+    """
+    import shtab
+
+    from verify.scene import list_cases
+
+    parser, function = build_parser(), "_verify_cases"
+    for action in arguments_of(parser):
+        if action.dest in ("case", "cases"):
+            action.complete = {"bash": function, "zsh": function}  # type: ignore[attr-defined]
+    names = " ".join(list_cases())  # of today
+    functions = {
+        "bash": f'{function}() {{ compgen -W \'{names}\' -- "$1"; compgen -f -- "$1"; }}',
+        "zsh": f"{function}() {{ _alternative 'cases:case:({names})' 'files:file:_files' }}",
+    }
+    print(shtab.complete(parser, shell, preamble=functions))  # type: ignore[arg-type]
+    return 0

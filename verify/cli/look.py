@@ -424,32 +424,3 @@ def _by_module(seconds: dict[str, float]) -> dict[str, float]:
     for kernel, spent in seconds.items():
         found[kernel.partition(":")[0]] += spent  # type: ignore[assignment]
     return dict(found.most_common())
-
-
-def completion(
-    shell: Annotated[Literal["bash", "zsh"], Arg("the shell that shall read it")],
-) -> int:
-    """Print a script that completes commands, options and cases in a shell.
-
-    Examples
-    --------
-      verify completion bash > ~/.local/share/bash-completion/completions/verify
-      verify completion zsh > ~/.zfunc/_verify
-    """
-    import shtab
-
-    from verify.cli import build_parser
-    from verify.cli.signatures import arguments_of
-    from verify.scene import list_cases
-
-    parser, function = build_parser(), "_verify_cases"
-    for action in arguments_of(parser):
-        if action.dest in ("case", "cases"):
-            action.complete = {"bash": function, "zsh": function}  # type: ignore[attr-defined]
-    names = " ".join(list_cases())  # of today
-    functions = {
-        "bash": f'{function}() {{ compgen -W \'{names}\' -- "$1"; compgen -f -- "$1"; }}',
-        "zsh": f"{function}() {{ _alternative 'cases:case:({names})' 'files:file:_files' }}",
-    }
-    print(shtab.complete(parser, shell, preamble=functions))  # type: ignore[arg-type]
-    return 0
