@@ -5,22 +5,34 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from verify.printable import words_of
+from verify.report.answers import answers
 from verify.report.blocks import Cell, Drawing, Table
-from verify.report.case_view import CaseView, PictureRow
+from verify.report.case_view import CaseView
+from verify.report.figures.answers import answer_panels, key
+from verify.report.figures.style import Palette
 from verify.report.notation import bytes_text, number, solver_title
-from verify.report.pictures import Picture
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
-from verify.result import NoticeKind, Status, Verdict, VerdictRecord
+from verify.result import Status, Verdict, VerdictRecord
 
 _NAMED = 6  # entries of a list in the paragraph
 _PLACES = 2  # of what one solver fails
-_ORDER = ["FAIL", "ERROR", "UNDECIDED", "PASS"]
+
+
+@dataclass(frozen=True)
+class AnswerView:
+    """One of the four questions, its answer in a sentence, its panel, and the case drawn there."""
+
+    question: str
+    sentence: str
+    panel: Drawing | None
+    case: CaseView | None
 
 
 @dataclass
 class Overview:
-    """Counts, lists in words, the matrix of verdicts, and the picture and plot that say most."""
+    """Counts, lists in words, the answers to the four questions, and the matrix of verdicts."""
 
     counts: dict[str, int]
     cases: int
@@ -33,11 +45,11 @@ class Overview:
     notes: list[str] = field(default_factory=list)
     matrix: Table | None = None
     names: list[str] = field(default_factory=list)
-    picture: tuple[Picture, str, str] | None = None
-    plot: tuple[str, str, Drawing] | None = None
+    answers: list[AnswerView] = field(default_factory=list)
+    key: Drawing | None = None
 
 
-def overview(run: Run, cases: Sequence[CaseView]) -> Overview:
+def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> Overview:
     """Return the first screen of `run`."""
     judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
     solves = [s for r in run.results for s in r.solves]
@@ -61,7 +73,12 @@ def overview(run: Run, cases: Sequence[CaseView]) -> Overview:
     asked += [v.solver or "nobody" for _, v in judged]
     view.names = [solver_title(name) for name in dict.fromkeys(asked)]
     view.matrix = _matrix(run, cases, view.names)
-    _show_most(view, cases)
+    try:
+        view.answers = _answers(run, cases, palette)
+        shown = [name for name in view.names if name not in ("nobody", "reference")]
+        view.key = key(shown, palette) if shown else None
+    except Exception as error:
+        view.notes.append(f"the four answers cannot be shown: {words_of(error)}.")
     return view
 
 
@@ -101,12 +118,6 @@ def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[t
         for w in entry.result.warnings if entry.result else []:
             whose = solver_title(w.solver) if w.solver else "every solver"
             warned.setdefault(f"{w.about} in {entry.name}", []).append(whose)
-    adequacy = [
-        f"{entry.name}: {notice.text}"
-        for entry in run.entries
-        for notice in (entry.result.notices if entry.result else [])
-        if notice.kind is NoticeKind.ADEQUACY
-    ]
     lists = {
         "Failed": _by_solver([(e, v) for e, v in failed if not v.known], judged),
         "Failed, known findings": _by_solver([(e, v) for e, v in failed if v.known], judged),
@@ -118,7 +129,6 @@ def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[t
         "Not judged": errors,
         # the text of each stands on top of its case
         "Warned of": [f"{about} ({', '.join(whose)})" for about, whose in warned.items()],
-        "Adequacy of the model": adequacy,
     }
     return [(title, _listed(entries)) for title, entries in lists.items() if entries]
 
@@ -182,23 +192,15 @@ def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
     return Cell(", ".join(ends) if ends else "–")
 
 
-def _show_most(view: Overview, cases: Sequence[CaseView]) -> None:
-    """Choose the worst case that has a picture, and the worst that has a plot."""
-    # of equal verdicts the case that shows most: it has the most figures
-    ranked = sorted(cases, key=lambda c: (_ORDER.index(str(c.verdict)), -len(c.convergence)))
-    for case in ranked:
-        if view.picture is None and case.rows:
-            errors = [row for row in case.rows if row.kind == "error" and case.failing]
-            row = (errors or case.rows)[0]
-            view.picture = (_telling(row, case.failing), case.anchor, case.title)
-        if view.plot is None and case.lead is not None:
-            view.plot = (case.lead[0], case.anchor, case.lead[1])
-
-
-def _telling(row: PictureRow, failing: Sequence[str]) -> Picture:
-    """Return the picture of who fails, else the last: the solver after its reference."""
-    marked = [p for p in row.pictures if any(name in p.title for name in failing)]
-    return (marked or row.pictures[-1:])[0]
+def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[AnswerView]:
+    """Return the four answers with their panels; what cannot be drawn is said by its sentence."""
+    found = answers(run.results)
+    panels = answer_panels(run.results, found, palette)
+    by_name = {case.name: case for case in cases}
+    return [
+        AnswerView(one.question, one.sentence, panel, by_name.get(one.example))
+        for one, panel in zip(found, panels, strict=True)
+    ]
 
 
 def _listed(parts: list[str]) -> str:

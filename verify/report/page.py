@@ -69,7 +69,7 @@ def page_view(
         "short": short,
         "when": f"Run of {started}" if started else "Run of unknown date",
         "command": run.record.get("command") or "",
-        "top": overview(run, cases),
+        "top": overview(run, cases, palette),
         "cases": cases,
         "families": families,
         "ranking": ranking,

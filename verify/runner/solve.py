@@ -143,7 +143,7 @@ def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) 
     from verify.system import checked_system
 
     system = getattr(solver, "system", None)
-    if scene.analysis.kind != "dynamic" or system is None:
+    if system is None or not (scene.analysis.kind == "dynamic" or "slivers" in scene.tags):
         return {}
     if unknowns > _LARGE:
         return {CRITICAL_STEP: f"not computed for more than {_LARGE} unknowns"}

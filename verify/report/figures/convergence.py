@@ -77,7 +77,7 @@ def error_panel(
         log_axis(axes, "x", log_range(values))
         log_axis(axes, "y", y_range)
         axes.set_xlabel(x_title)
-        _band(axes, floor(curves, abscissa))
+        uncertainty_band(axes, floor(curves, abscissa))
         if slope is not None and len(set(values)) > 1:
             _required(axes, [p for _, p in placed], *slope)
         said = [f"{title} against {x_title}."]
@@ -141,7 +141,7 @@ def _named(curve: Curve) -> str:
     return f"{curve.label}\norder {rate.order:.2f}{plus}"
 
 
-def _band(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
+def uncertainty_band(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
     """Draw the band below the uncertainty of the comparison, given as (x, uncertainty)."""
     low = axes.get_ylim()[0]
     if not any(u > low for _, u in places):

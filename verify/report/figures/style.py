@@ -20,6 +20,7 @@ from verify.report.notation import RAISED, printable
 
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"
+_LEFT, _ASIDE = 0.52, 2.0  # inches left of the axes, and with those right of them for a legend
 _RC = {
     "svg.fonttype": "none", "svg.hashsalt": "report", "text.parse_math": False, "font.size": 9,
     "axes.linewidth": 0.7, "axes.spines.top": False, "axes.spines.right": False,
@@ -87,28 +88,31 @@ class Palette(dict[str, Style]):
 
 
 @contextmanager
-def panel(title: str, width: float = 4.5, height: float = 2.75) -> Iterator[tuple[Figure, Axes]]:
+def panel(
+    title: str, width: float = 4.5, height: float = 2.75, legend: bool = True
+) -> Iterator[tuple[Figure, Axes]]:
     """Give a figure of one panel in the style of the report, sizes in inches; its title on top.
 
-    The axes leave room on the right for a legend.
+    The axes leave room on the right for a `legend`.
     """
-    across = width - 2.0
+    aside = _ASIDE if legend else _LEFT + 0.1
+    across = width - aside
     with rc_context(_RC):  # type: ignore[arg-type]
         figure = Figure(figsize=(width, height))
         FigureCanvasSVG(figure)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        _place(axes)
+        _place(axes, aside)
         axes.set_title(printable(title), loc="left", x=-0.42 / across, fontsize=9, pad=9)
         axes.grid(True, axis="y", color=_GRID, linewidth=0.7)
         yield figure, axes
 
 
-def _place(axes: Axes) -> None:
+def _place(axes: Axes, aside: float = _ASIDE) -> None:
     """Leave room for the labels of the axes and, on the right, for a legend."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     width, height = figure.get_size_inches()
-    axes.set_position((0.52 / width, 0.48 / height, (width - 2.0) / width,
+    axes.set_position((_LEFT / width, 0.48 / height, (width - aside) / width,
                        (height - 0.78) / height))  # fmt: skip
 
 

@@ -1,0 +1,340 @@
+"""What a run says to the four questions: accuracy, energy, slivers, cost; each in one sentence.
+
+How large are the displacement errors, does the energy drift, what do slivers do, and what does
+accuracy cost? Numbers come from the results alone. An error and a time are compared with those of
+conforming elements (`BASELINE`) in the same case, where that was solved, since the error itself
+depends on the case more than on the method. A median over cases carries the interval between the
+medians of the cases' lower and upper ends: whatever the truth of each case, its median lies there.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import NamedTuple
+
+from verify.report.curves import Curve, Point, error_curves
+from verify.report.notation import ROUND_OFF, number, solver_title
+from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, finest_of
+
+BASELINE = "conforming"
+_REFERENCE = "reference"
+_ERROR = "displacement_l2"
+_NAMED = 3  # solvers in a sentence
+_PARAMETER = "epsilon"  # of a family of slivers, in elements
+
+
+class Ratio(NamedTuple):
+    """A number and the interval of what it may be in truth."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Question, outcome in a sentence, and the case that its panel draws, if it draws one."""
+
+    question: str
+    sentence: str
+    example: str = ""
+
+
+@dataclass(frozen=True)
+class SliverCurve:
+    """A measure of one solver in one family over ε, as a share of that at the largest ε."""
+
+    solver: str
+    family: str
+    measure: str  # "error" or "critical step"
+    places: list[tuple[float, float]]
+
+
+def answers(results: Sequence[CaseResult]) -> list[Answer]:
+    """Return the answers of a run: accuracy, energy, slivers, cost."""
+    return [accuracy(results), energy(results), slivers(results), cost(results)]
+
+
+def accuracy(results: Sequence[CaseResult]) -> Answer:
+    """Answer how large displacement errors are, beside those of conforming elements."""
+    question, found = "Accuracy", dict(_ratios(results, _error_ratio))
+    if found:
+        said = _compared(found, "has", "displacement error of {} at equal element size")
+        return Answer(question, said, _example(results, found))
+    errors = {s: own for s, own in _finest_errors(results).items() if own}
+    if not errors:
+        missing = "No displacement error above round-off and above its uncertainty: a case with "
+        return Answer(question, missing + "[[cuts]] and a reference would fill this panel.")
+    parts = [_spread(name, own) for name, own in list(errors.items())[:_NAMED]]
+    first = next(iter(errors.values()))
+    example = sorted(first.items(), key=lambda one: one[1].value)[(len(first) - 1) // 2][0]
+    return Answer(question, f"Error of the displacement: {'; '.join(parts)}.", example)
+
+
+def energy(results: Sequence[CaseResult]) -> Answer:
+    """Answer how far the total energy drifts."""
+    worst: dict[str, tuple[float, float, str]] = {}
+    cases = set()
+    for result, solve in moving(results):
+        drift = solve.metric("energy_drift")
+        if drift is None:
+            continue
+        cases.add(result.case)
+        known = worst.get(solve.solver)
+        if known is None or drift.value > known[0]:
+            worst[solve.solver] = drift.value, drift.value + drift.uncertainty, result.case
+    if not worst:
+        return Answer("Energy", "No energy was followed: a case in motion would fill this panel.")
+    order = sorted(worst, key=lambda name: (name == BASELINE, worst[name][0]))
+    parts = []
+    for name in order[:_NAMED]:
+        value, most, where = worst[name]
+        at_most = f", at most {number(most, 2)}" if number(most, 2) != number(value, 2) else ""
+        parts.append(f"{solver_title(name)} {number(value, 2)}{at_most} ({where})")
+    where = "the one case" if len(cases) == 1 else f"{len(cases)} cases"
+    said = f"Largest relative change of the total energy in {where} in motion"
+    return Answer("Energy", f"{said}: {'; '.join(parts)}.")
+
+
+def slivers(results: Sequence[CaseResult]) -> Answer:
+    """Answer what slivers do to the error and to the critical step."""
+    curves = sliver_curves(results)
+    if not curves:
+        missing = "No slivers: a family of cases over [parameters] epsilon would fill this panel."
+        return Answer("Slivers", missing)
+    parts = []
+    order = sorted(dict.fromkeys(c.solver for c in curves), key=lambda name: name == BASELINE)
+    for name in order[:_NAMED]:
+        own = [c for c in curves if c.solver == name]
+        errors = [y for c in own if c.measure == "error" for _, y in c.places]
+        steps = [y for c in own if c.measure != "error" for _, y in c.places]
+        said = [f"error at most {number(max(errors), 3)} times"] if errors else []
+        said += [f"critical step at least {number(min(steps), 3)} times"] if steps else []
+        parts.append(f"{solver_title(name)}: {', '.join(said)}")
+    least = min(x for c in curves for x, _ in c.places)
+    families = len({c.family for c in curves})
+    where = f"{families} famil{'y' if families == 1 else 'ies'} down to ε = {number(least, 1)}"
+    return Answer("Slivers", f"{'; '.join(parts)} that at the largest ε, in {where}.")
+
+
+def cost(results: Sequence[CaseResult]) -> Answer:
+    """Answer what accuracy costs: the time at equal error, meshing included."""
+    found = dict(_ratios(results, _time_ratio))
+    if found:
+        said = _compared(found, "takes", "time of {} for an equal error, meshing included")
+        return Answer("Cost", said, _example(results, found))
+    timed = [
+        (result.case, curve)
+        for result in results
+        for curve in compared_curves(result)
+        if curve.solver != BASELINE and any(_seconds(p) for p in curve.points)
+    ]
+    if not timed:
+        return Answer("Cost", "No time was measured: a solve with an error would fill this panel.")
+    case, curve = max(timed, key=lambda one: len(one[1].points))
+    last = curve.points[-1]
+    said = f"{curve.label}: {number(last.value, 2)} in {number(_seconds(last), 2)} s"
+    missing = "no other solver reaches an equal error in the same case, to compare the time with"
+    return Answer("Cost", f"{said} ({case}); {missing}.", case)
+
+
+def compared_curves(result: CaseResult) -> list[Curve]:
+    """Return the displacement error of every solver but the reference, coarse to fine."""
+    return [c for c in error_curves(result, _ERROR) if c.solver != _REFERENCE]
+
+
+def moving(results: Sequence[CaseResult]) -> Iterator[tuple[CaseResult, SolveRecord]]:
+    """Yield the solves, on the finest level of each solver, whose total energy is known."""
+    for result in results:
+        solved = (s for s in result.solves if s.status is Status.SOLVED)
+        for solve in finest_of(solved).values():
+            if solve.solver != _REFERENCE and len(solve.account.get("total", [])) > 1:
+                yield result, solve
+
+
+def energy_curve(solve: SolveRecord) -> list[tuple[float, float]]:
+    """Return (share of the time, relative change of the total energy) of a solve in motion.
+
+    It is scaled so that its largest value is the metric ``energy_drift``.
+    """
+    times, total = solve.account["time"], solve.account["total"]
+    drift = solve.metric("energy_drift")
+    change = [abs(value - total[0]) for value in total]
+    if drift is None or not max(change) > 0.0:
+        return []
+    span = times[-1] - times[0] or 1.0
+    return [((t - times[0]) / span, c * drift.value / max(change))
+            for t, c in zip(times, change, strict=True) if c > 0.0]  # fmt: skip
+
+
+def sliver_curves(results: Sequence[CaseResult]) -> list[SliverCurve]:
+    """Return error and critical step over ε of each solver and family with two ε > 0 at least."""
+    places: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for result in results:
+        row = result.row or {}
+        size = row.get("value")
+        if row.get("parameter") != _PARAMETER or not isinstance(size, int | float) or size <= 0:
+            continue
+        solved = (s for s in result.solves if s.status is Status.SOLVED)
+        for name, solve in finest_of(solved).items():
+            error = solve.metric(_ERROR)
+            if error is not None and error.value > max(error.uncertainty, ROUND_OFF):
+                places.setdefault((name, row["family"], "error"), []).append((size, error.value))
+            step = _step(solve)
+            if step is not None:
+                key = (name, row["family"], "critical step")
+                places.setdefault(key, []).append((size, step))
+    curves = []
+    for (name, family, measure), own in places.items():
+        own.sort(reverse=True)
+        if len(own) > 1:
+            shares = [(x, y / own[0][1]) for x, y in own]
+            curves.append(SliverCurve(name, family, measure, shares))
+    return curves
+
+
+def _step(solve: SolveRecord) -> float | None:
+    """Return the critical step that is noted, in seconds; None if it is not known."""
+    try:
+        step = float(solve.notes.get(CRITICAL_STEP, "").removesuffix(" s"))
+    except ValueError:
+        return None
+    return step if 0.0 < step < math.inf else None
+
+
+def _ratios(
+    results: Sequence[CaseResult], compare: Callable[[Curve, Curve], Ratio | None]
+) -> Iterator[tuple[str, dict[str, Ratio]]]:
+    """Yield each solver that is compared with the baseline, and its ratio in each such case."""
+    found: dict[str, dict[str, Ratio]] = {}
+    for result in results:
+        curves = compared_curves(result)
+        beside = next((c for c in curves if c.solver == BASELINE), None)
+        for curve in curves:
+            if beside is not None and curve is not beside and (r := compare(curve, beside)):
+                found.setdefault(curve.label, {})[result.case] = r
+    order = sorted(found, key=lambda name: (name != "XFEM", median(_values(found[name]))))
+    yield from ((name, found[name]) for name in order)
+
+
+def _error_ratio(own: Curve, other: Curve) -> Ratio | None:
+    """Error over error on the finest level of both, where both are above their uncertainty."""
+    theirs = {p.level: p for p in other.points if _resolved(p)}
+    shared = [(p, theirs[p.level]) for p in own.points if p.level in theirs and _resolved(p)]
+    if not shared:
+        return None
+    p, q = shared[-1]
+    low = (p.value - p.uncertainty) / (q.value + q.uncertainty)
+    return Ratio(p.value / q.value, low, (p.value + p.uncertainty) / (q.value - q.uncertainty))
+
+
+def _time_ratio(own: Curve, other: Curve) -> Ratio | None:
+    """Time over time at the smallest error that both reach, between levels by a power law."""
+    reached = [[p for p in c.points if _resolved(p) and _seconds(p)] for c in (own, other)]
+    if not all(reached):
+        return None
+    target = max(min(p.value for p in points) for points in reached)
+    times = [_time_at(points, target) for points in reached]
+    if times[0] is None or times[1] is None:
+        return None
+    a, b = times
+    return Ratio(a.value / b.value, a.low / b.high, a.high / b.low)
+
+
+def _time_at(points: Sequence[Point], target: float) -> Ratio | None:
+    """Seconds to an error with their spread; None where even the coarsest level is below it."""
+    after = next((k for k, p in enumerate(points) if p.value <= target * (1 + 1e-12)), None)
+    if after is None or (after == 0 and points[0].value < target * (1 - 1e-12)):
+        return None
+    fine, coarse = points[after], points[max(after - 1, 0)]
+    share = 1.0
+    if coarse.value > fine.value:
+        share = math.log(coarse.value / target) / math.log(coarse.value / fine.value)
+
+    def between(which: int) -> float:
+        a, b = _span(coarse)[which], _span(fine)[which]
+        return a ** (1.0 - share) * b**share
+
+    return Ratio(between(0), between(1), between(2))
+
+
+def _span(point: Point) -> Ratio:
+    time = point.duration
+    assert time is not None
+    return Ratio(*(t + time.meshing for t in (time.median, time.low, time.high)))
+
+
+def _seconds(point: Point) -> float:
+    """Return the median time with meshing, in seconds; 0 if it is not known."""
+    time = point.duration
+    return time.median + time.meshing if time is not None and time.low > 0.0 else 0.0
+
+
+def _resolved(point: Point) -> bool:
+    return point.value > max(point.uncertainty, ROUND_OFF)
+
+
+def _finest_errors(results: Sequence[CaseResult]) -> dict[str, dict[str, Ratio]]:
+    """Return the errors on the finest level by solver and case, where they are resolved."""
+    found: dict[str, dict[str, Ratio]] = {}
+    for result in results:
+        for curve in compared_curves(result):
+            p = curve.points[-1]
+            if _resolved(p):
+                own = Ratio(p.value, p.value - p.uncertainty, p.value + p.uncertainty)
+                found.setdefault(curve.label, {})[result.case] = own
+    return found
+
+
+def _compared(found: Mapping[str, Mapping[str, Ratio]], verb: str, what: str) -> str:
+    """Say of each solver the median of its ratios, with its interval and the number of cases."""
+    medians = {
+        name: _interval(Ratio(*(median(end) for end in zip(*own.values(), strict=True))))
+        for name, own in found.items()
+    }
+    beside = f"times the {what.format(solver_title(BASELINE))}"
+    if len(medians) == 1:
+        ((name, middle),) = medians.items()
+        return f"{name} {verb} {middle} {beside}, {_over(len(found[name]))}."
+    parts = [f"{name} {middle} ({len(found[name])})" for name, middle in medians.items()]
+    more = f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else ""
+    return (
+        f"Solvers that {verb.replace('has', 'have').replace('takes', 'take')} so many {beside}, "
+        f"median (of cases): {', '.join(parts[:_NAMED])}{more}."
+    )
+
+
+def _over(count: int) -> str:
+    return "in one case" if count == 1 else f"in the median of {count} cases"
+
+
+def _interval(ratio: Ratio) -> str:
+    value, low, high = (number(end, 3) for end in ratio)
+    return value if low == high == value else f"{value} ({low}–{high})"
+
+
+def _spread(name: str, own: Mapping[str, Ratio]) -> str:
+    values = sorted(_values(own))
+    if len(values) == 1:
+        one = next(iter(own.values()))
+        return f"{name} {_interval(one)} ({next(iter(own))})"
+    ends = f"{number(values[0], 2)} to {number(values[-1], 2)}"
+    return f"{name} {number(median(values), 2)}, median of {len(values)} cases ({ends})"
+
+
+def _example(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Ratio]]) -> str:
+    """Return the case to draw: of those with the most levels, up to three, the one in the middle.
+
+    That is the case whose ratio, of the first solver, is nearest to the median of all cases.
+    """
+    own = next(iter(found.values()))
+    levels = {r.case: min(3, len({s.level for s in r.solves if s.solver == BASELINE}))
+              for r in results if r.case in own}  # fmt: skip
+    most, middle = max(levels.values()), median(_values(own))
+    return min((case for case in own if levels[case] == most),
+               key=lambda case: abs(math.log(own[case].value / middle)))  # fmt: skip
+
+
+def _values(own: Mapping[str, Ratio]) -> list[float]:
+    return [ratio.value for ratio in own.values()]
