@@ -76,7 +76,7 @@ def test_the_page_opens_whole_without_errors_and_does_not_overflow(
     found, console = opened(browser, page, width, tmp_path)
     assert console == []
     assert found["width"] == width
-    assert found["images"] == found["loaded"] == 13
+    assert found["images"] == found["loaded"] == 12
     assert found["content"] <= width, found["left"]
     assert found["left"] == []
 

@@ -235,10 +235,9 @@ def _time_ratio(own: Curve, other: Curve) -> Ratio | None:
     if not all(reached):
         return None
     target = max(min(p.value for p in points) for points in reached)
-    times = [_time_at(points, target) for points in reached]
-    if times[0] is None or times[1] is None:
+    a, b = (_time_at(points, target) for points in reached)
+    if a is None or b is None:
         return None
-    a, b = times
     return Ratio(a.value / b.value, a.low / b.high, a.high / b.low)
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from verify.report.answers import (
     Answer,
@@ -54,7 +53,7 @@ def key(names: Sequence[str], palette: Palette) -> Drawing:
         axes.set_axis_off()
         axes.set_position((0.0, 0.0, 1.0, 1.0))
         handles = [
-            Line2D([], [], label=name, linestyle=palette[name].dashes, **palette[name].marked)
+            axes.plot([], [], label=name, linestyle=palette[name].dashes, **palette[name].marked)[0]
             for name in names
         ]
         rows = -(-len(handles) // across)
@@ -154,9 +153,12 @@ def _slivers(results: Sequence[CaseResult], palette: Palette) -> Drawing | None:
             style = palette[solver_title(curve.solver)]
             dashes = "-" if curve.measure == "error" else ":"
             axes.plot(*zip(*curve.places, strict=True), linestyle=dashes, **style.marked)
-        handles = [Line2D([], [], color="#333", linestyle=s, label=w)
-                   for s, w in (("-", "error"), (":", "critical step"))
-                   if any((c.measure == "error") == (s == "-") for c in curves)]  # fmt: skip
+        drawn = {curve.measure for curve in curves}
+        handles = [
+            axes.plot([], [], color="#333", linestyle=dashes, label=measure)[0]
+            for measure, dashes in (("error", "-"), ("critical step", ":"))
+            if measure in drawn
+        ]
         axes.legend(handles=handles, frameon=False, fontsize=8, loc="best")
         said = "; ".join(
             f"{solver_title(c.solver)}, {c.family}, {c.measure}: {number_text(c.places[-1][1])} "

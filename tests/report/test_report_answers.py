@@ -1,0 +1,120 @@
+"""The four answers of a run, against numbers chosen beforehand: ratios, medians, times, slivers."""
+
+import pytest
+
+from verify.reference_record import ReferenceRecord
+from verify.report.answers import answers, energy_curve, sliver_curves
+from verify.report.figures.answers import answer_panels
+from verify.report.figures.style import Palette
+from verify.result import CRITICAL_STEP, CaseResult, Metric, SolveRecord, Status
+
+
+def solve(solver, level, error, off=0.0, seconds=None, **more):
+    metrics = [Metric("displacement_l2", error, "1", None, off)] if error else []
+    timings = {"solve": list(seconds), "meshing": [0.0]} if seconds else {}
+    metrics += more.pop("metrics", [])
+    return SolveRecord(
+        case="a", solver=solver, parameters={}, level=level, status=Status.SOLVED, reason="",
+        size=0.1 / 2**level, unknowns=100 * 4**level, timings=timings, metrics=metrics, **more,
+    )  # fmt: skip
+
+
+def case(name, *solves, row=None):
+    return CaseResult(
+        case=name, title=name, requirement="", scene_hash="", scene={},
+        reference=ReferenceRecord("none"), solves=list(solves), rates=[], verdicts=[], row=row,
+    )  # fmt: skip
+
+
+def test_the_error_is_held_against_conforming_elements_and_its_interval_is_that_of_the_median():
+    cases = [
+        case("a", solve("xfem", 1, 0.02, 0.002), solve("conforming", 1, 0.01, 0.001)),
+        case("b", solve("xfem", 1, 0.03), solve("conforming", 1, 0.01)),
+        case("c", solve("xfem", 1, 0.05), solve("conforming", 1, 0.01)),
+        # not resolved, and exact to round-off: no ratio
+        case("d", solve("xfem", 1, 0.01, 0.02), solve("conforming", 1, 0.01)),
+        case("e", solve("xfem", 1, 1e-15), solve("conforming", 1, 1e-15)),
+    ]
+    found = answers(cases)[0]
+    assert "XFEM has 3.00 times the displacement error of conforming P1" in found.sentence
+    assert "in the median of 3 cases" in found.sentence
+    assert found.example == "b"
+    # of one case: 0.018/0.011 = 1.64 and 0.022/0.009 = 2.44
+    assert "2.00 (1.64–2.44) times" in answers(cases[:1])[0].sentence
+    # a finer level of one solver alone compares with nothing
+    finer = case("a", *cases[0].solves, solve("xfem", 2, 0.001))
+    assert answers([finer])[0].sentence == answers(cases[:1])[0].sentence
+
+
+def test_time_is_compared_at_an_equal_error_between_levels_by_a_power_law():
+    # error = 1/t and 1/(4 t): at every error the second takes a quarter, whatever its levels
+    slow = [solve("xfem", k, 1.0 / t, seconds=[t]) for k, t in enumerate((10.0, 40.0, 160.0))]
+    fast = [
+        solve("conforming", k, 1.0 / (4.0 * t), seconds=[t])
+        for k, t in enumerate((3.0, 12.0, 48.0))
+    ]
+    found = answers([case("a", *slow, *fast)])[3]
+    assert "XFEM takes 4.00 times the time of conforming P1" in found.sentence
+    # repetitions from half to twice the median: four times either way
+    wide = [
+        solve("xfem", k, 1.0 / t, seconds=[t / 2, t, 2 * t]) for k, t in enumerate((10.0, 40.0))
+    ]
+    same = [
+        solve("conforming", s.level, s.metrics[0].value, seconds=s.timings["solve"]) for s in wide
+    ]
+    assert "1.00 (0.250–4.00) times" in answers([case("a", *wide, *same)])[3].sentence
+    # what is better on its coarsest level than the other ever is has no time at that error
+    better = [solve("conforming", 0, 1e-4, seconds=[1.0])]
+    assert (
+        "no other solver reaches an equal error" in answers([case("a", *slow, *better)])[3].sentence
+    )
+
+
+def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():
+    def moving(name, drift):
+        total = [1.0, 1.0 - drift, 1.0 + 2 * drift]
+        account = {"time": [0.0, 1.0, 4.0], "total": total}
+        return case(name, solve("xfem", 0, None, metrics=[Metric("energy_drift", 7 * drift, "1")],
+                                account=account))  # fmt: skip
+
+    cases = [moving("calm", 1e-6), moving("wild", 1e-3)]
+    assert "XFEM 7.0×10⁻³ (wild)" in answers(cases)[1].sentence.replace("0.0070", "7.0×10⁻³")
+    assert "in 2 cases in motion" in answers(cases)[1].sentence
+    # scaled to the drift: the largest change, at the end, is 7e-3, that at a quarter half of it
+    assert energy_curve(cases[1].solves[0]) == [
+        (0.25, pytest.approx(3.5e-3)),
+        (1.0, pytest.approx(7e-3)),
+    ]
+
+
+def test_slivers_are_held_against_the_largest_epsilon_and_rows_without_slivers_are_left_out():
+    def row(epsilon, error, step):
+        return case(f"s[{epsilon}]", solve("xfem", 0, error, notes={CRITICAL_STEP: step}),
+                    row={"family": "s", "parameter": "epsilon", "value": epsilon})  # fmt: skip
+
+    cases = [row(1e-6, 0.05, "0.003 s"), row(0.5, 0.04, "0.004 s"), row(0.0, 9.0, "9 s")]
+    curves = {curve.measure: curve.places for curve in sliver_curves(cases)}
+    assert curves["error"] == [(0.5, 1.0), (1e-6, pytest.approx(1.25))]
+    assert curves["critical step"] == [(0.5, 1.0), (1e-6, pytest.approx(0.75))]
+    said = answers(cases)[2].sentence
+    assert "error at most 1.25 times" in said
+    assert "critical step at least 0.750 times" in said
+    unknown = [row(1e-6, 0.05, "not known: no"), row(0.5, 0.04, "0.004 s")]
+    assert [curve.measure for curve in sliver_curves(unknown)] == ["error"]
+
+
+def test_what_a_run_has_not_is_said_and_which_case_would_fill_it():
+    found = answers([])
+    assert [one.question for one in found] == ["Accuracy", "Energy", "Slivers", "Cost"]
+    assert all("would fill this panel" in one.sentence for one in found)
+    assert answer_panels([], found, Palette()) == [None] * 4
+
+
+def test_panels_say_in_words_what_they_draw():
+    named = (("xfem", 0.1, 1.0), ("conforming", 0.2, 3.0))
+    levels = [solve(name, k, e, 1e-3, seconds=[t]) for name, e, t in named for k in (0, 1)]
+    cases = [case("a", *levels)]
+    drawn = answer_panels(cases, answers(cases), Palette())
+    assert drawn[1:3] == [None, None]
+    assert "XFEM: 0.1 at 0.1 to 0.1 at 0.05" in drawn[0].alt
+    assert "conforming P1: 0.2 at 3 to 0.2 at 3" in drawn[3].alt
