@@ -148,7 +148,6 @@ def run(
     if find_spec("numba") is None:  # this process does without, those that it starts do not
         raise ModuleNotFoundError("No module named 'numba'", name="numba")
     from verify.cli.run_text import costs_of, run_line, suites_line, verdict_lines
-    from verify.report.answers import answers
     from verify.runner import exit_code, select_cases
     from verify.runner.run import NOTHING_RAN
 
@@ -176,6 +175,10 @@ def run(
         return code
     for line in verdict_lines(summary.results):
         print_line(line)
+    from verify.report.answers import (
+        answers,
+    )  # it loads the figures, which solves need not wait for
+
     for one in answers(summary.results):
         print_line(f"{one.question}: {one.sentence}")
     if summary.reused:
