@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
+from verify.judge.checks import unjudged_result
 from verify.judge.sufficiency import sufficiency
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan, further_level, levels_in_vain
-from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, load_scene
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]

@@ -121,9 +121,9 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.s
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
 `rigid_motion`, `slack_membranes`, `stability`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability
-`energy_balance`, `energy_momentum`, `real_time`, `inherit`
+`energy_balance`, `energy_momentum`, `real_time`, `inherit`, `release`
     energies of a motion; a scheme that keeps energy and momentum, one of a linear solve per step;
-    the state of a body that is cut on the way
+    the state of a body that is cut on the way, and forces that fade where it lets go
 `critical_step`, `subdivision`
     largest step of explicit schemes; the cut body as a conforming mesh
 """
