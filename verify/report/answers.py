@@ -90,11 +90,14 @@ def energy(results: Sequence[CaseResult]) -> Answer:
     parts = []
     for name in order[:_NAMED]:
         value, most, where = worst[name]
-        at_most = f", at most {number(most, 2)}" if number(most, 2) != number(value, 2) else ""
-        parts.append(f"{solver_title(name)} {number(value, 2)}{at_most} ({where})")
-    where = "the one case" if len(cases) == 1 else f"{len(cases)} cases"
-    said = f"Largest relative change of the total energy in {where} in motion"
-    return Answer("Energy", f"{said}: {'; '.join(parts)}.")
+        bounds = [f"at most {number(most, 2)}"] if number(most, 2) != number(value, 2) else []
+        bounds += [where] if len(cases) > 1 else []
+        said = f" ({', '.join(bounds)})" if bounds else ""
+        parts.append(f"{solver_title(name)} {number(value, 2)}{said}")
+    where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
+    return Answer(
+        "Energy", f"Largest relative change of the total energy in {where}: {'; '.join(parts)}."
+    )
 
 
 def slivers(results: Sequence[CaseResult]) -> Answer:
@@ -107,8 +110,8 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
     order = sorted(dict.fromkeys(c.solver for c in curves), key=lambda name: name == BASELINE)
     for name in order[:_NAMED]:
         own = [c for c in curves if c.solver == name]
-        errors = [y for c in own if c.measure == "error" for _, y in c.places]
-        steps = [y for c in own if c.measure != "error" for _, y in c.places]
+        errors = [y for c in own if c.measure == "error" for _, y in c.places[1:]]
+        steps = [y for c in own if c.measure != "error" for _, y in c.places[1:]]
         said = [f"error at most {number(max(errors), 3)} times"] if errors else []
         said += [f"critical step at least {number(min(steps), 3)} times"] if steps else []
         parts.append(f"{solver_title(name)}: {', '.join(said)}")
