@@ -141,7 +141,9 @@ SETTLING = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("metric, adequate", [("end", True), ("early", False)])
+@pytest.mark.parametrize(
+    "metric, adequate", [pytest.param("end", True, marks=pytest.mark.heavy), ("early", False)]
+)
 def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_way(metric, adequate):
     study = budget_of(scenes.scene(**SETTLING), tolerance=0.15, metric=metric)
     static = [c for c in study.candidates if c.analysis == "static"]
@@ -162,6 +164,7 @@ def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_wa
 BRIEF = {**SETTLING, "analysis": {**SETTLING["analysis"], "duration": 2.0}}
 
 
+@pytest.mark.heavy
 def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
     scene = scenes.scene(**BRIEF)
     study = budget_of(scene, metric="early")
