@@ -64,8 +64,11 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
         return Answer(question, said, _example(results, found))
     errors = {s: own for s, own in _finest_errors(results).items() if own}
     if not errors:
-        missing = "No displacement error above round-off and above its uncertainty: a case with "
-        return Answer(question, missing + "[[cuts]] and a reference would fill this panel.")
+        known = [p for r in results for c in compared_curves(r) for p in c.points]
+        if known and all(p.value <= ROUND_OFF for p in known):
+            return Answer(question, "All displacement errors are at round-off.")
+        missing = "No displacement error above round-off and above its uncertainty: a case whose "
+        return Answer(question, missing + "reference is finer would tell.")
     parts = [_spread(name, own) for name, own in list(errors.items())[:_NAMED]]
     first = next(iter(errors.values()))
     example = sorted(first.items(), key=lambda one: one[1].value)[(len(first) - 1) // 2][0]
@@ -85,7 +88,7 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         if known is None or drift.value > known[0]:
             worst[solve.solver] = drift.value, drift.value + drift.uncertainty, result.case
     if not worst:
-        return Answer("Energy", "No energy was followed: a case in motion would fill this panel.")
+        return Answer("Energy", "No energy was followed: a case in motion would tell.")
     order = sorted(worst, key=lambda name: (name == BASELINE, worst[name][0]))
     parts = []
     for name in order[:_NAMED]:
@@ -104,7 +107,7 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
     """Answer what slivers do to the error and to the critical step."""
     curves = sliver_curves(results)
     if not curves:
-        missing = "No slivers: a family of cases over [parameters] epsilon would fill this panel."
+        missing = "No slivers: a family of cases over [parameters] epsilon would tell."
         return Answer("Slivers", missing)
     parts = []
     order = sorted(dict.fromkeys(c.solver for c in curves), key=lambda name: name == BASELINE)
@@ -134,7 +137,7 @@ def cost(results: Sequence[CaseResult]) -> Answer:
         if curve.solver != BASELINE and any(_seconds(p) for p in curve.points)
     ]
     if not timed:
-        return Answer("Cost", "No time was measured: a solve with an error would fill this panel.")
+        return Answer("Cost", "No time was measured: a solve with an error would tell.")
     case, curve = max(timed, key=lambda one: len(one[1].points))
     last = curve.points[-1]
     said = f"{curve.label}: {number(last.value, 2)} in {number(_seconds(last), 2)} s"
