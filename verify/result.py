@@ -18,9 +18,8 @@ REFERENCE = "reference"  #: solver that judges the others, where no exact soluti
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
-CRITICAL_STEP = (
-    "critical step"  #: of the notes of a solve in motion: of central differences, at rest
-)
+#: of the notes of a solve in motion or of slivers: of central differences, undeformed body
+CRITICAL_STEP = "critical step"
 CUT = "cut"  #: of the notes of a solve: where its realised cut is not as asked
 #: begins the note "comparison" of a solve that the comparison, not its solver, failed on
 COMPARISON_FAILED = "comparison failed"

@@ -61,7 +61,7 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
     question, found = "Accuracy", dict(_ratios(results, _error_ratio))
     if found:
         said = _compared(found, "has", "displacement error of {} at equal element size")
-        return Answer(question, said, _example(results, found))
+        return Answer(question, said + _left_out(results, found), _example(results, found))
     errors = {s: own for s, own in _finest_errors(results).items() if own}
     if not errors:
         known = [p for r in results for c in compared_curves(r) for p in c.points]
@@ -308,6 +308,19 @@ def _compared(found: Mapping[str, Mapping[str, Ratio]], verb: str, what: str) ->
         f"Solvers that {verb.replace('has', 'have').replace('takes', 'take')} so many {beside}, "
         f"median (of cases): {', '.join(parts[:_NAMED])}{more}."
     )
+
+
+def _left_out(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Ratio]]) -> str:
+    """Say in how many cases with both errors, not at round-off, no ratio can be told."""
+    unresolved = 0
+    for result in results:
+        curves = {c.solver: c for c in compared_curves(result)}
+        told = any(result.case in own for own in found.values())
+        if BASELINE in curves and len(curves) > 1 and not told:
+            errors = [p.value for c in curves.values() for p in c.points]
+            unresolved += max(errors) > ROUND_OFF
+    cases = f"{unresolved} more case{'s' * (unresolved != 1)}"
+    return f" In {cases} the uncertainty is as large as an error." if unresolved else ""
 
 
 def _over(count: int) -> str:

@@ -78,7 +78,6 @@ class CaseView:
     tables: dict[str, Table | None] = field(default_factory=dict)
     reference: list[tuple[str, str]] = field(default_factory=list)
     reference_tables: list[Table] = field(default_factory=list)
-    lead: tuple[str, Drawing] | None = None
 
 
 def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
@@ -160,8 +159,6 @@ def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:
                 costs = [p for over in ("unknowns", "time")
                          if (p := error_panel(title, curves, y_range, palette, over))]  # fmt: skip
                 view.cost = Figure(costs) if costs else view.cost
-                if panel is not None:
-                    view.lead = (f"{view.title}: {title}", panel)
     if drawn and not view.convergence:
         view.convergence_notes.append(
             "One level was solved: there is no convergence to draw; its errors are in the numbers."
