@@ -10,10 +10,10 @@ from time import process_time
 import numpy as np
 import pytest
 
-from verify.simulator.collision import SurfaceCollider
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.embedded_surface import EmbeddedSurface
-from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.embedded_surface import EmbeddedSurface
+from verify.simulator.moving_surface import BodySurface
+from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.simulator.surfaces import SurfaceCollider
 from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh
 

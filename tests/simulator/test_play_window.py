@@ -5,7 +5,7 @@ import pytest
 from thesis_stages import CASES
 
 from verify.scene import load_scene
-from verify.simulator.stage_of_scene import stage_of
+from verify.simulator.stage import stage_of
 from verify.simulator.surfaces import Picture
 from verify.simulator.window import PlayWindow, place_in_sight
 

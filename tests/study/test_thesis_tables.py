@@ -9,8 +9,14 @@ from verify.result import Verdict
 from verify.scene import load_scenes
 from verify.simulator.thesis.added_nodes import count_face, count_strips
 from verify.simulator.thesis.delays import delays, with_other_frames
-from verify.simulator.thesis.real_time import LIMITS, RealTime
-from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, StepTime, step_times
+from verify.simulator.thesis.real_time import (
+    CUTS,
+    LIMITS,
+    TETRAHEDRA,
+    RealTime,
+    StepTime,
+    step_times,
+)
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import exponent, sliver_systems

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.simulator.moving_surface import MovingSurface
 from verify.xfem.phantom import PhantomMesh
 
 

@@ -11,9 +11,9 @@ from scipy.optimize import minimize_scalar
 from surface_measures import sphere
 
 from verify.compare.splitting import measures
-from verify.simulator.collision import SurfaceCollider
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.moving_surface import BodySurface
+from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.simulator.surfaces import SurfaceCollider
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
 from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.mesh import SimplexMesh

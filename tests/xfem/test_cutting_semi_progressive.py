@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_comparison import assert_same_cut
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from random_strokes import meshes, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.moving_surface import BodySurface
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh

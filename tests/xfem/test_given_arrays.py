@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import cut_body, cut_membrane, material
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath, TriangulatedSurface

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from surface_measures import enclosed_by_body, loose_edges, pinched_edges, sphere, volume_by_body
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.embedded_surface import EmbeddedSurface
-from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.embedded_surface import EmbeddedSurface
+from verify.simulator.moving_surface import BodySurface
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

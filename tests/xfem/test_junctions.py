@@ -8,7 +8,7 @@ from cut_bodies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch
 from verify.xfem.elasticity import isotropic
 from verify.xfem.faceted_cuts import Polyline

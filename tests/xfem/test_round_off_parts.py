@@ -5,7 +5,7 @@ import pytest
 from degenerate_strokes import NEARNESS, body
 from xfem_bodies import boundary_nodes, zero_modes
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.elasticity import isotropic

@@ -5,8 +5,8 @@ import pytest
 from cut_bodies import rotation
 from xfem_bodies import boundary_nodes
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.moving_surface import BodySurface
+from verify.simulator.moving_surface import BodySurface
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, ToolPath

@@ -10,12 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays import Ints
+_Ints = NDArray[np.int64]
 
 
 def minimum_degree(
     starts: NDArray[np.int64], columns: NDArray[np.int64]
-) -> tuple[Ints, Ints, Ints, Ints]:
+) -> tuple[_Ints, _Ints, _Ints, _Ints]:
     """Order nodes for elimination.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.simulator.moving_surface import MovingSurface
 from verify.simulator.session import Session
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh

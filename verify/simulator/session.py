@@ -13,10 +13,9 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
-from verify.simulator.collision import Contacts, SurfaceCollider
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.stage import Grips, Stage, gripped, held_facets
-from verify.simulator.surfaces import Picture, Surfaces
+from verify.simulator.surfaces import Contacts, Picture, SurfaceCollider, Surfaces
 from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath

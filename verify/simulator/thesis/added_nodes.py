@@ -10,8 +10,8 @@ from verify.methods.catalogue import cut_by
 from verify.methods.cut_body import CutBody
 from verify.scene import load_scene
 from verify.simulator import Stage, stage_of
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.thesis.published import published_rows
+from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.simulator.thesis.delays import published_rows
 from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step

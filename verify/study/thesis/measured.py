@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import Delay, Frames
-from verify.simulator.thesis.real_time import RealTime
-from verify.simulator.thesis.step_times import StepTime
+from verify.simulator.thesis.real_time import RealTime, StepTime
 from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import SliverSystem
 

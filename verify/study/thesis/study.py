@@ -9,10 +9,14 @@ from typing import Any
 from verify.result import CaseResult
 from verify.scene import Scene, load_scenes
 from verify.simulator.thesis.added_nodes import count_face, count_strips
-from verify.simulator.thesis.delays import SPEEDS, delays, with_other_frames
-from verify.simulator.thesis.published import published_rows, published_source
-from verify.simulator.thesis.real_time import real_time
-from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, step_times
+from verify.simulator.thesis.delays import (
+    SPEEDS,
+    delays,
+    published_rows,
+    published_source,
+    with_other_frames,
+)
+from verify.simulator.thesis.real_time import CUTS, TETRAHEDRA, real_time, step_times
 from verify.study.record import Study
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import compare_methods

@@ -6,8 +6,7 @@ from verify.result import Verdict
 from verify.simulator.session import LIMITS
 from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import SPEEDS, Delay, Frames
-from verify.simulator.thesis.real_time import RealTime
-from verify.simulator.thesis.step_times import StepTime
+from verify.simulator.thesis.real_time import RealTime, StepTime
 from verify.study.record import Finding
 from verify.study.thesis.measured import Measured
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from verify.simulator.cutting.growing_body import GrowingBody
+from verify.simulator.growing_body import GrowingBody
 from verify.xfem.arrays import Floats, Ints, Sides
 
 

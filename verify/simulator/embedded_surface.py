@@ -15,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.simulator.arrays import distinct, of_lists, ranges
-from verify.simulator.cutting.division import MeshPatch
-from verify.simulator.cutting.growing_body import Increment
-from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.edge_points import EdgePoints
-from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.simulator.division import MeshPatch
+from verify.simulator.edge_points import EdgePoints
+from verify.simulator.growing_body import Increment
+from verify.simulator.moving_surface import MovingSurface
 from verify.simulator.places import MaterialPlaces
+from verify.simulator.point_numbers import FoundPoints, PointNumbers, distinct, of_lists, ranges
+from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.errors import XfemError
 from verify.xfem.pieces import ROUND_OFF, split_cells

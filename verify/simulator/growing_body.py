@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from verify.simulator.arrays import GrowingArray, distinct, ranges
-from verify.simulator.cutting.division import (
+from verify.simulator.division import (
     Division,
     MeshPatch,
     PatchCutter,
@@ -23,7 +22,7 @@ from verify.simulator.cutting.division import (
     number_groups,
     slots_before,
 )
-from verify.simulator.cutting.point_numbers import PointNumbers
+from verify.simulator.point_numbers import GrowingArray, PointNumbers, distinct, ranges
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
 from verify.xfem.cuts import Cut

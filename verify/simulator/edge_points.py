@@ -11,8 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from verify.simulator.arrays import GrowingArray
-from verify.simulator.cutting.point_numbers import NODES, NONE, PointNumbers
+from verify.simulator.point_numbers import NODES, NONE, GrowingArray, PointNumbers
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.simulator.arrays import GrowingArray, distinct, of_lists
+from verify.simulator.point_numbers import GrowingArray, distinct, of_lists
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
 from verify.xfem.mesh import SimplexMesh, connected

@@ -1,1 +1,0 @@
-"""Semi-progressive cutting: elements are split as a tool crosses them through."""

@@ -1,1 +1,0 @@
-"""Surfaces that move with a cut body."""
