@@ -14,9 +14,13 @@ import pytest
 from numba import njit
 
 from verify.accelerated import FAST
-from verify.accelerated.conjugate_gradient_kernels import invert_blocks
+from verify.accelerated.conjugate_gradient_kernels import (
+    invert_blocks,
+    solve_lower,
+    solve_upper,
+    upper_pattern,
+)
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.symmetric_sweep_kernels import solve_lower, solve_upper, upper_pattern
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic

@@ -5,7 +5,7 @@ import pytest
 from method_bodies import CUTTING, held_at
 
 from verify.methods.catalogue import cut_by
-from verify.methods.spring_force import SpringForce
+from verify.methods.springs import SpringForce
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import isotropic

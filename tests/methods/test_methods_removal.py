@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from verify.methods.catalogue import cut_by
-from verify.methods.refinement import bisect_cells
+from verify.methods.removal import bisect_cells
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.methods.catalogue import cut_by
-from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
+from verify.methods.snapping import snap_nodes, take_near_nodes
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from verify.methods.catalogue import cut_by
-from verify.methods.spring_fit import spring_stiffness
-from verify.methods.spring_force import SpringForce
+from verify.methods.springs import SpringForce, spring_stiffness
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import Material, isotropic

@@ -9,10 +9,9 @@ from cut_bodies import DENSITY, material
 from scipy.sparse.linalg import spsolve
 
 from verify.accelerated import FAST
-from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.cholesky import Cholesky, NearlySymmetric
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.direct_by_size import DirectBySize
-from verify.accelerated.nearly_symmetric import NearlySymmetric
+from verify.accelerated.solver_by_cost import DirectBySize
 from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody

@@ -1,10 +1,9 @@
 """Operations of `verify.xfem` at the speed of the machine, equal to the plain ones to round-off."""
 
+from verify.accelerated.cholesky import NearlySymmetric
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.direct_by_size import DirectBySize
-from verify.accelerated.nearly_symmetric import NearlySymmetric
 from verify.accelerated.one_pass import OnePassTetrahedra
-from verify.accelerated.solver_by_cost import SolverByCost
+from verify.accelerated.solver_by_cost import DirectBySize, SolverByCost
 from verify.xfem.linear_solvers import Kernels
 
 FAST = Kernels(DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)

@@ -4,20 +4,19 @@ A multifrontal method (Duff & Reid 1983), ordered by minimum degree on nodes. Ev
 depends on the sparsity only (order, fronts, where each block goes) is found once per topology;
 `Cholesky.factorize` then runs over values alone. No pivoting: the stiffness of a supported body
 is positive definite, and the error of a Cholesky factorisation does not depend on diagonal
-scaling, so slivers do not hurt it (Higham 2002, section 10.1).
+scaling, so slivers do not hurt it (Higham 2002, section 10.1). `NearlySymmetric` factorises the
+symmetric part and refines, and takes LU where that does not converge.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fronts
-from verify.accelerated.front_plan import plan_fronts, stack_depths
-from verify.xfem.arrays import check_floats
+from verify.accelerated.fronts import plan_fronts, stack_depths
+from verify.xfem.arrays import Floats, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import SingularStiffnessError, XfemError
-from verify.xfem.linear_solvers import LinearSolver, nodal_vector
-
-_Floats = NDArray[np.float64]
+from verify.xfem.linear_solvers import LinearSolver, SparseLU, nodal_vector
 
 
 class Cholesky(LinearSolver):
@@ -79,7 +78,7 @@ class Cholesky(LinearSolver):
         """About the operations of a factorisation."""
         return self._work
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Factorise; see `LinearSolver`."""
         check_floats("blocks", blocks, (self._block_count, self._block, self._block))
         self._is_factorised = False
@@ -99,7 +98,7 @@ class Cholesky(LinearSolver):
             raise SingularStiffnessError(int(self._plan.order[failed // self._block]))
         self._is_factorised = True
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`."""
         if not self._is_factorised:
             raise RuntimeError("solve before factorize")
@@ -116,3 +115,92 @@ class Cholesky(LinearSolver):
         )
         solution[self._plan.order] = self._permuted
         return solution
+
+
+_REFINED = 1e-9  # residual over load: the rounding of a Newton correction, not of a solution
+_REFINEMENTS = 12
+_RESPITE = 16  # factorisations that go straight to LU after one that needed it
+
+
+class NearlySymmetric(LinearSolver):
+    """Cholesky factorisation of the symmetric part, and refinement; LU where that does not do.
+
+    The stiffness of a conserving step is symmetric but for the square of the step; with the mass
+    its symmetric part is positive definite as long as the step resolves the motion.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+
+    Attributes
+    ----------
+    pivoted : int
+        Factorisations so far that needed the LU.
+    """
+
+    def __init__(self, pattern: BlockPattern, block: int) -> None:
+        self._pattern, self._block = pattern, block
+        self._symmetric = Cholesky(pattern, block)
+        self._general = SparseLU(pattern, block)
+        self._blocks: Floats | None = None
+        self._is_general = False
+        self._respite = 0
+        self.pivoted = 0
+
+    def factorize(self, blocks: Floats) -> None:
+        """Factorise; see `LinearSolver`."""
+        check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
+        self._blocks, self._is_general = blocks, False
+        if self._respite > 0:
+            self._respite -= 1
+            self._pivot()
+            return
+        transposed = blocks[self._pattern.mirror].transpose(0, 2, 1)
+        try:
+            self._symmetric.factorize(0.5 * (blocks + transposed))
+        except SingularStiffnessError:
+            self._respite = _RESPITE
+            self._pivot()
+
+    def _pivot(self) -> None:
+        assert self._blocks is not None
+        self._general.factorize(self._blocks)
+        self._is_general = True
+        self.pivoted += 1
+
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
+        """Solve; see `LinearSolver`."""
+        if self._blocks is None:
+            raise RuntimeError("solve before factorize")
+        load = nodal_vector(load, "right-hand side", self._pattern.node_count, self._block)
+        if not self._is_general:
+            solution = self._refine(load)
+            if solution is not None:
+                if x is not None:
+                    x[:] = solution
+                return solution
+            self._respite = _RESPITE
+            self._pivot()
+        return self._general.solve(load, x)
+
+    def _refine(self, load: Floats) -> Floats | None:
+        """Solution by refinement, or nothing where that does not halve the residual each time."""
+        assert self._blocks is not None
+        matrix = self._pattern.matrix(self._blocks)
+        # as displacements: the rows of slivers are many orders smaller than the others
+        diagonal = np.abs(self._blocks[self._pattern.diagonal]).max(axis=(1, 2))[:, None]
+        size = float(np.linalg.norm(load / diagonal))
+        solution = self._symmetric.solve(load)
+        before = np.inf
+        for _ in range(_REFINEMENTS):
+            residual = load - (matrix @ solution.ravel()).reshape(load.shape)
+            norm = float(np.linalg.norm(residual / diagonal))
+            if norm <= _REFINED * size:
+                return solution
+            if not norm < 0.5 * before:
+                return None
+            solution += self._symmetric.solve(residual)
+            before = norm
+        return None

@@ -7,8 +7,11 @@ them either.
 
 import numpy as np
 
-from verify.accelerated.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
-from verify.accelerated.symmetric_sweep_kernels import upper_pattern
+from verify.accelerated.conjugate_gradient_kernels import (
+    conjugate_gradients,
+    invert_blocks,
+    upper_pattern,
+)
 from verify.xfem.arrays import Floats, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError

@@ -10,12 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Ints
 
 
 def minimum_degree(
     starts: NDArray[np.int64], columns: NDArray[np.int64]
-) -> tuple[_Ints, _Ints, _Ints, _Ints]:
+) -> tuple[Ints, Ints, Ints, Ints]:
     """Order nodes for elimination.
 
     Parameters

@@ -7,7 +7,6 @@ follows, row by row: what is below the diagonal, and the diagonal as Σ_j K_ij =
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from verify.accelerated.tetrahedron_batches import (
     BATCH,
@@ -25,14 +24,12 @@ from verify.accelerated.tetrahedron_batches import (
     resist_rotation,
     rotate,
 )
+from verify.xfem.arrays import Bools, Floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
 from verify.xfem.element import deform as deform_cells
 from verify.xfem.energy_momentum import StepEnds, averaged_stress
 from verify.xfem.polar import rotation_matrix
-
-_Floats = NDArray[np.float64]
-_Bools = NDArray[np.bool_]
 
 _WINDOW = 8 * BATCH  # cells among which those of a batch are not neighbours
 _FIRST, _SECOND = np.triu_indices(4, 1)
@@ -86,12 +83,12 @@ class OnePassTetrahedra:
 
     def __call__(
         self,
-        displacement: _Floats,
-        velocity: _Floats,
+        displacement: Floats,
+        velocity: Floats,
         implicit: float,
         scale: float,
-        force: _Floats,
-        blocks: _Floats,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
     ) -> int:
@@ -101,13 +98,13 @@ class OnePassTetrahedra:
 
     def average(
         self,
-        start: _Floats,
-        end: _Floats,
+        start: Floats,
+        end: Floats,
         scale: float,
         rotational: float,
-        substituted: _Bools,
-        force: _Floats,
-        blocks: _Floats,
+        substituted: Bools,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
     ) -> int:
         """Overwrite the averaged force and the tangent at the end; see `OnePass`."""
@@ -124,9 +121,7 @@ class OnePassTetrahedra:
             substituted[self._cells] = irregular
         return left_out
 
-    def _add_substitutes(
-        self, irregular: _Bools, start: _Floats, end: _Floats, force: _Floats
-    ) -> None:
+    def _add_substitutes(self, irregular: Bools, start: Floats, end: Floats, force: Floats) -> None:
         """Add the forces of the few cells without a plain form, as `verify.xfem` does."""
         some = self._elements.part(self._cells[irregular])
         count = len(some.cells)
@@ -141,12 +136,12 @@ class OnePassTetrahedra:
 
     def _run(
         self,
-        moved: tuple[_Floats, _Floats, float],
+        moved: tuple[Floats, Floats, float],
         scale: float,
         rotational: float,
         averaged: bool,
-        force: _Floats,
-        blocks: _Floats,
+        force: Floats,
+        blocks: Floats,
         whole: bool,
     ) -> int:
         self._at[0] = moved[0]
@@ -267,13 +262,13 @@ def _complete(row, starts, diagonal, mirror, whole, d, blocks):
             blocks[middle, k, l] = 0.5 * (d[k, l] + d[l, k])
 
 
-def _by_batch(values: _Floats) -> _Floats:
+def _by_batch(values: Floats) -> Floats:
     """Entries (cells, k) of cells as (batches, k · BATCH), those of a batch beside each other."""
     entries = values.reshape(-1, BATCH, values.shape[1]).transpose(0, 2, 1)
     return np.ascontiguousarray(entries).reshape(len(entries), -1)
 
 
-def _by_cell(entries: _Floats) -> _Floats:
+def _by_cell(entries: Floats) -> Floats:
     """Entries (batches, k · BATCH) as (cells, k)."""
     return (
         entries.reshape(len(entries), -1, BATCH)

@@ -1,8 +1,13 @@
-"""Conjugate gradients or Cholesky factorisation: whichever has less to do for a matrix.
+"""Solvers chosen by what a matrix costs them: counted operations decide, no clock.
 
-How many iterations a motion needs depends on its step, and what a factorisation costs on how thick
-a body is. Iterations are counted and the operations of a factorisation known from its analysis, so
-that no clock decides, and the same motion takes the same way twice.
+`SolverByCost` takes conjugate gradients or Cholesky's factorisation. How many iterations a motion
+needs depends on its step, and what a factorisation costs on how thick a body is. Iterations are
+counted and the operations of a factorisation known from its analysis, so that the same motion takes
+the same way twice.
+
+`DirectBySize` takes SciPy's factorisation for a few solutions with a small matrix, else `Cholesky`.
+SciPy needs milliseconds more for each, but nothing has to be compiled, which takes ten seconds at
+the first use of `Cholesky`.
 """
 
 import numpy as np
@@ -10,16 +15,15 @@ from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError
-from verify.xfem.linear_solvers import LinearSolver
-
-_Floats = NDArray[np.float64]
+from verify.xfem.linear_solvers import LinearSolver, SparseLU
 
 # measured on one core (AVX-512): in ns, per operation and entry of the factor of a
 # factorisation with its solution, and per node and iteration of conjugate gradients
 _OPERATION, _ENTRY, _ITERATION = 0.035, 6.0, 50.0
-_SMALL = 500  # nodes, up to which a factorisation takes less than a millisecond
+_FEW_NODES = 500  # nodes, up to which a factorisation takes less than a millisecond
 _LARGE = 2000  # nodes of a solid, from which it is not even analysed ...
 _MANY = 100  # ... before so many iterations were not enough
 _MOST = 10_000  # iterations where there is no memory for a factor
@@ -56,9 +60,9 @@ class SolverByCost(LinearSolver):
     ) -> None:
         self._pattern, self._block, self._held = pattern, block, held
         self._direct: Cholesky | None = None
-        self._blocks: _Floats | None = None
+        self._blocks: Floats | None = None
         self._iterative = ConjugateGradients(pattern, block, tolerance, _MANY)
-        self.is_iterative = pattern.node_count > _SMALL
+        self.is_iterative = pattern.node_count > _FEW_NODES
         self._is_analysed = not self.is_iterative or not (solid and pattern.node_count >= _LARGE)
         if self._is_analysed:
             self._analyse()
@@ -88,7 +92,7 @@ class SolverByCost(LinearSolver):
         cost = _OPERATION * direct.operations + _ENTRY * direct.factor_entries
         self._iterative.limit = max(1, int(cost / (_ITERATION * self._pattern.node_count)))
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Take the matrix; see `LinearSolver`."""
         self._blocks = blocks
         if self.is_iterative:
@@ -97,7 +101,7 @@ class SolverByCost(LinearSolver):
             assert self._direct is not None
             self._direct.factorize(blocks)
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`. Iterations run out only if there is no room for a factor."""
         x = np.zeros(np.shape(load)) if x is None else x
         while self.is_iterative:
@@ -124,3 +128,43 @@ class SolverByCost(LinearSolver):
         below = np.flatnonzero(pattern.columns < row)
         self._blocks[below] = self._blocks[pattern.mirror[below]].transpose(0, 2, 1)
         self._direct.factorize(self._blocks)
+
+
+# where SuperLU takes about 30 ms more than `Cholesky` (benchmarks/test_xfem_static compares them)
+_FEW_ENTRIES = 110_000  # entries of the matrix: 4000 nodes in the plane, 900 in space
+_FEW = 8  # factorisations, a quarter of a second at most
+
+
+class DirectBySize(LinearSolver):
+    """Solver of K x = b for symmetric positive definite K in nodal blocks.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    held : (N,) bool array, optional
+        As of `Cholesky`.
+    """
+
+    def __init__(
+        self, pattern: BlockPattern, block: int, held: NDArray[np.bool_] | None = None
+    ) -> None:
+        self._problem = pattern, block, held
+        self._count = 0
+        self._solver: LinearSolver
+        if len(pattern.columns) * block**2 <= _FEW_ENTRIES:
+            self._solver = SparseLU(pattern, block, definite=True)
+        else:
+            self._solver = Cholesky(*self._problem)
+
+    def factorize(self, blocks: Floats) -> None:
+        """Factorise; see `LinearSolver`."""
+        self._count += 1
+        if self._count > _FEW and isinstance(self._solver, SparseLU):
+            self._solver = Cholesky(*self._problem)
+        self._solver.factorize(blocks)
+
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
+        """Solve; see `LinearSolver`."""
+        return self._solver.solve(load, x)

@@ -1,17 +1,24 @@
-"""All methods by name."""
+"""All methods by name, and the control that leaves the cuts out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from verify.methods.cut_body import CutBody
+from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.removal import removal, removal_refined
 from verify.methods.snapping import snapping
 from verify.methods.subdivision import snapping_subdivision, subdivision
-from verify.methods.uncut import uncut
 from verify.methods.virtual_nodes import virtual_node, virtual_node_arbitrary
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
+
+
+def uncut(mesh: SimplexMesh, cuts: Sequence[Cut]) -> CutBody:
+    """Leave the cuts out, and say so."""
+    change = Change("cut left out", len(cuts), float("inf") if cuts else 0.0, "m")
+    return make_body(mesh, cut_mesh(mesh, []), (change,))
+
 
 METHODS: Mapping[str, Callable[..., CutBody]] = {
     "subdivision": subdivision,

@@ -1,17 +1,15 @@
 """Result of every method: a body to solve on, one to show, and an account of the cut."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.arrays import Ints
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.phantom import PhantomMesh
+from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.subdivision import Subdivision, subdivide
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -72,12 +70,12 @@ class CutBody:
     phantom: PhantomMesh
     resisting: PhantomMesh
     conforming: Subdivision
-    cell_origin: _Ints
+    cell_origin: Ints
     counts: Counts
     smallest_fraction: float
     changes: tuple[Change, ...]
     seconds: dict[str, float] = field(default_factory=dict)
-    cell_number: _Ints | None = None
+    cell_number: Ints | None = None
 
     def material(self, given: Material) -> Material:
         """Material of the cells of ``phantom.mesh``, from that of the cells as given."""
@@ -97,9 +95,9 @@ def make_body(
     *,
     resisting: PhantomMesh | None = None,
     conforming: Subdivision | None = None,
-    cell_origin: _Ints | None = None,
+    cell_origin: Ints | None = None,
     seconds: dict[str, float] | None = None,
-    cell_number: _Ints | None = None,
+    cell_number: Ints | None = None,
 ) -> CutBody:
     """Make the body of a cut mesh, with its counts.
 
@@ -121,4 +119,27 @@ def make_body(
         changes=tuple(change for change in changes if change.count),
         seconds=seconds or {},
         cell_number=cell_number,
+    )
+
+
+def whole_cells(phantom: PhantomMesh, chosen: NDArray[np.bool_] | None = None) -> PhantomMesh:
+    """Return the chosen pieces (p,), all by default, each with the whole volume of its cell.
+
+    Unknowns keep their numbers, also those that no chosen piece uses.
+    """
+    keep = np.ones(len(phantom.cells), dtype=bool) if chosen is None else chosen
+    corners = phantom.cells.shape[1]
+    return replace(
+        phantom,
+        cells=phantom.cells[keep],
+        parent=phantom.parent[keep],
+        fraction=np.ones(int(keep.sum())),
+        label=phantom.label[keep],
+        sub_cells=SubCells(
+            piece=np.zeros(0, dtype=np.int64),
+            points=np.zeros((0, corners), dtype=np.int64),
+            barycentric=np.zeros((0, corners, corners)),
+            fraction=np.zeros(0),
+            zero_points=phantom.sub_cells.zero_points,
+        ),
     )

@@ -5,21 +5,72 @@ Virtual nodes and removal cut again what a cut has opened. A mesh that is prepar
 """
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.methods.opened_mesh import OpenedMesh
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
+from verify.xfem.subdivision import Subdivision
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+
+class OpenedMesh(SimplexMesh):
+    """A mesh with a cut in it, of which only the outer boundary counts as boundary.
+
+    Supports and loads on the boundary of the body must not act on the faces of the cut.
+
+    Parameters
+    ----------
+    points, cells
+        As of `SimplexMesh`.
+    outer : (b, 2) array_like of int
+        Pairs (cell, local node opposite to the facet) of the outer boundary.
+    """
+
+    def __init__(self, points: ArrayLike, cells: ArrayLike, outer: ArrayLike) -> None:
+        super().__init__(points, cells)
+        object.__setattr__(self, "_outer", np.asarray(outer, dtype=np.int64).reshape(-1, 2))
+
+    @cached_property
+    def boundary_facets(self) -> Ints:
+        """(b, 2) pairs (cell, local node opposite) of the outer boundary."""
+        outer: Ints = self.__dict__["_outer"]
+        return outer
+
+
+def facets_without_twin(points: NDArray[np.float64], cells: Ints) -> Ints:
+    """(b, 2) facets of one cell only that are not the face of a cut: nothing is at their place."""
+    mesh = SimplexMesh(points, cells)
+    facets = np.argwhere(mesh.neighbours < 0)
+    _, place = np.unique(points, axis=0, return_inverse=True)
+    on_facet = np.arange(mesh.dim + 1) != facets[:, 1:]
+    corners = place.ravel()[cells[facets[:, 0]]][on_facet].reshape(len(facets), mesh.dim)
+    _, which, count = np.unique(
+        np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return facets[count[which.ravel()] == 1]
+
+
+def conforming_to(
+    mesh: SimplexMesh, cell_parent: Ints, cut_facets: NDArray[np.float64]
+) -> Subdivision:
+    """Return a mesh that is its own conforming sub-division: every node an unknown."""
+    return Subdivision(
+        points=mesh.points,
+        cells=mesh.cells,
+        cell_piece=np.arange(len(mesh.cells)),
+        cell_parent=cell_parent,
+        interpolation=csr_array(eye_array(len(mesh.points))),
+        cut_facets=cut_facets,
+    )
+
 
 # of a mesh with all cuts: cells (m, cuts) that each cut has opened
 OpenedCells = Callable[[PhantomMesh], NDArray[np.bool_]]
@@ -44,9 +95,9 @@ class Seams(NamedTuple):
         Their corners, in metres.
     """
 
-    one: _Ints
-    other: _Ints
-    points: _Floats
+    one: Ints
+    other: Ints
+    points: Floats
 
 
 def seams_of(phantom: PhantomMesh) -> Seams:

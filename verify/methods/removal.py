@@ -4,6 +4,12 @@ Cotin, Delingette & Ayache, *A hybrid elastic model for real-time cutting, defor
 force feedback for surgery training and simulation*, The Visual Computer 16 (2000); with local
 refinement first: Forest, Delingette & Ayache, *Removing tetrahedra from manifold
 tetrahedralisation: application to real-time surgical simulation*, Medical Image Analysis 9 (2005).
+
+The refinement bisects longest edges and leaves no hanging nodes (Rivara, *Algorithms for refining
+triangular grids suitable for adaptive and multigrid techniques*, IJNME 20 (1984)): where an edge is
+bisected, the longest edge of every cell at it is, too. All edges of the mesh have one order
+(length, then node numbers); each cell is bisected at its marked edges in that order, so that two
+cells divide their common face in the same way.
 """
 
 from collections.abc import Sequence
@@ -14,11 +20,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.methods.cut_body import Change, CutBody, make_body
-from verify.methods.opened_mesh import OpenedMesh, conforming_to
-from verify.methods.opening import OpenedCells, cut_so_far
-from verify.methods.refinement import bisect_cells
-from verify.methods.whole_cells import whole_cells
+from verify.methods.cut_body import Change, CutBody, make_body, whole_cells
+from verify.methods.opening import OpenedCells, OpenedMesh, conforming_to, cut_so_far
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.contacts import face_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
@@ -26,9 +30,72 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
+
+def bisect_cells(mesh: SimplexMesh, marked: NDArray[np.bool_]) -> tuple[SimplexMesh, Ints]:
+    """Bisect the marked cells at their longest edges, and what must follow.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    marked : (m,) bool array
+
+    Returns
+    -------
+    mesh : SimplexMesh
+        The nodes of the given mesh first.
+    origin : (k,) int array
+        Cell of the given mesh in which each cell lies.
+    """
+    first, second = np.triu_indices(mesh.dim + 1, 1)
+    keys = _keys(mesh.cells, first, second)
+    edges, edge_of = np.unique(keys, return_inverse=True)
+    edge_of = edge_of.reshape(keys.shape)
+    ends = np.stack([edges >> 32, edges & 0xFFFFFFFF], axis=1)
+    length = np.linalg.norm(mesh.points[ends[:, 0]] - mesh.points[ends[:, 1]], axis=1)
+    rank = np.empty(len(edges), dtype=np.int64)
+    # lengths that differ by round-off are equal
+    rank[np.lexsort([edges, np.round(length / length.max(), 9)])] = np.arange(len(edges))
+    longest = edge_of[np.arange(len(edge_of)), rank[edge_of].argmax(axis=1)]
+
+    bisected = np.zeros(len(edges), dtype=bool)
+    bisected[longest[marked]] = True
+    while True:
+        count = bisected.sum()
+        bisected[longest[bisected[edge_of].any(axis=1)]] = True
+        if bisected.sum() == count:
+            break
+
+    chosen = np.flatnonzero(bisected)
+    middle = np.full(len(edges), -1)
+    middle[chosen] = len(mesh.points) + np.arange(len(chosen))
+    cells, origin = mesh.cells, np.arange(len(mesh.cells))
+    while True:
+        found = _keys(cells, first, second)
+        at = np.minimum(np.searchsorted(edges, found), len(edges) - 1)
+        order = np.where((edges[at] == found) & bisected[at], rank[at], -1)
+        local = order.argmax(axis=1)
+        row = np.flatnonzero(order.max(axis=1) >= 0)
+        if len(row) == 0:
+            break
+        local, edge = local[row], at[row, local[row]]
+        halves = [cells[row], cells[row].copy()]
+        halves[0] = halves[0].copy()
+        for half, end in zip(halves, (first, second), strict=True):
+            half[np.arange(len(row)), end[local]] = middle[edge]
+        rest = np.ones(len(cells), dtype=bool)
+        rest[row] = False
+        cells = np.concatenate([cells[rest], *halves])
+        origin = np.concatenate([origin[rest], origin[row], origin[row]])
+    points = np.concatenate([mesh.points, 0.5 * mesh.points[ends[chosen]].sum(axis=1)])
+    return SimplexMesh(points, cells), origin
+
+
+def _keys(cells: Ints, first: NDArray, second: NDArray) -> Ints:
+    """(q, e) each edge of the cells as one number."""
+    low = np.minimum(cells[:, first], cells[:, second])
+    high = np.maximum(cells[:, first], cells[:, second])
+    return low << 32 | high
+
 
 # A cell of which the cut takes off less than this share is not touched: the cut runs along a face.
 _TOUCHED = 1e-9
@@ -114,7 +181,7 @@ def removal_refined(
 def _remove(
     given: SimplexMesh,
     cut: PhantomMesh,
-    origin: _Ints,
+    origin: Ints,
     start: float,
     changes: list[Change],
 ) -> CutBody:
@@ -158,20 +225,20 @@ def _remove(
     )
 
 
-def _touched(cut: PhantomMesh) -> _Bools:
+def _touched(cut: PhantomMesh) -> Bools:
     """(m,) cells of which no piece has all the volume."""
     largest = np.zeros(len(cut.mesh.cells))
     np.maximum.at(largest, cut.parent, cut.fraction)
     return largest < 1.0 - _TOUCHED
 
 
-def _longest_edges(mesh: SimplexMesh) -> _Floats:
+def _longest_edges(mesh: SimplexMesh) -> Floats:
     first, second = np.triu_indices(mesh.dim + 1, 1)
     ends = mesh.points[mesh.cells]
     return np.linalg.norm(ends[:, first] - ends[:, second], axis=2).max(axis=1)
 
 
-def _debris(phantom: PhantomMesh, bodies: _Ints, touched: _Bools) -> _Bools:
+def _debris(phantom: PhantomMesh, bodies: Ints, touched: Bools) -> Bools:
     """(p,) cells that only the removed ones joined to their body and that all lie at the gap."""
     first, second = face_contacts(phantom)
     count = len(phantom.cells)
@@ -190,7 +257,7 @@ def _debris(phantom: PhantomMesh, bodies: _Ints, touched: _Bools) -> _Bools:
     return loose[part]
 
 
-def _without_hinges(phantom: PhantomMesh) -> tuple[_Ints, _Ints]:
+def _without_hinges(phantom: PhantomMesh) -> tuple[Ints, Ints]:
     """Cells (p, d + 1) joined across faces only, and the mesh node of each of their nodes."""
     corners = phantom.cells.shape[1]
     first, second = face_contacts(phantom)

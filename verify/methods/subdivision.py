@@ -15,9 +15,8 @@ from time import perf_counter
 import numpy as np
 
 from verify.methods.cut_body import Change, CutBody, make_body
-from verify.methods.nodal_cut import NodalCut
-from verify.methods.opened_mesh import OpenedMesh, conforming_to, facets_without_twin
-from verify.methods.snapped_mesh import SnappedMesh, snap_nodes, take_near_nodes
+from verify.methods.opening import OpenedMesh, conforming_to, facets_without_twin
+from verify.methods.snapping import NodalCut, SnappedMesh, snap_nodes, take_near_nodes
 from verify.methods.tip_nodes import add_tip_points
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut

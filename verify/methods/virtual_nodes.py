@@ -17,9 +17,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.methods.cut_body import Change, CutBody, make_body
+from verify.methods.cut_body import Change, CutBody, make_body, whole_cells
 from verify.methods.opening import OpenedCells, cut_so_far
-from verify.methods.whole_cells import whole_cells
 from verify.xfem.contacts import absorb, sibling_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut

@@ -10,7 +10,7 @@ from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody
-from verify.methods.spring_force import SpringForce
+from verify.methods.springs import SpringForce
 from verify.scene import Scene
 from verify.scene.messages import nearest
 from verify.solution import Regularisation, Solution
@@ -226,7 +226,7 @@ class MassSpringSolver(MethodSolver):
     cut : str
         The method that cuts; snapping by default.
     fit : {"fitted", "van_gelder"}
-        See `verify.methods.spring_fit`.
+        See `verify.methods.springs`.
     """
 
     choices: Mapping[str, Collection[str]] = {

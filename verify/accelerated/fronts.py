@@ -1,0 +1,234 @@
+"""Fronts of a multifrontal factorisation, planned before it sees a value: tree, rows, places.
+
+Small fronts are merged into their parents, and the tree is put in postorder.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.accelerated.minimum_degree import minimum_degree
+from verify.xfem.arrays import Ints
+
+# Merge while the merged front has at most that many columns, or that share of added zeros:
+# dense loops are faster per entry than short ones (measured).
+_NARROW = 8
+_ZEROS = 0.1
+
+
+def merge_and_order(
+    order: Ints, bounds: Ints, parent: Ints, below: Ints
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """Merge fronts, and reorder so that the subtree of each comes directly before it.
+
+    Parameters
+    ----------
+    order, bounds : int arrays
+        Elimination order and its fronts.
+    parent : (S,) int array
+        Parent of each front, a later one, or -1.
+    below : (S,) int array
+        Rows of each front below its columns.
+
+    Returns
+    -------
+    order, bounds : int arrays
+        The same for the merged fronts; update matrices can then wait on a stack.
+    tops : (F,) int array
+        The front into which those of a merged one went: its rows are those of this one.
+    level : (F,) int array
+        0 at a root.
+    """
+    count, width = len(parent), np.diff(bounds)
+    position, group, tops, level, ends = np.zeros((5, count + 1), dtype=np.int64)
+    fronts = _merge(width.copy(), parent, below, group, np.zeros(count, dtype=np.int64))
+    linked, stack = np.full((4, count + 1), -1), np.full(count + 1, count)
+    _postorder(width, parent, group, linked, stack, position, tops, level, ends)
+    new = np.empty_like(order)
+    columns = np.arange(len(order)) - np.repeat(bounds[:-1], width)
+    new[np.repeat(position[:count], width) + columns] = order
+    return new, ends[: fronts + 1], tops[:fronts], level[:fronts]
+
+
+@njit(cache=True)
+def _merge(columns, parent, below, group, zeros):
+    """Write the front into which each goes in the end (itself if it stays); how many stay."""
+    count = len(parent)
+    for front in range(count):
+        group[front] = front
+    left = count
+    for front in range(count):
+        above = parent[front]
+        if above < 0:
+            continue
+        height = columns[above] + below[above]
+        added = columns[front] * (height - below[front]) + zeros[front] + zeros[above]
+        merged = columns[front] + columns[above]
+        stored = merged * (merged + 1) // 2 + merged * below[above]
+        if merged <= _NARROW or added <= _ZEROS * stored:
+            group[front] = above
+            columns[above] = merged
+            zeros[above] = added
+            left -= 1
+    for front in range(count - 1, -1, -1):
+        group[front] = group[group[front]]
+    return left
+
+
+@njit(cache=True)
+def _postorder(width, parent, group, linked, stack, position, tops, level, ends):
+    """Write the first place of each front's columns, and of merged fronts what is returned."""
+    # children of merged fronts, last: roots; and fronts merged into one, ascending
+    head, following, member, next_member = linked[0], linked[1], linked[2], linked[3]
+    count = len(parent)
+    for front in range(count - 1, -1, -1):
+        next_member[front] = member[group[front]]
+        member[group[front]] = front
+        if group[front] == front:
+            above = group[parent[front]] if parent[front] >= 0 else count
+            following[front] = head[above]
+            head[above] = front
+    depth, used, fronts = 1, 0, 0
+    while depth > 0:
+        front = stack[depth - 1]
+        child = head[front]
+        if child >= 0:
+            head[front] = following[child]
+            stack[depth] = child
+            depth += 1
+            continue
+        depth -= 1
+        if front == count:
+            break
+        part = member[front]
+        while part >= 0:
+            position[part] = used
+            used += width[part]
+            part = next_member[part]
+        tops[fronts], level[fronts] = front, depth - 1
+        fronts += 1
+        ends[fronts] = used
+
+
+class FrontPlan(NamedTuple):
+    """Fronts in postorder, as kernels take them.
+
+    Attributes
+    ----------
+    order : (N,) int array
+        Nodes in the order of elimination.
+    bounds : (F + 1,) int array
+        Columns of front s are places bounds[s] to bounds[s + 1] in the order.
+    row_start : (F + 1,) int array
+        Rows of front s are entries row_start[s] to row_start[s + 1] of `rows`.
+    rows : (R,) int array
+        Places in the order, ascending, after the columns of the front.
+    relative : (R,) int array
+        Place of each row among the columns and rows of the parent front.
+    parent, level : (F,) int arrays
+        Parent front, -1 at a root, and how many are above.
+    entry_start : (N + 1,) int array
+        Matrix blocks of each column (in the order).
+    entry_block, entry_row : (E,) int arrays
+        Which block, transposed, adds to which local row of the column's front.
+    """
+
+    order: Ints
+    bounds: Ints
+    row_start: Ints
+    rows: Ints
+    relative: Ints
+    parent: Ints
+    level: Ints
+    entry_start: Ints
+    entry_block: Ints
+    entry_row: Ints
+
+
+def plan_fronts(
+    starts: NDArray[np.int32], columns: NDArray[np.int32], held: NDArray[np.bool_]
+) -> FrontPlan:
+    """Find order, fronts and places for a sparsity.
+
+    Parameters
+    ----------
+    starts, columns : int arrays
+        Symmetric, as compressed rows.
+    held : (N,) bool array
+        Nodes that are coupled to no other.
+    """
+    nodes = len(held)
+    node = np.repeat(np.arange(nodes), np.diff(starts))
+    blocks = np.flatnonzero((columns == node) | ~(held[node] | held[columns]))
+    begins, coupled = np.searchsorted(blocks, starts), columns[blocks].astype(np.int64)
+    order, bounds, row_start, rows = minimum_degree(begins, coupled)
+    parent = _parents(bounds, row_start, _inverse(order)[rows])
+    below = np.diff(row_start)
+    order, bounds, tops, level = merge_and_order(order, bounds, parent, below)
+    rank, below = _inverse(order), below[tops]
+    # rows of a front, ascending: sorted by front and place at once
+    front = np.repeat(np.arange(len(tops)), below)
+    keys = np.sort(nodes * front + rank[rows[_ranges(row_start[tops], below)]])
+    row_start, rows = _starts(below), keys - nodes * front
+    parent = _parents(bounds, row_start, rows)
+
+    def places(front: Ints, row: Ints) -> Ints:
+        """Places of rows among the columns and rows of fronts."""
+        found = row - bounds[front]
+        outside = np.flatnonzero(row >= bounds[front + 1])
+        front = front[outside]
+        at = np.searchsorted(keys, nodes * front + row[outside])
+        found[outside] = (bounds[front + 1] - bounds[front]) + at - row_start[front]
+        return found
+
+    count = np.diff(begins)[order]
+    at = _ranges(begins[order], count)
+    column, row = np.repeat(np.arange(nodes), count), rank[coupled[at]]
+    lower = row >= column
+    at, column, row = at[lower], column[lower], row[lower]
+    return FrontPlan(
+        order, bounds, row_start, rows, places(parent[front], rows), parent, level,
+        np.searchsorted(column, np.arange(nodes + 1)), blocks[at],
+        places(np.searchsorted(bounds, column, "right") - 1, row),
+    )  # fmt: skip
+
+
+def stack_depths(parent: Ints, level: Ints, entries: Ints) -> tuple[int, int]:
+    """Depths of two stacks of update matrices, of fronts of even levels and of odd ones.
+
+    A front writes its update matrix (of that many entries) on one while those of its children,
+    which it then takes, are last on the other.
+    """
+    freed = np.bincount(parent[parent >= 0], entries[parent >= 0], len(parent)).astype(np.int64)
+    even, odd = (
+        np.where(level & 1 == mine, entries, 0) - np.where(level & 1 == mine, 0, freed)
+        for mine in (0, 1)
+    )
+    return int(np.cumsum(even).max(initial=0)), int(np.cumsum(odd).max(initial=0))
+
+
+def _inverse(order: Ints) -> Ints:
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank
+
+
+def _starts(counts: Ints) -> Ints:
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def _ranges(first: Ints, counts: Ints) -> Ints:
+    """Ranges of that many numbers from the first ones on, one after the other."""
+    return np.arange(counts.sum()) + np.repeat(first - _starts(counts)[:-1], counts)
+
+
+def _parents(bounds: Ints, row_start: Ints, rows: Ints) -> Ints:
+    """Front (S,) in whose columns the first row of each is; -1 without rows."""
+    parent = np.full(len(bounds) - 1, -1)
+    some = np.flatnonzero(np.diff(row_start))
+    if len(some):
+        first = np.minimum.reduceat(rows, row_start[some])
+        parent[some] = np.searchsorted(bounds, first, "right") - 1
+    return parent
