@@ -9,7 +9,7 @@ from reference.linear_solvers import rigid_motions
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.held_facets import held_facets, held_nodes, shifted_ends
+from verify.scene.parts import held_facets, held_nodes, shifted_ends
 from verify.solution import Regularisation
 
 _HELD = 1e-9  # lever of the supports over the size of the piece, below which it may turn

@@ -17,8 +17,7 @@ from reference.space import ConformingSpace
 from reference.ties import TiedSolver
 from reference.unknowns import TiedUnknowns
 from verify.scene import Gravity, Scene
-from verify.scene.history import factor_at, first_factor
-from verify.scene.physics import PrescribedMotion
+from verify.scene.physics import PrescribedMotion, factor_at, first_factor
 
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-14  # of the accelerations

@@ -17,7 +17,7 @@ from reference.exact.solution import ExactSolution
 from reference.exact.straight_cracks import CrackTip, Griffith, StraightFrontField
 from verify.errors import InputError
 from verify.scene import Material, Scene
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 
 _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] = {
     "linear": (Linear, "uniform strain, uncut: matrix, shift"),

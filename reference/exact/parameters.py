@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 
 _SHAPES = {
     (): "a number",

@@ -6,7 +6,7 @@ import pytest
 import scenes
 from pydantic import ValidationError
 
-from verify.scene.rules import RULES
+from verify.scene.scene import RULES
 from verify.scene.strict import Strict
 
 PATH2 = {"kind": "tool_path", "points": [[0.0, 0.5], [0.5, 0.5]], "speed": 1.0}

@@ -10,7 +10,7 @@ from verify.errors import InputError
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.scene import Rotation, Support, ToolPathCut, load_scene
-from verify.scene.history import factor_at, first_factor, jumps, slope_at
+from verify.scene.physics import factor_at, first_factor, jumps, slope_at
 
 MOVING = (
     body_text("A square", "It shall move.", [1.0, 1.0], [[4, 4]], density="1.0")

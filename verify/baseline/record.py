@@ -7,8 +7,7 @@ from pydantic import Field, ValidationError
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.scene.messages import first_fault
-from verify.scene.strict import Finite, NonNegative, Positive, Strict
+from verify.scene.strict import Finite, NonNegative, Positive, Strict, first_fault
 
 
 class _From(Strict):

@@ -9,7 +9,7 @@ from verify.baseline.measured import finest, metric_of, speed_entry, speed_of
 from verify.baseline.record import Baseline, CaseBaseline, Own, Quantity, Speed
 from verify.errors import InputError
 from verify.result import CaseResult, Verdict
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 
 SPEED = "speed"
 

@@ -15,8 +15,8 @@ from verify.compare.simplex_rule import simplex_rule
 from verify.compare.simplices import facet_nodes
 from verify.compare.splitting import measures
 from verify.scene import BodyForce, Scene, Traction
-from verify.scene.history import factor_at
 from verify.scene.parts import Pieces, pieces_on_part
+from verify.scene.physics import factor_at
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from verify.compare.load_work import boundary_nodes_of_facets
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.held_facets import held_nodes
-from verify.scene.history import factor_at, jumps
-from verify.scene.physics import PrescribedMotion
+from verify.scene.parts import held_nodes
+from verify.scene.physics import PrescribedMotion, factor_at, jumps
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

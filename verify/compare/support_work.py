@@ -37,7 +37,7 @@ from verify.compare.prescribed_motion import PrescribedNodes, prescribed_nodes
 from verify.compare.strain_energy import stress_power, viscous_power
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
-from verify.scene.history import factor_at
+from verify.scene.physics import factor_at
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

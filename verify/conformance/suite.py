@@ -10,7 +10,7 @@ from verify.conformance.check import CheckResult, State, evaluate
 from verify.conformance.checks import checks
 from verify.conformance.trials import Outcome, Trial, solve_trials
 from verify.errors import InputError
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 from verify.solvers.named import parameters_in
 
 

@@ -20,8 +20,7 @@ from verify.scene import (
     Support,
     Traction,
 )
-from verify.scene.held_facets import HeldFacets
-from verify.scene.parts import Pieces, pieces_on_part
+from verify.scene.parts import HeldFacets, Pieces, pieces_on_part
 from verify.scene.physics import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary

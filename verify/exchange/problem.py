@@ -66,7 +66,7 @@ class Load:
     corners : (k, corners, d) array, optional
         Of what is loaded, m; None if that is all of each facet or cell.
     history : list of (time, factor), optional
-        By what the load is multiplied in time; see `verify.scene.history`.
+        By what the load is multiplied in time; see `verify.scene.physics`.
     """
 
     simplices: NDArray[np.int64]

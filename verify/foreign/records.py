@@ -17,7 +17,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from verify.errors import InputError
 from verify.printable import shown
 from verify.scene import Scene
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 
 PROGRAMS = Path(__file__).resolve().parent / "programs"
 _STRICT = ConfigDict(extra="forbid")

@@ -7,7 +7,7 @@ from math import log
 
 from verify.records import Regularisation
 from verify.result import Rate, SolveRecord
-from verify.scene.held_facets import END_OF_SUPPORT
+from verify.scene.parts import END_OF_SUPPORT
 
 # Relative errors below this are round-off of a direct solver on 1e5 unknowns.
 ROUND_OFF = 1e-11

@@ -22,7 +22,7 @@ from verify.scene import (
     is_uniform,
 )  # fmt: skip
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.history import factor_at, jumps
+from verify.scene.physics import factor_at, jumps
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

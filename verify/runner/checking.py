@@ -6,8 +6,8 @@ from verify.errors import InputError
 from verify.runner.mesh_faults import check_overlaps
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.messages import nearest
 from verify.scene.placement import empty_region, part_without_mesh
+from verify.scene.strict import nearest
 from verify.solvers import solver_names
 from verify.solvers.named import parameters_in, solver_in
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.runner import exact_samples as samples
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
-from verify.scene.history import factor_at
 from verify.scene.initial import AtRest, InitialField, Moving
 from verify.scene.parts import on_part
-from verify.scene.physics import PrescribedMotion
+from verify.scene.physics import PrescribedMotion, factor_at
 from verify.solvers.loads_of_scene import ForceDensity
 from verify.xfem.mesh import SimplexMesh
 

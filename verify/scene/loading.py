@@ -19,8 +19,8 @@ from verify.printable import one_line, words_of
 from verify.scene.acceptance import RatioCheck
 from verify.scene.family import Row, expand_rows, row_asked, rows_schema
 from verify.scene.geometry import MeshFile
-from verify.scene.messages import first_fault, nearest
 from verify.scene.scene import Scene
+from verify.scene.strict import first_fault, nearest
 from verify.whole_files import read_bounded
 
 _LARGEST = 2**23  # bytes; the longest case that comes with the project has 6 kB

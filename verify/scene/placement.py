@@ -16,8 +16,7 @@ from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, 
 from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
 from verify.scene.cuts import ArcCut
 from verify.scene.geometry import Box, Polygon, Rectangle
-from verify.scene.held_facets import held_facets
-from verify.scene.parts import on_part, pieces_on_part
+from verify.scene.parts import held_facets, on_part, pieces_on_part
 from verify.scene.physics import Traction
 from verify.scene.tables import SceneTables
 

@@ -1,12 +1,18 @@
-"""The base of all scene models: strict, frozen, unknown keys are errors; and the form of a rule.
+"""The base of all scene models, the form of a rule, and messages about a case file in one line.
 
-A rule is a row of a table: the key that it is about, what breaks it, and the text of the message.
+Models are strict and frozen; unknown keys are errors. A rule is a row of a table: the key that it
+is about, what breaks it, and the text of the message. A message names the key, the fault and the
+nearest valid word there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from verify.errors import instead
+from verify.printable import shown
 
 # `strict`: a number is a number; "1e4" and true are not
 # and none is so large, or so small above zero, that its powers are not
@@ -91,3 +97,147 @@ class Strict(BaseModel):
         if fault := first_broken(self.rules, self):
             raise ValueError(fault)
         return self
+
+
+# ------------------------------------------------------------------------------ messages
+_FEW, _SHOWN = 30, 3
+# what pydantic expected, by the type of its error
+_WANTED = {
+    "float_type": "a finite number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "a text in quotes",
+    "string_too_short": "one line of text",
+    "string_pattern_mismatch": "one line of text",
+    "string_too_long": "at most {max_length} characters",
+    "dict_type": "a table of keys",
+    "model_type": "a table of keys",
+    "model_attributes_type": "a table of keys",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "greater_than": "a number > {gt:g}",
+    "greater_than_equal": "a number ≥ {ge:g}",
+    "less_than": "a number < {lt:g}",
+    "less_than_equal": "a number ≤ {le:g}",
+    "literal_error": "{expected}",
+}
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """Give a phrase to put behind "no such …": the nearest of `words`, or all if they are few."""
+    known = sorted(words)
+    close = get_close_matches(word, known, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean '{close[0]}'?"
+    if len(known) > _FEW:
+        return f"; expected one of {len(known)}, such as {', '.join(known[:_SHOWN])}"
+    return f"; expected one of {', '.join(known)}" if known else ""
+
+
+def first_fault(error: ValidationError, content: dict[str, Any], schema: dict[str, Any]) -> str:
+    """Say the most telling of pydantic's errors in one line.
+
+    Parameters
+    ----------
+    error : ValidationError
+    content : dict
+        What was validated, as read from the file.
+    schema : dict
+        JSON Schema of it, for the valid keys.
+    """
+    faults = error.errors()
+    # a misspelt key is usually also a missing one: the misspelling is what to mend
+    found = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
+    key = _key(found, content)
+    same = [fault for fault in faults if _key(fault, content) == key]
+    others = len({_key(fault, content) for fault in faults} - {key})
+    more = f" (and {others} more)" if others else ""
+    return f"{_sentence(found, same, key, schema)}{more}"
+
+
+def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> str:
+    match found["type"]:
+        case "extra_forbidden":
+            if said := instead(key):
+                return said
+            valid = _valid_keys(found["loc"][:-1], schema)
+            return f"{key}: unknown key{nearest(str(found['loc'][-1]), valid)}"
+        case "missing":
+            return f"{key}: missing"
+        case "union_tag_not_found":
+            tag = found["ctx"]["discriminator"].strip("'")
+            return f"{key}.{tag}: missing{_tags(found, schema)}"
+        case "union_tag_invalid":
+            tag = found["ctx"]["discriminator"].strip("'")
+            return f"{key}.{tag}: no '{found['ctx']['tag']}'{_tags(found, schema)}"
+        case "value_error":
+            message = found["msg"].removeprefix("Value error, ")
+            return f"{key}: {message}" if key else message
+    wanted = " or ".join(dict.fromkeys(_wanted(fault) for fault in same))
+    return f"{key}: expected {wanted}, got {shown(found['input'])}"
+
+
+def _tags(found: Any, schema: dict[str, Any]) -> str:
+    """Name the valid tags of a union, or the nearest one."""
+    given = str(found["ctx"].get("tag", ""))
+    if "expected_tags" in found["ctx"]:
+        tags = [tag.strip(" '") for tag in found["ctx"]["expected_tags"].split(",")]
+    else:
+        node = _node(found["loc"], schema)
+        tags = list(node.get("discriminator", {}).get("mapping", {}))
+    return nearest(given, tags)
+
+
+def _wanted(fault: Any) -> str:
+    """Say what pydantic expected in words of a case file (it speaks of tuples)."""
+    if fault["type"] in ("list_type", "tuple_type"):
+        table = isinstance(fault["input"], dict)
+        return "a list of tables ([[…]], not […])" if table else "a list in brackets"
+    text = _WANTED.get(fault["type"])
+    if text is None:
+        return str(fault["msg"]).removeprefix("Input should be ")
+    return text.format(**fault.get("ctx", {}))
+
+
+def _key(fault: Any, content: Any) -> str:
+    """``cuts[0].points`` from pydantic's location, without the tags of its unions."""
+    location = fault["loc"]
+    text, inner = "", content
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+            inner = inner[part] if isinstance(inner, list) and part < len(inner) else None
+        elif isinstance(inner, dict) and part in inner:
+            text += f".{part}"
+            inner = inner[part]
+        elif part == location[-1] and fault["type"] == "missing":
+            text += f".{part}"
+    return text.lstrip(".")
+
+
+def _valid_keys(location: Iterable[int | str], schema: dict[str, Any]) -> list[str]:
+    """Keys that the schema allows at `location`."""
+    return list(_node(location, schema).get("properties", {}))
+
+
+def _node(location: Iterable[int | str], schema: dict[str, Any]) -> dict[str, Any]:
+    """Find the part of the schema that describes `location`."""
+    node = schema
+    for part in location:
+        node = _resolved(node, schema)
+        if "discriminator" in node and part in node["discriminator"]["mapping"]:
+            node = {"$ref": node["discriminator"]["mapping"][part]}
+        elif isinstance(part, int):
+            node = node.get("items", {})
+        else:
+            node = node.get("properties", {}).get(part, node)
+    return _resolved(node, schema)
+
+
+def _resolved(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+    if "anyOf" in node:
+        node = next((n for n in node["anyOf"] if n.get("type") != "null"), node)
+    if "$ref" in node:
+        node = schema["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+    return node

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.held_facets import HeldFacets, held_nodes
-from verify.scene.parts import Pieces, pieces_on_part
+from verify.scene.parts import HeldFacets, Pieces, held_nodes, pieces_on_part
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ import numpy as np
 from verify.errors import InputError, instead
 from verify.printable import one_line, shown, words_of
 from verify.scene import Scene
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 from verify.solution import Solution
 from verify.solvers.named import solver_in
 

@@ -12,7 +12,7 @@ from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody
 from verify.methods.springs import SpringForce
 from verify.scene import Scene
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import (
     background_mesh,

@@ -13,8 +13,8 @@ from scipy.sparse import csr_array
 from verify.errors import InputError, UnsupportedSceneError
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
-from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open
+from verify.scene.physics import factor_at, first_factor
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.loads_of_scene import forces_of, is_moving

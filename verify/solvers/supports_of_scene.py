@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Scene
-from verify.scene.held_facets import HeldFacets, held_facets, no_node, points_apart, shifted_ends
-from verify.scene.history import factor_at, first_factor
-from verify.scene.physics import PrescribedMotion
+from verify.scene.parts import HeldFacets, held_facets, no_node, points_apart, shifted_ends
+from verify.scene.physics import PrescribedMotion, factor_at, first_factor
 from verify.solution import Regularisation
 from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.body import MovingSupports

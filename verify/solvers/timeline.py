@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Scene, ToolPathCut
-from verify.scene.history import jumps
+from verify.scene.physics import jumps
 
 Array = NDArray[np.float64]
 
