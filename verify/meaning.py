@@ -51,6 +51,11 @@ def _reference_in_linear_motion(scene: Scene, solve: SolveRecord) -> bool:
     return solve.solver == "reference" and _linear_motion(scene, solve)
 
 
+def _opens_swept(scene: Scene, solve: SolveRecord) -> bool:
+    blade = any(cut.get("kind") == "tool_path" for cut in scene.get("cuts") or [])
+    return blade and (scene.get("analysis") or {}).get("opening", "swept") == "swept"
+
+
 def _not_continued(scene: Scene, solve: SolveRecord) -> bool:
     return solve.cut is not None and not solve.cut.continued
 
@@ -98,6 +103,13 @@ CHANGES = (
         "loads and supports act on the part of the boundary that the formula names; they acted on "
         "whole facets or nodes of it",
         _has_a_region,
+    ),
+    Change(
+        3,
+        ("*",),
+        "what a blade opens is held by forces that fade as it is swept, of the reference and of "
+        "own solvers; it was let go at once when it was passed",
+        _opens_swept,
     ),
 )  # fmt: skip
 REVISION = max(change.revision for change in CHANGES)

@@ -114,7 +114,7 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
     scene = strip(angle=angle)
-    found = find_solver(solver).solve(scene, 0, 0, scheme=scheme)
+    found = find_solver(solver).solve(scene, 0, 0, scheme=scheme, opening="late")
     law = law_of(scene)
     exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
     account = motion_account(scene, found, law)
@@ -134,9 +134,6 @@ def test_what_the_forces_at_a_cut_take_is_told_from_the_scheme():
     The scheme takes nothing, up to what gravity-free energies are known to; the sum is G as above.
     """
     scene = strip(angle=17.0)
-    scene = scene.model_copy(update={
-        "analysis": scene.analysis.model_copy(update={"opening": "swept"})
-    })  # fmt: skip
     found = find_solver("xfem").solve(scene, 0, 0, scheme="newmark", mass="consistent")
     law = law_of(scene)
     exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)

@@ -382,7 +382,7 @@ BROKEN_ALONE = [
     ({"analysis": {"duration": 1.0}},
      "duration, time_step and outputs belong to a dynamic analysis"),
     ({"analysis": {"damping": [1.0, 0.0]}}, "damping belongs to a dynamic analysis"),
-    ({"analysis": {"opening": "swept"}}, "opening: it belongs to a dynamic analysis"),
+    ({"analysis": {"opening": "late"}}, "opening: it belongs to a dynamic analysis"),
     ({"initial": {"kind": "moving"}}, "a moving body needs a velocity, a spin, or both"),
     ({"initial": {"kind": "moving", "velocity": [1.0, 0.0], "centre": [0.0, 0.0]}},
      "centre belongs to a spin"),

@@ -249,6 +249,6 @@ def test_the_top_speed_is_of_either_end_of_a_blade():
 
 def test_an_opening_rule_is_for_what_moves(tmp_path):
     with pytest.raises(InputError, match="opening: it belongs to a dynamic analysis"):
-        load(tmp_path, STATIC + HELD + '[analysis]\nopening = "swept"\n')
+        load(tmp_path, STATIC + HELD + '[analysis]\nopening = "late"\n')
     with pytest.raises(InputError, match=r"late.*swept"):
         load(tmp_path, MOVING + HELD.replace("[[", 'opening = "never"\n[[', 1))

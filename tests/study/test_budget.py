@@ -154,6 +154,7 @@ kind = "dynamic"
 duration = 2.0
 time_step = 0.025
 outputs = 5
+opening = "late"
 [initial]
 kind = "equilibrium"
 [[supports]]
@@ -188,6 +189,8 @@ def test_a_place_waits_on_average_for_half_of_its_element(tmp_path, level):
     chords = h * np.array([below, 1.0 - below])
     expected = (chords**2).sum() / chords.sum() / 2 / SPEED
     assert mean_wait(scene, body_of(scene), solution) == pytest.approx(expected, rel=1e-9)
+    swept = scene_of(tmp_path, ('opening = "late"', 'opening = "swept"'))
+    assert mean_wait(swept, body_of(swept), solution) is None
 
 
 @pytest.mark.fenicsx

@@ -419,9 +419,9 @@ class Analysis(Strict):
         default=(0.0, 0.0), description="Rayleigh: mass (1/s) and stiffness (s) factors"
     )
     opening: Literal["late", "swept"] = Field(
-        default="late",
-        description="what a tool_path opens is free at once when it is passed, or held by forces "
-        "that fade as it is swept: of the reference and all own solvers",
+        default="swept",
+        description="what a tool_path opens is held by forces that fade as it is swept, or free "
+        "at once when it is passed: of the reference and all own solvers",
     )
 
     rules: ClassVar[Rules] = (
@@ -431,7 +431,7 @@ class Analysis(Strict):
          "duration, time_step and outputs belong to a dynamic analysis"),
         ("", lambda a: a.kind == "static" and any(a.damping),
          "damping belongs to a dynamic analysis"),
-        ("opening", lambda a: a.kind == "static" and a.opening != "late",
+        ("opening", lambda a: a.kind == "static" and a.opening != "swept",
          "it belongs to a dynamic analysis"),
     )  # fmt: skip
 

@@ -69,20 +69,21 @@ class _Parameters:
         self.marching()  # it checks its own
 
     def rule(self, scene: Scene) -> str:
-        """Return the rule by which blades open a scene.
+        """Return the rule by which blades open a scene; late where slivers are merged or dropped.
 
         Raises
         ------
         InputError
-            If the policy for slivers does not go with it.
+            If it is asked for and does not go with the policy for slivers.
         """
-        rule = self.opening or scene.analysis.opening
-        if rule != "late" and self.slivers in ("merge", "drop"):
+        if self.slivers not in ("merge", "drop"):
+            return self.opening or scene.analysis.opening
+        if self.opening == "swept":
             raise InputError(
-                f"opening = '{rule}' with slivers = '{self.slivers}', whose unknowns are not those "
+                f"opening = 'swept' with slivers = '{self.slivers}', whose unknowns are not those "
                 "of before parted; expected slivers = 'keep' or 'penalise'"
             )
-        return rule
+        return "late"
 
     def cutting(self) -> Cutting:
         """Return those of a body that is cut on its way."""
