@@ -12,10 +12,8 @@ from reference.large_strain import solve_large_strain
 from reference.law import law_of, mass_matrix
 from reference.linear_solvers import Kind
 from reference.loads import load_forces
-from reference.nodal_algebra import NodalMatrix, NodalSolver
-from reference.space import ConformingSpace
-from reference.ties import TiedSolver
-from reference.unknowns import TiedUnknowns
+from reference.nodal_algebra import NodalMatrix, NodalSolver, TiedSolver
+from reference.space import ConformingSpace, TiedUnknowns
 from verify.scene import Gravity, Scene
 from verify.scene.physics import PrescribedMotion, factor_at, first_factor
 

@@ -58,7 +58,7 @@ def facet_openings(
     space : ConformingSpace
         With all final cuts open.
     facing : (f, q, 2) int array
-        Of `reference.ties.facing_nodes`.
+        Of `reference.nodal_algebra.facing_nodes`.
     swept : bool
     delay : float
         By which facets on tool paths open late, s.

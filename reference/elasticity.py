@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from reference.boundary_values import constrained_values
+from reference.deformation import lame
+from reference.inside_out import naming_weak_places
 from reference.law import Law, mass_matrix
 from reference.linear_solvers import (
     Answer,
@@ -23,10 +25,8 @@ from reference.linear_solvers import (
     solve_saddle,
 )
 from reference.loads import load_form
-from reference.moduli import lame
 from reference.nodal_algebra import assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
-from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import Material, Scene
 

@@ -30,12 +30,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.deformation import Deformation, MembraneStretch, PolarStretch
+from reference.deformation import (
+    Deformation,
+    MembraneStretch,
+    PolarStretch,
+    density,
+    lame_constants,
+)
 from reference.linear_solvers import factorised
-from reference.moduli import density, lame_constants
 from reference.nodal_algebra import assembled_matrix, compiled, nodal_forces
-from reference.space import ConformingSpace, mixed_unknowns
-from reference.unknowns import Unknowns
+from reference.space import ConformingSpace, Unknowns, mixed_unknowns
 from verify.errors import InputError
 from verify.scene import Material
 

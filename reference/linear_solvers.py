@@ -7,8 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.space import ConformingSpace
-from reference.unknowns import Unknowns
+from reference.space import ConformingSpace, Unknowns
 
 Kind = Literal["definite", "symmetric", "general"]  # the first two are symmetric
 LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it

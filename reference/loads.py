@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.moduli import density
+from reference.deformation import density
 from reference.nodal_algebra import nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError

@@ -12,8 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference.dolfinx_versions import import_dolfinx
-from reference.form_cache import guard_form_cache
+from reference.dolfinx_versions import guard_form_cache, import_dolfinx
 
 # direct solvers, preconditioners and orderings that PETSc may have been built with
 _PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", "hdf5")

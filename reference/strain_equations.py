@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.boundary_values import RigidMotions
 from reference.deformation import MembraneStretch
 from reference.inside_out import OrientationCheck, place_text
 from reference.law import Law, quadrature
@@ -16,7 +17,6 @@ from reference.linear_solvers import (
     set_multigrid,
     solve_directly,
 )
-from reference.rigid_motion import RigidMotions
 from reference.space import ConformingSpace
 
 Array = NDArray[np.float64]

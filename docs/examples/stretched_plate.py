@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from reference.exact.hooke import hooke
-from reference.exact.parameters import Parameters
+from reference.exact.field import Parameters, hooke
 from reference.exact.solution import ExactSolution
 from verify.scene import Material
 

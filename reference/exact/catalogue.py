@@ -4,15 +4,19 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from reference.exact.arc_crack import ArcCrack
-from reference.exact.circular_cut import CircularCut
-from reference.exact.hooke import Hooke, hooke
-from reference.exact.layers import Layers
+from reference.exact.arc_crack import ArcCrack, CircularCut
+from reference.exact.field import Hooke, Parameters, hooke
 from reference.exact.moving_cracks import BladeStrip
-from reference.exact.parameters import Parameters
 from reference.exact.penny import Penny
-from reference.exact.rolled_halves import RolledHalves
-from reference.exact.smooth_fields import Airy, Bending, Linear, Patch, Sinusoidal
+from reference.exact.smooth_fields import (
+    Airy,
+    Bending,
+    Layers,
+    Linear,
+    Patch,
+    RolledHalves,
+    Sinusoidal,
+)
 from reference.exact.solution import ExactSolution
 from reference.exact.straight_cracks import CrackTip, Griffith, StraightFrontField
 from verify.errors import InputError

@@ -6,8 +6,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.hooke import Hooke
-from reference.exact.parameters import Parameters
+from reference.exact.field import Hooke, Parameters
 from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 from verify.scene import Scene

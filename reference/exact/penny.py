@@ -5,10 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.hooke import Hooke
-from reference.exact.parameters import Parameters
-from reference.exact.solution import Array, ExactSolution
-from reference.exact.two_sided import matrices, plane_axes
+from reference.exact.field import Hooke, Parameters
+from reference.exact.solution import Array, ExactSolution, matrices, plane_axes
 from verify.errors import InputError
 from verify.scene import Scene
 

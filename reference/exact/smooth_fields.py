@@ -1,11 +1,26 @@
-"""Fields without a tip, from uniform strains to waves: cut and uncut bodies reproduce them."""
+"""Fields without a tip: uniform strains, waves, layers of two materials, halves rolled apart.
+
+Layers meet along a line which a straight cut crosses; the field is linear on each of four parts.
+Tension S along the cut, another on each side, leaves the cut free and is in equilibrium with
+itself across the interface. Its strains are those of each material; they fit together where both
+materials strain alike along the interface, τ·ε τ: at one angle for two given materials. The rest
+of the jump, which shears, is a rotation of the second material.
+"""
 
 import numpy as np
 
-from reference.exact.hooke import Hooke
-from reference.exact.parameters import Parameters
-from reference.exact.solution import Array, ExactSolution
-from reference.exact.two_sided import Above, TwoSidedSolution, matrices, side
+from reference.exact.field import Hooke, Parameters, hooke
+from reference.exact.solution import (
+    Above,
+    Array,
+    ExactSolution,
+    TwoSidedSolution,
+    line_axes,
+    matrices,
+    side,
+)
+from verify.errors import InputError
+from verify.scene import Material, Scene
 
 
 class Linear(ExactSolution):
@@ -158,3 +173,136 @@ class Sinusoidal(TwoSidedSolution):
 
     def _laplacian(self, s: Array, above: Above, which: int, *by: int) -> Array:
         return np.sum([self._wave(s, above, which, a, a, *by) for a in self._along], axis=0)
+
+
+_FITS = 1e-9  # of the strains: how well they must agree along the interface
+_BESIDE = 1e-4, 1e-7  # m: how far along the interface and beside it materials are looked at
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+class Layers(TwoSidedSolution):
+    """Uniform stress S s⊗s on each side of the cut, in two materials.
+
+    ``point`` is where the interface crosses the cut.
+
+    Parameters
+    ----------
+    material : Material
+        With one region, whose interface it is.
+    parameters : Parameters
+        ``point``, ``slope`` or ``angle`` of the cut, ``shift``; ``interface_slope`` or
+        ``interface_angle`` (degrees), and ``stress`` S (Pa) above and below the cut.
+
+    Raises
+    ------
+    InputError
+        If the strains do not fit together along the interface, or the regions of the scene have
+        no such interface.
+    """
+
+    def __init__(self, material: Material, parameters: Parameters) -> None:
+        super().__init__(hooke(material), parameters)
+        self._stress = parameters.take("stress", (2,))
+        along = line_axes(parameters, "interface_")[0] @ self._axes.T  # in the axes of the cut
+        self._normal = _QUARTER @ along
+        laws = self._laws_beside(material, along @ self._axes)
+        # per unit of stress: (left, right) of the interface
+        strains = [np.diag([1.0, -one.eta]) / one.plane_modulus for one in laws]
+        jump = strains[1] - strains[0]
+        if abs(along @ jump @ along) > _FITS * float(np.abs(strains).max()):
+            raise InputError(
+                f"parameters: along the interface the materials strain by "
+                f"{along @ strains[0] @ along:.6g} and {along @ strains[1] @ along:.6g} per Pa of "
+                "tension along the cut; expected the same"
+            )
+        spin = -(self._normal @ jump @ along)
+        self._gradients = np.array([strains[0], strains[1] + spin * _QUARTER])
+
+    def stress(self, points: Array, near: Array | None = None) -> Array:
+        """Stress (n, 2, 2), Pa; that of each point's material."""
+        _, above = self._local(points, near)
+        unit = np.outer(self._axes[0], self._axes[0])
+        return np.asarray(side(self._stress, above)[:, None, None] * unit)
+
+    def kinks(self, start: Array, end: Array) -> list[float]:
+        """Parameters in (0, 1) at which a segment crosses the interface."""
+        a, b = ((point - self._origin) @ self._axes.T @ self._normal for point in (start, end))
+        return [float(a / (a - b))] if a * b < 0 else []
+
+    def _laws_beside(self, material: Material, along: Array) -> list[Hooke]:
+        """Laws to the left and to the right of the interface, as the scene has them."""
+        steps = [(step, aside) for aside in (1.0, -1.0) for step in (1.0, -1.0)]
+        beside = self._origin + np.array(
+            [
+                step * _BESIDE[0] * along + aside * _BESIDE[1] * (_QUARTER @ along)
+                for step, aside in steps
+            ]
+        )
+        number = material.number_at(beside)
+        if number[0] != number[1] or number[2] != number[3] or number[0] == number[2]:
+            raise InputError(
+                "'layers' expects material.regions that differ across the interface through the "
+                "point, and not along it"
+            )
+        return [hooke(material.each[k]) for k in number[[0, 2]]]
+
+    def _local_displacement(self, s: Array, above: Above) -> Array:
+        return np.asarray(np.einsum("nij,nj->ni", self._local_gradient(s, above), s))
+
+    def _local_gradient(self, s: Array, above: Above) -> Array:
+        second = s @ self._normal < 0.0
+        return side(self._stress, above)[:, None, None] * self._gradients[second.astype(int)]
+
+
+class RolledHalves(TwoSidedSolution):
+    """Strips on both sides of a cut, each bent away from the other to a circle of its own.
+
+    In the energy μ‖U − I‖² + ½ λ tr²(U − I) a strip |ξ| < h/2 takes the places
+    (r cos cs, r sin cs) with r = A cosh cξ + B sinh cξ + b/c, b = 2(λ + μ)/(λ + 2μ): equilibrium
+    without body force, free of traction at ξ = ±h/2. At s = 0 the middle lines stay where they are.
+
+    Parameters ``thickness`` h (m) and ``curvature`` c (1/m, positive) per side; ``shift`` (m,
+    normal to the cut) per side.
+    """
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        super().__init__(law, parameters)
+        self._thickness = parameters.take("thickness", (2,))
+        self._curvature = parameters.take("curvature", (2,))
+        if (self._thickness <= 0.0).any() or (self._curvature <= 0.0).any():
+            raise InputError("parameters: thickness and curvature; expected positive numbers")
+        lame, shear = law.lame, law.shear
+        stiff = lame + 2 * shear
+        self._b = 2 * (lame + shear) / stiff
+        spare = 2 * (lame + shear) - lame * self._b
+        c, h = self._curvature, self._thickness
+        self._sinh = spare * stiff / (c * np.cosh(0.5 * c * h) * (stiff**2 - lame**2))
+        self._cosh = -lame * self._sinh / stiff
+
+    def strain_energy(self, body: Array | Scene) -> float:
+        """Refuse: at finite rotation the linear work on the surface is not the energy."""
+        raise InputError("the strain energy at finite rotation is integrated over the body")
+
+    def _radius(self, xi: Array, above: Above) -> tuple[Array, Array]:
+        """Radius r (n,), m, and dr/dξ (n,)."""
+        c = side(self._curvature, above)
+        even, odd = side(self._cosh, above), side(self._sinh, above)
+        r = even * np.cosh(c * xi) + odd * np.sinh(c * xi) + self._b / c
+        return r, c * (even * np.sinh(c * xi) + odd * np.cosh(c * xi))
+
+    def _local_displacement(self, s: Array, above: Above) -> Array:
+        sign, middle = np.where(above, 1.0, -1.0), 0.5 * side(self._thickness, above)
+        (x, t), c = s.T, side(self._curvature, above)
+        r, _ = self._radius(middle - sign * t, above)
+        at_middle = side(self._cosh, above) + self._b / c
+        # ξ points away from the centre of the circle: towards the cut
+        rise = sign * (middle + at_middle - r * np.cos(c * x))
+        return np.column_stack([r * np.sin(c * x) - x, rise - t])
+
+    def _local_gradient(self, s: Array, above: Above) -> Array:
+        sign, middle = np.where(above, 1.0, -1.0), 0.5 * side(self._thickness, above)
+        (x, t), c = s.T, side(self._curvature, above)
+        r, slope = self._radius(middle - sign * t, above)
+        cos, sin = np.cos(c * x), np.sin(c * x)
+        return matrices([[c * r * cos - 1.0, -sign * slope * sin],
+                         [sign * c * r * sin, slope * cos - 1.0]])  # fmt: skip

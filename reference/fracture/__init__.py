@@ -3,9 +3,17 @@
 They are computed from a `verify.solution.Solution` alone, so from any solver's.
 """
 
-from reference.fracture.front import CircularFront, Front, FrontCoordinates, StraightFront
+from reference.fracture.front import (
+    CircularFront,
+    Front,
+    FrontCoordinates,
+    StraightFront,
+    front_at,
+    front_reach,
+    station_count,
+    station_spacing,
+)
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
-from reference.fracture.fronts import front_at, front_reach, station_count, station_spacing
 from reference.fracture.intensity import DomainError, StressIntensity, stress_intensity
 from reference.fracture.tips import Tip, no_tip, tips
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.hooke import hooke
+from reference.exact.field import hooke
 from reference.fracture.cells import (
     CellGradients,
     Force,
@@ -15,7 +15,7 @@ from reference.fracture.cells import (
     stress_of,
 )
 from reference.fracture.front import Front
-from reference.fracture.singular_fields import mode_field
+from reference.fracture.tips import mode_field
 from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution

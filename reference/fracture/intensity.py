@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.hooke import Hooke, hooke
+from reference.exact.field import Hooke, hooke
 from reference.exact.solution import ExactSolution
 from reference.fracture.cells import CellGradients, Force, cell_gradients, net_force, stress_of
-from reference.fracture.singular_fields import ahead_of, tip_fields
+from reference.fracture.tips import ahead_of, tip_fields
 from verify.errors import InputError
 from verify.scene import ArcCut, Material
 from verify.solution import Solution

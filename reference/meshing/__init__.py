@@ -2,7 +2,6 @@
 
 from reference.meshing.conforming import conforming_mesh
 from reference.meshing.edge_splitting import refine_uniformly
-from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import (
     imprint,
     imprint_polygons,
@@ -11,7 +10,7 @@ from reference.meshing.imprint import (
 )
 from reference.meshing.imprint_facets import Realised, imprint_facets
 from reference.meshing.opening import ConformingMesh, open_cut
-from reference.meshing.session import background_mesh
+from reference.meshing.session import Grading, background_mesh, clear_radii, singular_points
 
 __all__ = [
     "ConformingMesh",

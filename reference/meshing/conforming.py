@@ -7,12 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import flip_flat_cells, shrink_to_points
-from reference.meshing.features import Feature, close_pairs, divided_outline, plane_features
-from reference.meshing.grading import Grading
+from reference.meshing.features import (
+    APART,
+    Feature,
+    check_separation,
+    check_strips,
+    close_pairs,
+    divided_outline,
+    plane_features,
+)
 from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
-from reference.meshing.separation import APART, check_separation, check_strips
 from reference.meshing.session import (
+    Grading,
     add_polygon,
     add_size,
     entity_facets,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from reference_scenes import needs_fenicsx
 
-from reference.form_cache import guard_form_cache
+from reference.dolfinx_versions import guard_form_cache
 from verify.doctor import examine_forms
 
 pytestmark = needs_fenicsx

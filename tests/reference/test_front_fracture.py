@@ -8,7 +8,7 @@ from solid_scenes import EXACT, cube, disc
 
 from reference.exact import exact_solution
 from reference.fracture import CircularFront, StraightFront, front_intensity
-from reference.fracture.singular_fields import mode_field
+from reference.fracture.tips import mode_field
 from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
 from verify.errors import InputError
 from verify.scene import Material

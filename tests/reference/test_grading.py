@@ -13,9 +13,9 @@ from reference.fracture import tips
 from reference.fracture.intensity import ring
 from reference.meshing import background_mesh, conforming_mesh
 from reference.meshing.edge_splitting import flip_flat_cells
-from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
+from reference.meshing.session import Grading, clear_radii, singular_points
 from verify.solution import Solution
 from verify.solvers.conforming_meshes import reference_mesh
 

@@ -46,7 +46,7 @@ def test_every_level_of_the_reference_halves_every_step_of_the_one_before(
 
     # which steps are taken does not depend on the motion: nothing is solved
     monkeypatch.setattr(Stepper, "step", lambda one, state: step(one, state))
-    monkeypatch.setattr("reference.dynamics_ledger.Ledger.record", lambda *_: None)
+    monkeypatch.setattr("reference.dynamics_step.Ledger.record", lambda *_: None)
     begun = []
     for level in range(3):
         taken.clear()

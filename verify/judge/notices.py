@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from reference.moduli import wave_speed
+from reference.deformation import wave_speed
 from verify.compare.hooke import Law
 from verify.compare.strain_energy import strain_energy
 from verify.judge.intervals import NotMeasuredError, error_interval

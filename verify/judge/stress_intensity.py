@@ -201,7 +201,7 @@ def _with_free_faces(
             assert normal is not None  # else it is a defect
             stress += np.outer(values, normal) + np.outer(normal, values)
             stress -= (values @ normal) * np.outer(normal, normal)
-    from reference.exact.hooke import hooke
+    from reference.exact.field import hooke
 
     law = hooke(scene.material.each[0])
     trace = np.trace(stress) / (d * law.lame + 2 * law.shear)

@@ -12,7 +12,7 @@ from math import ceil, prod, sqrt
 
 import numpy as np
 
-from reference.moduli import wave_speed
+from reference.deformation import wave_speed
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.placement import points_of_body
 from verify.solvers.interface import is_built_in

@@ -34,7 +34,7 @@ class Account:
         state : mapping
             Energies of the state by name, J.
         done : mapping
-            What was done since the start, J: by the names of `reference.dynamics_ledger.DONE`.
+            What was done since the start, J: by the names of `reference.dynamics_step.DONE`.
         momentum, angular_momentum : (d,), (1 or 3,) array
             In kg m/s and kg m²/s.
         cut_angular_impulse : (1 or 3,) array

@@ -9,12 +9,11 @@ from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import linear_system, solve_linear, wants_pressure
 from reference.exact import exact_of
 from reference.fracture.cells import MIXED
-from reference.inside_out import place_text
+from reference.inside_out import naming_weak_places, place_text
 from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.loads import load_forces
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
-from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
@@ -216,7 +215,7 @@ def _solve(
 
 def _comm() -> Any:
     """Communicator over which a scene is distributed, or None where there is one process only."""
-    from reference.ranks import all_ranks
+    from reference.dolfinx_versions import all_ranks
 
     ranks, _ = all_ranks()
     return ranks if ranks.size > 1 else None

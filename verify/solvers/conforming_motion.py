@@ -7,16 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
+from reference.deformation import wave_speed
 from reference.dynamics_body import MovingBody
 from reference.dynamics_cuts import facet_openings, inherit, partly_opened
-from reference.dynamics_ledger import Ledger, momenta_of
 from reference.dynamics_release import Hold, parted_nodes
-from reference.dynamics_step import Scheme, State, Stepper, generalised_alpha, implicit_euler
+from reference.dynamics_step import (
+    Ledger,
+    Scheme,
+    State,
+    Stepper,
+    generalised_alpha,
+    implicit_euler,
+    momenta_of,
+)
 from reference.fracture.cells import MIXED
-from reference.moduli import wave_speed
+from reference.inside_out import naming_weak_places
+from reference.nodal_algebra import facing_nodes, lasting_ties
 from reference.space import ConformingSpace, conforming_space
-from reference.ties import facing_nodes, lasting_ties
-from reference.weak_place import naming_weak_places
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference.exact.hooke import hooke
+from reference.exact.field import hooke
 from reference.exact.moving_cracks import sudden_intensity
 from verify.scene import Material
 from verify.study.calibration.plane_scenes import Content, Random
