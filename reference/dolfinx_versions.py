@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-
 _POLL = 0.05  # s
 # s without a new file after which a program that takes no lock has been killed: DOLFINx itself
 # waits for 10 s at most

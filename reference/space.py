@@ -18,7 +18,6 @@ from reference.meshing import ConformingMesh
 from reference.meshing.edge_splitting import mesh_edges
 from reference.meshing.opening import measures
 
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 

@@ -28,7 +28,6 @@ from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.tool_path import Cut
 
-
 Array = NDArray[np.float64]
 # of the body's longest side, which gmsh meshes as 1: below it runs out of digits, and loses facets
 # of a cut at its tip (seen from 9e-10 down)
