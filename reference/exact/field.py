@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.scene import Material
-from verify.scene.messages import nearest
+from verify.scene.strict import nearest
 
 
 @dataclass(frozen=True)
