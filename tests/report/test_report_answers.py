@@ -4,8 +4,8 @@ import pytest
 
 from verify.reference_record import ReferenceRecord
 from verify.report.answers import answers, energy_curve, sliver_curves
-from verify.report.figures.answers import answer_panels
-from verify.report.figures.style import Palette
+from verify.report.error_plots import answer_panels
+from verify.report.plots import Palette
 from verify.result import CRITICAL_STEP, CaseResult, Metric, SolveRecord, Status
 
 

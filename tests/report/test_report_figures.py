@@ -8,16 +8,15 @@ import pytest
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
-from verify.report import load_run, render
+from verify.report import load_run, plots, render
 from verify.report.bodies import Body, deformed_body
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
-from verify.report.figures import convergence, plots
-from verify.report.figures.convergence import error_panel, error_range
-from verify.report.figures.style import Palette, drawing
-from verify.report.opening_view import opening_figures
+from verify.report.error_plots import error_panel, error_range
 from verify.report.pictures import case_pictures, plane_tips, scale_top
+from verify.report.plots import Palette, drawing
 from verify.report.problem import cut_lines
+from verify.report.profiles import opening_figures
 from verify.result import (
     Metric,
     Notice,
@@ -47,7 +46,7 @@ def drawn(monkeypatch):
             kept.append((figure.axes[0], alt))
             return drawing(figure, alt, kind)
 
-        monkeypatch.setattr(convergence, "drawing", keep)
+        monkeypatch.setattr(error_plots, "drawing", keep)
         slope = required_slope(result, metric)
         assert error_panel("error", curves, y_range, Palette(), slope=slope) is not None
         return kept[0]

@@ -13,11 +13,10 @@ from verify.cli import ranking as runner_ranking
 from verify.cli.ranking import rank_run
 from verify.conformance import CheckResult, State
 from verify.report import load_run, render
-from verify.report.figures import plots as figures
-from verify.report.figures.style import Palette
+from verify.report import plots as figures
 from verify.report.notation import error_text, number, with_interval
-from verify.report.sliver_view import graded
-from verify.report.study_page import render_study
+from verify.report.plots import Palette
+from verify.report.study_page import graded, render_study
 from verify.report.tables import check_row
 from verify.result import Status, Verdict, VerdictRecord
 

@@ -16,7 +16,7 @@ from synthetic_run import HOSTILE, make_run
 
 from verify.cli.run_text import verdict_lines
 from verify.report import load_run, render
-from verify.report.exports import COLUMNS
+from verify.report.run_directory import COLUMNS
 from verify.result import SolveRecord, Status, Verdict
 from verify.result_files import read_result, write_result
 

@@ -8,8 +8,8 @@ import pytest
 from verify.cli import ranking
 from verify.errors import InputError
 from verify.reference_record import ReferenceRecord
-from verify.report.figures.style import Palette
 from verify.report.page import family_views
+from verify.report.plots import Palette
 from verify.report.run_directory import load_run
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner import selection

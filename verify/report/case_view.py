@@ -6,13 +6,12 @@ from verify.printable import words_of
 from verify.report.blocks import Drawing, Figure, Table
 from verify.report.curves import Curve, error_curves, limits, metric_names
 from verify.report.drawn_bodies import colour_bar
-from verify.report.figures.convergence import error_panel, error_range
-from verify.report.figures.style import Palette
-from verify.report.motion_view import MotionView, motion_view
+from verify.report.error_plots import error_panel, error_range
 from verify.report.notation import ROUND_OFF, error_title, number, number_text, solver_title
-from verify.report.opening_view import opening_figures
 from verify.report.pictures import CasePictures, Picture
+from verify.report.plots import Palette
 from verify.report.problem import problem_facts, sketch
+from verify.report.profiles import MotionView, motion_view, opening_figures
 from verify.report.run_directory import CaseEntry
 from verify.report.tables import MANY, case_tables, reference_facts, reference_tables
 from verify.result import CaseResult, SolveRecord, Verdict, worst

@@ -31,7 +31,7 @@ from verify.report.notation import (
     solver_title,
     spread_text,
 )
-from verify.report.ranking_tables import rank
+from verify.report.page import rank
 from verify.whole_files import whole_file, write_whole
 
 PICTURES = "report-pictures"

@@ -9,9 +9,9 @@ from verify.printable import words_of
 from verify.report.answers import answers
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.case_view import CaseView
-from verify.report.figures.answers import answer_panels, key
-from verify.report.figures.style import Palette
+from verify.report.error_plots import answer_panels, key
 from verify.report.notation import bytes_text, number, solver_title
+from verify.report.plots import Palette
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
 from verify.result import Status, Verdict, VerdictRecord

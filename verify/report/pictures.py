@@ -22,10 +22,10 @@ from verify.report.bodies import (
     read_stored,
     zoomed,
 )
+from verify.report.drawn_bodies import packed
 from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry
-from verify.report.turntable import packed
 from verify.result import REFERENCE, CaseResult, SolveRecord, Status, error_picture, finest_of
 from verify.solution import Solution
 

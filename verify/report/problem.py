@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from verify.errors import InputError
 from verify.geometry.spatial import rim_edges
 from verify.report.blocks import Drawing
-from verify.report.figures.style import drawing
+from verify.report.plots import drawing
 from verify.scene.tool_path import Cut
 
 # what says nothing where it is so

@@ -1,19 +1,41 @@
-"""Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``."""
+"""Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``.
 
+Cases may have been drawn before, beside the solves of other cases: `main` does so. Each question in
+its folder names a run directory, the folder of a case in it, and the file to write. What is written
+is read back by the process that asked for it, and by nobody else.
+"""
+
+import pickle
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from time import sleep
+from typing import Any, NoReturn
 
 from PIL import Image
 
-from verify.json_files import write_json
-from verify.report.case_view import case_view, show_pictures
-from verify.report.drawing import drawn_before, drawn_case, run_palette
-from verify.report.exports import all_results, csv_rows, junit_document
+from verify.json_files import read_json, write_json
+from verify.printable import words_of
+from verify.processes import die_with_parent
+from verify.report.case_view import CaseView, case_view, show_pictures
+from verify.report.drawn_bodies import draw
 from verify.report.forms import as_html, as_markdown, load_templates, print_page
+from verify.report.notation import solver_title
 from verify.report.page import page_view
-from verify.report.pictures import CasePictures
-from verify.report.run_directory import Run, load_run
+from verify.report.pictures import CasePictures, case_pictures
+from verify.report.plots import Palette, Style
+from verify.report.run_directory import (
+    CaseEntry,
+    Run,
+    all_results,
+    csv_rows,
+    junit_document,
+    load_entry,
+    load_record,
+    load_run,
+)
 from verify.whole_files import write_whole
 
 # of the provenance, what says something to a reader elsewhere
@@ -45,7 +67,7 @@ def render(directory: Path, form: str = "html", drawings: Path | None = None) ->
         it and with PDF. A summary is Markdown without the cases: the verdicts, the rankings, where
         they come from; with it comes the CSV file alone.
     drawings : Path, optional
-        Folder in which `verify.report.drawing` has left cases of this run. What is read there is
+        Folder in which `verify.report.rendering` has left cases of this run. What is read there is
         trusted: it is one that the caller has made for it.
 
     Returns
@@ -127,3 +149,60 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
     said = [f"{stills} bodies are shown as stills"] if stills else []
     said += [f"{dropped} of {total} pictures are left out"] if dropped else []
     return f"{', '.join(said)} to keep the page below {_PAGE_BYTES / 1e6:.3g} MB."
+
+
+_LOOK_SECONDS = 0.02
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case as the page shows it, and the styles that its figures give labels."""
+
+    view: CaseView
+    styles: dict[str, Style]
+
+
+def main(folder: Path) -> NoReturn:
+    """Draw each case that a question in `folder` names, and remove the question."""
+    die_with_parent()
+    while True:
+        for question in sorted(folder.glob("*.json")):
+            asked = read_json(question)
+            root = Path(asked["root"])
+            palette = run_palette(load_record(root)[0])
+            drawn = drawn_case(root, asked["index"], load_entry(root / asked["folder"]), palette)
+            write_whole(Path(asked["target"]), pickle.dumps(drawn))
+            question.unlink()
+        sleep(_LOOK_SECONDS)
+
+
+def run_palette(record: Mapping[str, Any]) -> Palette:
+    """Return the styles of the solvers of a run, whichever of its cases is drawn first."""
+    named = record.get("solvers")
+    names = [name for name in named if isinstance(name, str)] if isinstance(named, list) else []
+    return Palette.of(solver_title(name) for name in names)
+
+
+def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Drawn:
+    """Draw case number `index` of a run; if its pictures fail, nothing else of it does."""
+    try:
+        pictures = case_pictures(root, entry)
+        for picture in pictures.all:
+            picture.image = draw(picture.body, picture.view)
+    except Exception as error:
+        pictures = CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
+    return Drawn(case_view(index, entry, pictures, palette), dict(palette))
+
+
+def drawn_before(file: Path, palette: Palette) -> Drawn | None:
+    """Return what `main` wrote into `file`, if the figures would have the same styles now."""
+    try:
+        drawn: Drawn = pickle.loads(file.read_bytes())  # our own, in a folder of this process
+    except (OSError, EOFError, pickle.UnpicklingError):
+        return None
+    same = all(palette[label] == style for label, style in drawn.styles.items())
+    return drawn if same else None
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

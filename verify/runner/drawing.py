@@ -47,7 +47,7 @@ class Drawings:
         """Have the process that draws load what it needs."""
         if self._folder is not None and self._child is None:
             log, limits = self._folder / "log.txt", (self._timeout, self._memory)
-            self._child = Child("verify.report.drawing", self._folder, log, *limits, own=True)
+            self._child = Child("verify.report.rendering", self._folder, log, *limits, own=True)
 
     def ask(self, case: str) -> None:
         """Have a judged case drawn when there is room."""
