@@ -8,7 +8,7 @@ import pytest
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
-from verify.report import load_run, plots, render
+from verify.report import error_plots, load_run, plots, render
 from verify.report.bodies import Body, deformed_body
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
