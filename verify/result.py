@@ -10,8 +10,7 @@ from enum import StrEnum
 from math import inf
 from typing import Any
 
-from verify.records import CutRecord, Regularisation
-from verify.reference_record import ReferenceRecord
+from verify.records import CutRecord, ReferenceRecord, Regularisation
 
 SCHEMA_VERSION = 1
 REFERENCE = "reference"  #: solver that judges the others, where no exact solution does

@@ -6,7 +6,7 @@ from dataclasses import replace
 import scenes
 
 from verify.calibration import KERNEL
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.result_files import write_result
 

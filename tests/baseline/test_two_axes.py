@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 import runs
 
-from verify.meaning import changes_of
+from verify.provenance import changes_of
 from verify.records import CutRecord
 
 

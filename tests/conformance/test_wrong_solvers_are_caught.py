@@ -5,9 +5,9 @@ from importlib import import_module
 
 import pytest
 
-from verify.conformance import State, conform, exit_code_of, scenes, trials, worker
+from verify.conformance import State, conform, exit_code_of, scenes, trials
 from verify.conformance.check import evaluate
-from verify.conformance.energy_in_motion import energy_in_motion
+from verify.conformance.checks import energy_in_motion
 from verify.conformance.meeting_checks import crossed_interface, ending_cut, parted_checks
 from verify.conformance.trials import Outcome
 from verify.json_files import write_json
@@ -30,7 +30,7 @@ class Solved:
     def __init__(self, solver, parameters, names, stem):
         self.log, batch = stem.with_suffix(".txt"), stem.with_suffix(".json")
         write_json({"solver": solver, "parameters": dict(parameters), "trials": names}, batch)
-        worker.main(batch)
+        trials.main(batch)
 
     def poll(self):
         return Ending(0, 0.0, 0.0)

@@ -8,7 +8,7 @@ import zipfile
 
 import pytest
 
-from verify.foreign import program, records, template
+from verify.foreign import installing, records
 from verify.solvers import interface
 
 RECORD = """
@@ -37,7 +37,7 @@ def programs(tmp_path, monkeypatch):
     """An empty list of programs, and a folder of installations."""
     folder = tmp_path / "programs"
     folder.mkdir()
-    for module in (records, program, template):
+    for module in (records, installing):
         monkeypatch.setattr(module, "PROGRAMS", folder)
     monkeypatch.setattr(interface, "_PROGRAMS", folder)
     monkeypatch.setenv("VERIFY_SOLVERS", str(tmp_path / "solvers"))

@@ -3,8 +3,7 @@
 import pytest
 
 from verify.judge.ranks import rank_solvers
-from verify.records import Regularisation
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord, Regularisation
 from verify.result import CaseResult, Metric, SolveRecord, Status
 
 

@@ -18,7 +18,7 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.conforming import _RADIUS_OF_JUMPS
 from verify.study.calibration.families import families
-from verify.study.calibration.trial import trials
+from verify.study.calibration.study import trials
 
 LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
 TIME = 0.9

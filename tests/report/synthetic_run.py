@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from verify.records import Regularisation
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord, Regularisation
 from verify.result import (
     CaseResult,
     Metric,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.report.answers import answers, energy_curve, sliver_curves
 from verify.report.error_plots import answer_panels
 from verify.report.plots import Palette

@@ -10,7 +10,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.judge.checks import unjudged_result
 from verify.judge.sufficiency import sufficiency
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan, further_level, levels_in_vain

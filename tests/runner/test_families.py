@@ -7,7 +7,7 @@ import pytest
 
 from verify.cli import ranking
 from verify.errors import InputError
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.report.page import family_views
 from verify.report.plots import Palette
 from verify.report.run_directory import load_run

@@ -9,7 +9,7 @@ import pytest
 
 from verify.compare.error_field import nodal_error
 from verify.compare.locate import SolutionField
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner import exit_code
 from verify.runner.solve import solve_job

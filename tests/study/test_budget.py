@@ -12,7 +12,7 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.study.budget.budget import Answer, error_budget
 from verify.study.budget.candidates import Candidate, cheapest_adequate
-from verify.study.budget.crossing_delay import mean_wait
+from verify.study.budget.chain import mean_wait
 
 
 class Affine:

@@ -5,7 +5,7 @@ import pytest
 import scenes
 
 from reference.exact import exact_solution
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver

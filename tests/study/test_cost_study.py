@@ -8,14 +8,12 @@ import pytest
 from scipy.stats import binom
 
 from verify.judge.cost import pareto_front, time_at, work_points
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
-from verify.study.calibration.families import families
+from verify.study.calibration.families import families, series_families
 from verify.study.calibration.motion_scenes import released, stretched, wave
-from verify.study.calibration.series import series_families
-from verify.study.calibration.study import binomial_tail, calibration_findings
-from verify.study.calibration.trial import Trial, trials
+from verify.study.calibration.study import Trial, binomial_tail, calibration_findings, trials
 from verify.study.cost import cost_study, growing_scenes
 
 STRIP = "statics/tissue_strip"

@@ -17,11 +17,8 @@ from verify.simulator.thesis.real_time import (
     StepTime,
     step_times,
 )
-from verify.study.thesis.measured import Measured
-from verify.study.thesis.methods_compared import MethodOnCase
-from verify.study.thesis.sliver_systems import exponent, sliver_systems
-from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
-from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
+from verify.study.thesis.measured import Measured, MethodOnCase, exponent, sliver_systems
+from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 _HOLD = (
     "Table 4.3, its law",

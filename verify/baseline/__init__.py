@@ -9,8 +9,7 @@ from verify.baseline.checking import Row, check_run, exit_code_of
 from verify.baseline.difference import VerdictChange, verdict_changes
 from verify.baseline.finished_run import FinishedRun, read_run
 from verify.baseline.record import Baseline, read_baseline, write_baseline
-from verify.baseline.saving import save_run
-from verify.baseline.updating import Move, update_from
+from verify.baseline.updating import Move, save_run, update_from
 
 __all__ = [
     "Baseline",

@@ -3,11 +3,17 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from verify.baseline.finished_run import FinishedRun, physics_of
-from verify.baseline.measured import finest, metric_of, quantities_of, speed_of
+from verify.baseline.finished_run import (
+    FinishedRun,
+    finest,
+    metric_of,
+    physics_of,
+    quantities_of,
+    speed_of,
+)
 from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity, Speed
 from verify.calibration import KERNEL
-from verify.meaning import changes_of
+from verify.provenance import changes_of
 from verify.result import CaseResult, Metric, Verdict
 from verify.runner.run import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 

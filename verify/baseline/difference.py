@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from verify.baseline.checking import changes_between
-from verify.baseline.finished_run import FinishedRun
-from verify.baseline.measured import finest
-from verify.meaning import WIDTHS
+from verify.baseline.finished_run import FinishedRun, finest
+from verify.provenance import WIDTHS
 from verify.result import CaseResult, Verdict, VerdictRecord, worst
 
 

@@ -49,7 +49,7 @@ def export(
     see docs/guide/your-solver.md.
     """  # fmt: skip
     from verify.exchange import export_case
-    from verify.foreign.template import write_template
+    from verify.foreign.records import write_template
     from verify.scene import load_scene
 
     scene = load_scene(case)

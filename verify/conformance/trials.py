@@ -1,6 +1,12 @@
-"""Trials of a solver: scenes solved in processes of their own, so that a crash is a finding."""
+"""Trials of a solver: scenes solved in processes of their own, so that a crash is a finding.
+
+``python -m verify.conformance.trials BATCH.json`` solves a batch in one process. It writes
+``BATCH.ready`` once the solver is loaded, and an ``outcome.json`` after each trial; a trial that
+kills the process is the first without one.
+"""
 
 import os
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,11 +15,15 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.processes import die_with_parent
 from verify.result import Status
 from verify.runner.child import POLL_SECONDS, Child, telling_line
+from verify.runner.solve import solve_job
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
+from verify.solvers import check_parameters, find_solver
 from verify.solvers.interface import is_built_in
+from verify.solvers.named import solver_in
 
 _START_SECONDS = 120.0  # importing a solver may start MPI or compile
 
@@ -102,7 +112,7 @@ def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: P
     batch, log = stem.with_suffix(".json"), stem.with_suffix(".txt")
     write_json({"solver": solver, "parameters": dict(parameters), "trials": names}, batch)
     own = is_built_in(solver)  # forked from a warm process, if the caller keeps one
-    return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"), own=own)
+    return Child("verify.conformance.trials", batch, log, _START_SECONDS, float("inf"), own=own)
 
 
 def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Status]:
@@ -142,3 +152,26 @@ def _outcome(folder: Path) -> Outcome:
     finally:
         for file in folder.glob("solution*"):
             os.unlink(file)
+
+
+def main(batch_file: Path) -> None:
+    """Solve the trials of a batch, in order."""
+    die_with_parent()
+    batch = read_json(batch_file)
+    if ":" in batch["solver"]:
+        sys.path.append(os.getcwd())
+    try:
+        name = solver_in(batch["solver"])
+        check_parameters(name, find_solver(name), batch["parameters"])
+    except InputError as error:
+        write_json({"error": str(error)}, batch_file.with_suffix(".refused"))
+        return
+    batch_file.with_suffix(".ready").touch()
+    for name in batch["trials"]:
+        folder = batch_file.parent / name
+        outcome = solve_job(read_json(folder / "job.json"), folder, timed=False)
+        write_json(outcome, folder / "outcome.json")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

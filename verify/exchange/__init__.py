@@ -5,11 +5,9 @@
 `export_fields` writes the solutions of a run for ParaView.
 """
 
-from verify.exchange.answers import Answers, read_answers
-from verify.exchange.export import export_case
-from verify.exchange.layout import problem_of
+from verify.exchange.export import Answers, export_case, read_answers
 from verify.exchange.paraview import export_fields
-from verify.exchange.problem import HeldNodes, Load, Problem
+from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
 from verify.exchange.program import ProgramSolver
 
 __all__ = [

@@ -12,7 +12,7 @@ from time import sleep
 from typing import Any
 
 from verify.errors import InputError
-from verify.exchange.answers import Answers
+from verify.exchange.export import Answers
 from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status

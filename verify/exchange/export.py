@@ -1,4 +1,4 @@
-"""A case as files for programs that are not written in Python.
+"""A case as files for programs that are not written in Python, and their answers read back.
 
 ::
 
@@ -15,6 +15,7 @@ Every field of the JSON files is described in ``docs/guide/your-solver.md``.
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,13 @@ import numpy as np
 
 from verify.compare.hooke import hooke
 from verify.errors import InputError
-from verify.exchange.layout import problem_of
-from verify.exchange.problem import HeldNodes, Load, Problem
-from verify.json_files import write_json
+from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.json_files import read_json, write_json
+from verify.printable import one_line
+from verify.result import Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene
+from verify.solution import Solution, read_solution
 from verify.whole_files import asked_place, whole_file
 
 EXPORT_SCHEMA = 1
@@ -236,3 +239,77 @@ def _write_cuts(scene: Scene, path: Path) -> None:
     mesh = meshio.Mesh(np.vstack(points), blocks, cell_data={"cut": index})
     with whole_file(path) as partial:
         mesh.write(partial, file_format="vtu")
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Solutions by level; for the other levels, how they ended and why.
+
+    Attributes
+    ----------
+    solutions : dict of int to Solution
+    missing : dict of int to (Status, str)
+    """
+
+    solutions: dict[int, Solution] = field(default_factory=dict)
+    missing: dict[int, tuple[Status, str]] = field(default_factory=dict)
+
+
+def read_answers(scene: Scene, folder: Path) -> Answers:
+    """Read ``level-<k>/solution.json`` and its VTU files below `folder`.
+
+    A program that cannot do a level answers ``{"schema": 1, "refused": "why"}``. A level whose
+    answer is missing, damaged or of the wrong dimension has failed; the others count.
+
+    Parameters
+    ----------
+    scene : Scene
+    folder : Path
+        Of the layout that `export_case` makes; it may be the exported directory itself.
+
+    Raises
+    ------
+    InputError
+        If there is no answer at all, or the folder was exported from another version of the case.
+    """
+    if not folder.is_dir():
+        text = "no such directory; expected answers in level-<k>/solution.json"
+        raise InputError(text, str(folder))
+    _check_same_case(scene, folder)
+    paths = [level_folder(folder, k) / "solution.json" for k in range(scene.mesh.count)]
+    if not any(path.is_file() for path in paths):
+        text = f"holds no answer; expected level-0/solution.json … for {len(paths)} levels"
+        raise InputError(text, str(folder))
+    answers = Answers()
+    for level, path in enumerate(paths):
+        if not path.is_file():
+            reason = f"no answer for level {level} (no file {path.parent.name}/{path.name})"
+            answers.missing[level] = Status.FAILED, reason
+            continue
+        try:
+            if refusal := read_json(path).get("refused"):
+                answers.missing[level] = Status.REFUSED, one_line(refusal)
+                continue
+            solution = read_solution(path.with_suffix(""))
+            if solution.dimension != scene.dimension:
+                text = f"a {solution.dimension}D solution; the case has {scene.dimension}"
+                raise InputError(text, str(path))
+        except InputError as error:
+            answers.missing[level] = Status.FAILED, str(error)
+        else:
+            answers.solutions[level] = solution
+    return answers
+
+
+def _check_same_case(scene: Scene, folder: Path) -> None:
+    """Refuse answers to another version of the case, where the export says which it was."""
+    file = folder / "case.json"
+    if not file.is_file():
+        return
+    exported = read_json(file)
+    if exported.get("physics") != physics_digest(scene):
+        raise InputError(
+            f"was exported from '{exported.get('case')}', which is another case than "
+            f"'{scene.name}' is now: export it again and solve that",
+            str(file),
+        )

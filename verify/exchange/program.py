@@ -11,8 +11,7 @@ from time import perf_counter
 from typing import Any, ClassVar
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.exchange.answers import read_answers
-from verify.exchange.export import export_case
+from verify.exchange.export import export_case, read_answers
 from verify.json_files import write_json
 from verify.result import Status
 from verify.scene import Scene

@@ -5,8 +5,7 @@ and `ForeignProgram` makes one a solver. The programs themselves are stand-alone
 their own Python and import nothing of this package.
 """
 
-from verify.foreign.installing import install, remove, state_of
-from verify.foreign.program import ForeignProgram
+from verify.foreign.installing import ForeignProgram, install, remove, state_of
 from verify.foreign.records import ForeignSolver, foreign_solver, foreign_solvers
 
 __all__ = [

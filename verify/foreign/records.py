@@ -7,6 +7,7 @@
     programs/NAME/requirements.lock   its packages with their hashes, if it is installed from them
 """
 
+import shutil
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from verify.errors import InputError
 from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.strict import nearest
+from verify.whole_files import asked_place
 
 PROGRAMS = Path(__file__).resolve().parent / "programs"
 _STRICT = ConfigDict(extra="forbid")
@@ -183,3 +185,12 @@ def _read(path: Path) -> ForeignSolver:
 
 
 _RECORD = TypeAdapter(ForeignSolver)
+
+
+def write_template(folder: Path) -> list[Path]:
+    """Write the reader and writer of the exchange and the example into `folder`."""
+    files = [folder / name for name in ("exchange_files.py", "example.py")]
+    with asked_place(folder):
+        for file in files:
+            shutil.copyfile(PROGRAMS / file.name, file)
+    return files

@@ -44,7 +44,7 @@ from verify.judge.reference import (
 )
 from verify.judge.sufficiency import sufficiency
 from verify.printable import one_line
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import (
     COMPARISON_FAILED,
     REFERENCE,

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.result import REFERENCE, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck, scene_hash
 

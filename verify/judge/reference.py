@@ -39,7 +39,7 @@ from verify.judge.richardson import (
 )
 from verify.judge.stress_intensity import exact_intensity
 from verify.judge.time_to_accuracy import time_to_accuracy
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord
 from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
-from verify.records import Regularisation
-from verify.reference_record import ReferenceRecord
+from verify.records import ReferenceRecord, Regularisation
 from verify.report.blocks import Cell, Table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (

@@ -84,7 +84,7 @@ def _leave_traceback() -> None:
 
 
 def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict[str, Any]:
-    from verify.compile_times import compile_times
+    from verify.calibration import compile_times
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver

@@ -37,7 +37,7 @@ _BUILT_IN |= dict.fromkeys(_METHODS, "verify.solvers.methods_adapter:MethodSolve
 _GROUP = "verify.solvers"
 # programs of others, a folder each, of the class named here, which is told the name
 _PROGRAMS = Path(__file__).resolve().parents[1] / "foreign" / "programs"
-_FOREIGN = "verify.foreign.program:ForeignProgram"
+_FOREIGN = "verify.foreign.installing:ForeignProgram"
 _ASKED = ("refuses", "levels", "solve")  # methods that every solver has
 MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 

@@ -8,7 +8,7 @@ import numpy as np
 from reference.exact.field import hooke
 from reference.exact.moving_cracks import sudden_intensity
 from verify.scene import Material
-from verify.study.calibration.plane_scenes import Content, Random
+from verify.study.calibration.still_scenes import Content, Random
 
 _YOUNG, _DENSITY, _LENGTH = 1.0, 1.0, 1.0
 

@@ -1,12 +1,194 @@
-"""All that the study of the thesis measures, before it is judged."""
+"""What the study of the thesis measures, before it is judged.
 
+Slivers: explicit step and condition of bodies whose cut comes ever nearer to nodes. Methods: error,
+energy, step and time of each against one conforming reference or exact solution.
+"""
+
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.cost import work_points
+from verify.judge.system_numbers import condition_numbers, critical_step, with_uncut_twin
+from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.scene import Scene
 from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import Delay, Frames
 from verify.simulator.thesis.real_time import RealTime, StepTime
-from verify.study.thesis.methods_compared import MethodOnCase
-from verify.study.thesis.sliver_systems import SliverSystem
+from verify.solvers import find_solver
+from verify.study.measured_scenes import variant_of
+
+_METHODS = (
+    "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
+    "snapping",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SliverSystem:
+    """One method with slivers of one size.
+
+    Attributes
+    ----------
+    dimension : int
+    method : str
+        As a study of slivers takes it.
+    size : float
+        Distance of the cut from a layer of nodes, in element sizes.
+    ratio : float
+        Critical explicit step over that of the uncut body.
+    condition, scaled : float
+        Condition number of the stiffness, and of the stiffness scaled by its diagonal.
+    """
+
+    dimension: int
+    method: str
+    size: float
+    ratio: float
+    condition: float
+    scaled: float
+
+
+def sliver_systems(
+    scenes: Sequence[Scene], methods: Sequence[str] = _METHODS
+) -> list[SliverSystem]:
+    """Measure the systems of rows of families of slivers, those of ε = 0 left out."""
+    found = []
+    for method in _METHODS:
+        variant = variant_of(method)
+        system: Any = getattr(variant.found(), "system", None)
+        for scene in scenes:
+            if scene.row is None or not 0.0 < scene.row.value < 0.5:
+                continue
+            try:
+                own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
+            except UnsupportedSceneError:
+                continue
+            ratio = critical_step(own) / critical_step(whole)
+            raw, scaled = condition_numbers(own)
+            found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
+    return found
+
+
+def exponent(steps: Sequence[SliverSystem]) -> float:
+    """Slope of log(critical step) over log(size) between the two smallest sizes."""
+    two = sorted(steps, key=lambda step: step.size)[:2]
+    return float(np.log(two[1].ratio / two[0].ratio) / np.log(two[1].size / two[0].size))
+
+
+@dataclass(frozen=True)
+class MethodOnCase:
+    """One method on one mesh of one case.
+
+    Attributes
+    ----------
+    case, solver : str
+    level : int
+    size : float or None
+        Of the elements, m.
+    unknowns : int or None
+    displacement, energy_norm, jump : (value, low, high) or None
+        Relative errors with the intervals in which they lie.
+    energy : float or None
+        Relative error of the strain energy.
+    critical_step : float or None
+        Over that of the uncut mesh; None where the method has none or its mesh is not the
+        background mesh.
+    seconds : float or None
+        Wall time of what each cut costs anew, median.
+    reason : str
+        Why there is no answer or no comparison.
+    changed : str
+        What the method moved, removed or left out: the largest of each kind.
+    """
+
+    case: str
+    solver: str
+    level: int
+    size: float | None
+    unknowns: int | None
+    displacement: tuple[float, float, float] | None
+    energy_norm: tuple[float, float, float] | None
+    jump: tuple[float, float, float] | None
+    energy: float | None
+    critical_step: float | None
+    seconds: float | None
+    reason: str
+    changed: str
+
+
+def compare_methods(scenes: Sequence[Scene], results: Sequence[CaseResult]) -> list[MethodOnCase]:
+    """Sum up what the runner has solved and measured, and add critical steps."""
+    found = []
+    for scene, result in zip(scenes, results, strict=True):
+        steps = _critical_steps(scene, {record.solver for record in result.solves})
+        times = {
+            (point.solver, point.level): point.seconds
+            for metric in ("displacement_l2", "energy_norm")
+            for point in work_points(result.solves, metric)
+        }
+        for record in result.solves:
+            if record.solver != "reference":
+                key = record.solver, record.level
+                found.append(_summed_up(scene.name, record, times.get(key), steps.get(key)))
+    return found
+
+
+def _summed_up(
+    case: str, record: SolveRecord, seconds: float | None, step: float | None
+) -> MethodOnCase:
+    displacement, energy_norm, jump = (
+        _interval(record.metric(name)) for name in ("displacement_l2", "energy_norm", "jump_l2")
+    )
+    reason = record.reason if record.status is not Status.SOLVED else ""
+    if not reason and displacement is None:
+        reason = record.notes.get("comparison", "not compared")
+    changed = "; ".join(
+        f"{one.kind}: {one.count}, {one.size:.2g} {one.unit}"
+        for one in record.regularisations
+        if one.size
+    )
+    return MethodOnCase(
+        case, record.solver, record.level, record.size, record.unknowns, displacement,
+        energy_norm, jump, _relative(record.metric("strain_energy")), step, seconds, reason,
+        changed,
+    )  # fmt: skip
+
+
+def _interval(metric: Metric | None) -> tuple[float, float, float] | None:
+    if metric is None:
+        return None
+    return (
+        metric.value,
+        max(metric.value - metric.uncertainty, 0.0),
+        (metric.value + metric.uncertainty),
+    )
+
+
+def _relative(metric: Metric | None) -> float | None:
+    if metric is None or not metric.reference:
+        return None
+    return metric.value / metric.reference - 1.0
+
+
+def _critical_steps(scene: Scene, solvers: Set[str]) -> Mapping[tuple[str, int], float]:
+    """Over that of the uncut mesh, by solver and level, of those that hand over their system."""
+    # any density does: the ratio does not depend on it
+    heavy = scene.material.model_copy(update={"density": scene.material.density or 1.0})
+    scene = scene.model_copy(update={"material": heavy})
+    found = {}
+    for name in sorted(solvers - {"reference"}):
+        system: Any = getattr(find_solver(name), "system", None)
+        for level in range(scene.mesh.count) if system is not None else ():
+            try:
+                own, whole = with_uncut_twin(system, scene, level, {})
+                found[name, level] = critical_step(own) / critical_step(whole)
+            except (UnsupportedSceneError, InputError):
+                continue  # the solver has said why
+    return found
 
 
 @dataclass(frozen=True)

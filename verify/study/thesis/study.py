@@ -18,11 +18,8 @@ from verify.simulator.thesis.delays import (
 )
 from verify.simulator.thesis.real_time import CUTS, TETRAHEDRA, real_time, step_times
 from verify.study.record import Study
-from verify.study.thesis.measured import Measured
-from verify.study.thesis.methods_compared import compare_methods
-from verify.study.thesis.sliver_systems import sliver_systems
-from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
-from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
+from verify.study.thesis.measured import Measured, compare_methods, sliver_systems
+from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 # exact without tips, exact with tips inside elements, and references in the plane and in space
 CASES = (
