@@ -24,11 +24,50 @@ from verify.study.calibration.still_scenes import (
     solid_smooth,
     tip,
 )
-from verify.study.calibration.study import Trial
 
 Content = dict[str, Any]
 
 _SCENES, _QUICK_SCENES = 15, 2
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a reference states of one number, and how far off it is; relative.
+
+    Parameters
+    ----------
+    family : str
+    scene, degree, level : int
+        Which scene of the family, degree of the elements, and the finest of the three levels.
+    quantity : str
+        An error norm of the finest level, or a quantity of interest.
+    stated, true : float
+        Half-width that the reference states, and its true error.
+    known : float
+        How well the true error is known.
+    left_out : str
+        Why it does not count; empty if it does.
+    """
+
+    family: str
+    degree: int
+    level: int
+    quantity: str
+    stated: float
+    true: float
+    known: float
+    left_out: str = ""
+    scene: int = 0
+
+    @property
+    def covered(self) -> bool:
+        """Whether the stated half-width covers the true error."""
+        return bool(self.true <= self.stated + self.known)
+
+    @property
+    def ratio(self) -> float:
+        """Stated over true."""
+        return self.stated / self.true if self.true > 0.0 else float("inf")
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from verify.runner.tasks import Task, all_made
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
-from verify.study.calibration.families import Family, families
-from verify.study.calibration.series import series_families
+from verify.study.calibration.families import Family, Trial, families, series_families
 from verify.study.record import Finding, Study
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
@@ -38,46 +37,6 @@ _LEVELS = 3  # that a reference is made of
 _ROUND_OFF = 1e-10
 # A truth that is itself uncertain by more than this share of the error judges nothing
 _SURE = 0.1
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What a reference states of one number, and how far off it is; relative.
-
-    Parameters
-    ----------
-    family : str
-    scene, degree, level : int
-        Which scene of the family, degree of the elements, and the finest of the three levels.
-    quantity : str
-        An error norm of the finest level, or a quantity of interest.
-    stated, true : float
-        Half-width that the reference states, and its true error.
-    known : float
-        How well the true error is known.
-    left_out : str
-        Why it does not count; empty if it does.
-    """
-
-    family: str
-    degree: int
-    level: int
-    quantity: str
-    stated: float
-    true: float
-    known: float
-    left_out: str = ""
-    scene: int = 0
-
-    @property
-    def covered(self) -> bool:
-        """Whether the stated half-width covers the true error."""
-        return bool(self.true <= self.stated + self.known)
-
-    @property
-    def ratio(self) -> float:
-        """Stated over true."""
-        return self.stated / self.true if self.true > 0.0 else float("inf")
 
 
 def trials_of(family: str, index: int, seed: int) -> list[Trial]:
