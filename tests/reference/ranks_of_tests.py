@@ -1,4 +1,4 @@
-"""Running what a test writes down on some MPI ranks, in processes of their own."""
+"""Running what a test writes down on two MPI ranks, and on the one that this process is."""
 
 import pickle
 import subprocess
@@ -10,14 +10,16 @@ import pytest
 from verify.errors import InputError
 from verify.runner.ranks import mpiexec
 
-_BEFORE = """
-import pickle, sys
-sys.path[:0] = {tests!r}
+_ONE = """
 from reference.dolfinx_versions import import_dolfinx
 import_dolfinx()
 import numpy as np
 from mpi4py import MPI
 world = MPI.COMM_WORLD
+"""
+_BEFORE = """
+import pickle, sys
+sys.path[:0] = {tests!r}
 """
 _AFTER = """
 if world.rank == 0:
@@ -26,17 +28,24 @@ if world.rank == 0:
 """
 
 
-def on_ranks(count, code, folder):
-    """Give the `answer` that `code` finds on the first of `count` ranks, called `world` there."""
+def on_one_rank_and_two(code, folder):
+    """Give the `answer` of `code` in this process and on the first of two ranks, its `world`."""
+    here = {}
+    exec(_ONE + code, here)
+    assert here["world"].size == 1
+    return here["answer"], _on_two(code, folder)
+
+
+def _on_two(code, folder):
     try:
         launcher = mpiexec()
     except InputError as error:
         pytest.skip(str(error))
-    out = folder / f"{count}.pickle"
+    out = folder / "answer.pickle"
     here = Path(__file__).parent
-    before = _BEFORE.format(tests=[str(here), str(here.parent)])
+    before = _BEFORE.format(tests=[str(here), str(here.parent)]) + _ONE
     done = subprocess.run(
-        [launcher, "-n", str(count), sys.executable, "-c",
+        [launcher, "-n", "2", sys.executable, "-c",
          f"{before}\n{code}\n{_AFTER.format(out=str(out))}"],
         capture_output=True,
         text=True,
@@ -45,5 +54,5 @@ def on_ranks(count, code, folder):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     size, answer = pickle.loads(out.read_bytes())
-    assert size == count
+    assert size == 2
     return answer

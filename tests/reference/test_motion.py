@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from ranks_of_tests import on_ranks
+from ranks_of_tests import on_one_rank_and_two
 from reference_scenes import needs_fenicsx, polyline, square
 from scipy.sparse.linalg import eigsh
 
@@ -292,8 +292,7 @@ for name, scene, solver, given in [
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ranks")
-    return [on_ranks(count, _MOTIONS, folder) for count in (1, 2)]
+    return on_one_rank_and_two(_MOTIONS, tmp_path_factory.mktemp("ranks"))
 
 
 def test_two_ranks_move_every_point_as_one_does(answers):
