@@ -32,9 +32,10 @@ def run(line: str, folder: Path) -> CompletedProcess[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
-    (tmp_path / "my_case.toml").write_text(
-        blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8"
-    )
+    case = blocks("guide/write-a-case.md", "toml")[0]
+    # a reference four digits better than the 20 % that are asked, in a tenth of the time of eight
+    case = case.replace("[48, 16], ", "") + "[reference]\nsize = 0.01\n"
+    (tmp_path / "my_case.toml").write_text(case, encoding="utf-8")
     lines = [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
     assert len(lines) >= 3
     for line in [line for line in lines if line not in ELSEWHERE]:

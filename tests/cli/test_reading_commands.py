@@ -10,9 +10,10 @@ import textwrap
 import time
 
 import pytest
+from command_line import run_here
 
-from verify.cli import build_parser, main
-from verify.cli.progress import said_to_wait
+from verify.cli import build_parser, main, progress
+from verify.cli.progress import Waiting, said_to_wait
 from verify.cli.run import of_one_solver, of_solvers
 from verify.cli.streams import print_line, printable_streams
 from verify.scene import list_cases, load_scene, load_scenes
@@ -62,21 +63,26 @@ def test_describe_says_the_requirement_and_every_check(case, capsys):
     assert type(scene).model_validate(content).model_dump() == scene.model_dump()
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import verify.cli",
-        "from verify.cli import main; main(['list'])",
-        "from verify.cli import main; main(['describe', 'statics/f1_patch'])",
-        "from verify.cli import main; main(['schema'])",
-    ],
-)
-def test_reading_commands_load_no_solver_and_no_graphics_and_importing_them_nothing(code):
-    probe = f"{code}\nimport sys; print(*sorted({{n.partition('.')[0] for n in sys.modules}}))"
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.splitlines()[-1].split())
-    assert loaded.isdisjoint(HEAVY)
-    assert code != "import verify.cli" or loaded.isdisjoint(("numpy", "pydantic", "rich"))
+READING = """
+import sys
+def loaded():
+    print("loaded", *sorted({name.partition(".")[0] for name in sys.modules}))
+from verify.cli import main
+loaded()
+for words in (["list"], ["describe", "statics/f1_patch"], ["schema"]):
+    main(words)
+    loaded()
+"""
+
+
+def test_reading_commands_load_no_solver_and_no_graphics_and_importing_them_nothing():
+    command = [sys.executable, "-c", READING]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    said = [line.split() for line in done.stdout.splitlines() if line.startswith("loaded ")]
+    assert len(said) == 4
+    for loaded in said:
+        assert set(loaded).isdisjoint(HEAVY)
+    assert set(said[0]).isdisjoint(("numpy", "pydantic", "rich"))
 
 
 @pytest.mark.parametrize(
@@ -153,12 +159,22 @@ def test_each_solver_gets_its_own():
 
 
 def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
-    # one level and scheme: first order in time, which the case does not accept
-    run = ["run", "dynamics/freed_half", "--solver", "xfem", "--repetitions", "1", "--no-report"]
-    out = ["--out", str(tmp_path / "run"), "--json"]
+    # first order in time: after five steps a fifth further than the parabola
+    text = list_cases()["dynamics/freed_half"].read_text(encoding="utf-8")
+    for given, shorter in {
+        "[[8, 8], [16, 16]]": "[[4, 4]]", "duration = 0.5": "duration = 0.05",
+        "time = 0.3": "time = 0.03", "-1.225": "-0.01225", "-0.441": "-0.00441",
+    }.items():  # fmt: skip
+        assert given in text
+        text = text.replace(given, shorter)
+    (tmp_path / "falls.toml").write_text(text, encoding="utf-8")
+    run = ["run", str(tmp_path / "falls.toml"), "--solver", "xfem", "--repetitions", "1"]
+    out = ["--out", str(tmp_path / "run"), "--json", "--no-report"]
     assert main([*run, *out, "--set", "xfem.scheme=implicit_euler"]) != 0
     (case,) = json.loads(capsys.readouterr().out)["cases"]
     assert case["verdict"] == "FAIL"
+    found = {check["metric"]: check["observed"] for check in case["verdicts"]}
+    assert found == pytest.approx({"fall": -0.01225 * 1.2, "fall_on_the_way": -0.00441 * 4 / 3})
     assert main(["run", "dynamics/freed_half", "--set", "xfme.scheme=newmark"]) == 2
     assert "no solver 'xfme'" in capsys.readouterr().err
     assert main(["run", "statics/f1_patch", "--set", "xfem.tip=middle", *out[:2]]) == 2
@@ -173,25 +189,43 @@ SLOW = """
             return None
         def levels(self, scene): return 1
         def solve(self, scene, level, repetitions=1):
-            time.sleep(9)
+            time.sleep(2)
             raise ValueError("nothing")
 """
 
 
-def test_a_long_solve_says_through_a_pipe_what_is_waited_for(tmp_path):
+def test_a_long_solve_says_through_a_pipe_what_is_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(progress, "_FIRST", 0.5)
     (tmp_path / "slow.py").write_text(textwrap.dedent(SLOW))
+    monkeypatch.syspath_prepend(str(tmp_path))
     command = ["run", "statics/f1_patch", "--solver", "slow:Slow", "--out", "out", "--no-report"]
-    done = subprocess.run(
-        [sys.executable, "-m", "verify", *command, "--quick", "--judge", "slow:Slow"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=120,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(tmp_path)])},
-    )  # fmt: skip
+    paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = run_here([*command, "--quick", "--judge", "slow:Slow"], tmp_path, paths)
     waits = [line for line in done.stderr.splitlines() if line.startswith("…")]
     of_solve = [line for line in waits if "statics/f1_patch · slow:Slow · level 0" in line]
-    assert len(of_solve) >= 2  # after 2 s and after 6 s
+    assert len(of_solve) >= 2  # after 0.5 s and after 1.5 s
     assert len(of_solve) < 5
     assert "\r" not in done.stderr
     assert "\x1b" not in done.stderr
+
+
+def test_after_a_word_the_next_silence_is_as_short_as_the_first(monkeypatch):
+    monkeypatch.setattr(progress, "_FIRST", 0.03)
+    said = io.StringIO()
+    waiting = Waiting(said, lambda: "something")
+
+    def until(lines, seconds):
+        end = time.monotonic() + seconds
+        while said.getvalue().count("…") < lines and time.monotonic() < end:
+            time.sleep(0.01)
+        return said.getvalue().count("…") == lines
+
+    try:
+        assert until(5, 60.0)  # and the sixth after 0.96 s more
+        waiting.say("a word")
+        assert until(6, 0.6)
+    finally:
+        waiting.close()
 
 
 def test_nothing_is_said_of_what_is_soon_done(capsys):

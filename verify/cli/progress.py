@@ -27,20 +27,23 @@ class Waiting:
 
     def __init__(self, stream: TextIO, doing: Callable[[], str]) -> None:
         self._stream, self._doing = stream, doing
-        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._changed, self._ended = threading.Condition(), False
         self._said, self._patience = monotonic(), _FIRST
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
 
     def say(self, text: str) -> None:
         """Write a line; what is waited for now has begun."""
-        with self._lock:
+        with self._changed:
             self._write(text)
             self._patience = _FIRST
+            self._changed.notify()
 
     def close(self) -> None:
         """Say no more."""
-        self._ended.set()
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
         self._thread.join()
 
     def _write(self, text: str) -> None:
@@ -48,13 +51,15 @@ class Waiting:
         self._said = monotonic()
 
     def _watch(self) -> None:
-        while not self._ended.wait(max(0.0, self._said + self._patience - monotonic())):
-            with self._lock:
-                if monotonic() >= self._said + self._patience:
-                    self._patience = min(2 * self._patience, _LONGEST)
-                    self._said = monotonic()
-                    if doing := self._doing():
-                        self._write(f"… {doing}")
+        with self._changed:
+            while not self._ended:
+                if (left := self._said + self._patience - monotonic()) > 0.0:
+                    self._changed.wait(left)
+                    continue
+                self._patience = min(2 * self._patience, _LONGEST)
+                self._said = monotonic()
+                if doing := self._doing():
+                    self._write(f"… {doing}")
 
 
 @contextmanager
