@@ -16,7 +16,7 @@ from verify.runner import selection
 from verify.runner.families import Families
 from verify.runner.selection import select_cases
 from verify.scene import load_scene, load_scenes, loading
-from verify.solvers import named
+from verify.solvers import interface
 from verify.study.measured_scenes import variant_of
 
 ROWS = "\n[parameters]\nepsilon = [0.5, 0.0]\n"
@@ -227,7 +227,7 @@ def test_a_bad_one_is_said_before_anything_is_solved(verify, command, asked, sai
 
 
 def test_parameters_in_a_name_are_values_and_those_of_the_solver():
-    assert named.parameters_in("a b=1 c=1e-3 d=.5 e=true f=text") == {
+    assert interface.parameters_in("a b=1 c=1e-3 d=.5 e=true f=text") == {
         "b": 1, "c": 1e-3, "d": 0.5, "e": True, "f": "text",
     }  # fmt: skip
     for asked in (

@@ -6,8 +6,7 @@ from thesis_stages import CASES, stage
 
 from verify.scene import load_scene
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.solvers.cuts_of_scene import cuts_of
-from verify.solvers.openings_of_scene import Openings
+from verify.solvers.openings_of_scene import Openings, cuts_of
 from verify.xfem.phantom import cut_mesh
 
 

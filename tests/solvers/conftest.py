@@ -2,7 +2,7 @@
 
 import pytest
 
-from verify.solvers.staged_account import StagedAccount
+from verify.solvers.motion_of_scene import StagedAccount
 from verify.xfem.energy_balance import BalanceRecorder
 
 

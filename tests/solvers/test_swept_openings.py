@@ -22,7 +22,7 @@ from verify.errors import InputError
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import load_scene
 from verify.solvers import find_solver, motion_of_scene
-from verify.solvers.xfem_steps import SCHEMES
+from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.explicit import acceleration_of
 
 METHODS = ("xfem", "virtual_node", "subdivision", "snapping")

@@ -21,7 +21,7 @@ from verify.scene import load_scene
 from verify.solvers.interface import find_solver
 from verify.solvers.openings_of_scene import Openings
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_steps import SCHEMES
+from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.cuts import Polyline
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh

@@ -188,7 +188,7 @@ def conform(
     from verify.cli.progress import said_to_wait
     from verify.cli.run import of_one_solver
     from verify.conformance import conform, exit_code_of
-    from verify.solvers.named import one_name, parameters_of, solver_in
+    from verify.solvers.interface import one_name, parameters_of, solver_in
 
     name = one_name(solver)
     given = parameters_of(name, {solver_in(name): of_one_solver(parameters)})

@@ -18,7 +18,7 @@ from verify.ranking import ranked_solvers
 from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_digest, code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
-from verify.solvers.named import solver_in
+from verify.solvers.interface import solver_in
 
 RANKING_FILE = "ranking.json"
 _SECONDS = 120.0  # for each small solve of the suite

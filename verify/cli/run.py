@@ -191,7 +191,7 @@ def run(
 def _solvers_of(asked: RunOptions) -> tuple[list[str], dict[str, dict[str, Any]]]:
     """Return the solvers that are asked for, and the parameters of each."""
     from verify.runner.checking import check_solver_name
-    from verify.solvers.named import one_name, parameters_of
+    from verify.solvers.interface import one_name, parameters_of
 
     names = [
         name for entry in asked.solvers for part in entry.split(",") if (name := one_name(part))
@@ -210,7 +210,7 @@ def _options(
 ) -> "Options":
     from verify.runner import Options
     from verify.runner.fingerprint import cache_folder
-    from verify.solvers.named import one_name
+    from verify.solvers.interface import one_name
 
     return Options(
         solvers=tuple(dict.fromkeys(names)),
@@ -330,6 +330,6 @@ def _split(text: str, given: str, example: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not equals or not name.isidentifier():
         raise InputError(f"--set {given}: expected NAME=VALUE, e.g. {example}")
-    from verify.solvers.named import plain_value
+    from verify.solvers.interface import plain_value
 
     return name, plain_value(value)

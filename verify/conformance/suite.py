@@ -11,7 +11,7 @@ from verify.conformance.checks import checks
 from verify.conformance.trials import Outcome, Trial, solve_trials
 from verify.errors import InputError
 from verify.scene.strict import nearest
-from verify.solvers.named import parameters_in
+from verify.solvers.interface import parameters_in
 
 
 def conform(

@@ -22,8 +22,7 @@ from verify.runner.solve import solve_job
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
 from verify.solvers import check_parameters, find_solver
-from verify.solvers.interface import is_built_in
-from verify.solvers.named import solver_in
+from verify.solvers.interface import is_built_in, solver_in
 
 _START_SECONDS = 120.0  # importing a solver may start MPI or compile
 

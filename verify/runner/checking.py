@@ -9,7 +9,7 @@ from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.placement import empty_region, part_without_mesh
 from verify.scene.strict import nearest
 from verify.solvers import solver_names
-from verify.solvers.named import parameters_in, solver_in
+from verify.solvers.interface import parameters_in, solver_in
 
 _CHECKED = 200_000  # most nodes of the coarsest mesh of a scene whose mechanics are checked: 1 s
 

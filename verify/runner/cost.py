@@ -15,8 +15,7 @@ import numpy as np
 from reference.deformation import wave_speed
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.placement import points_of_body
-from verify.solvers.interface import is_built_in
-from verify.solvers.named import solver_in
+from verify.solvers.interface import is_built_in, solver_in
 
 REFERENCE = "reference"
 _FENICSX = ("conforming", REFERENCE)

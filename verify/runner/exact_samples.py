@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from verify.geometry.nearest import distance_to_pieces
 from verify.geometry.spatial import measures, unit_normals
-from verify.solvers.boundary_of_scene import Boundary
+from verify.solvers.loads_of_scene import Boundary
 from verify.xfem.mesh import SimplexMesh
 
 Array = NDArray[np.float64]

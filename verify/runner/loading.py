@@ -21,8 +21,7 @@ from verify.processes import die_with_parent
 from verify.runner.child import POLL_SECONDS, Child, telling_line
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.selection import Options
-from verify.solvers.interface import is_built_in, module_of
-from verify.solvers.named import parameters_of, solver_in
+from verify.solvers.interface import is_built_in, module_of, parameters_of, solver_in
 
 _SECONDS = (60.0, 300.0)  # for importing a solver: at least, at most
 

@@ -20,7 +20,7 @@ from verify.runner.references import REFERENCE, ReferenceBundle
 from verify.runner.selection import Options
 from verify.scene import Scene
 from verify.scene.strict import nearest
-from verify.solvers.named import parameters_of
+from verify.solvers.interface import parameters_of
 
 _FEWEST = 3  # levels from which a reference has an error bar
 

@@ -88,8 +88,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
-    from verify.solvers.interface import checked_levels, checked_refusal
-    from verify.solvers.named import solver_in
+    from verify.solvers.interface import checked_levels, checked_refusal, solver_in
 
     if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
         sys.path.append(os.getcwd())

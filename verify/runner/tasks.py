@@ -26,8 +26,7 @@ from verify.runner.directory import emptied, folder_name
 from verify.runner.fingerprint import code_digest, code_of_solver, digest_of
 from verify.runner.loading import source_of
 from verify.solvers import find_solver
-from verify.solvers.interface import is_built_in
-from verify.solvers.named import solver_in
+from verify.solvers.interface import is_built_in, solver_in
 from verify.whole_files import write_whole
 
 _FOUND, _WHY = "found.json", "why.json"

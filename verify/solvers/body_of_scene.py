@@ -16,7 +16,7 @@ from verify.scene import (
     Scene,
     read_mesh,
 )
-from verify.solvers.cells_of_scene import grid_of
+from verify.solvers.runs import grid_of
 from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh

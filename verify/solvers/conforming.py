@@ -18,11 +18,10 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Regularisation, Solution
-from verify.solvers.cells_of_scene import across_interfaces
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
 from verify.solvers.interface import check_choices
-from verify.solvers.runs import Record, at_rest, repeated
+from verify.solvers.runs import Record, across_interfaces, at_rest, repeated
 from verify.solvers.timeline import OPENINGS
 from verify.system import System
 

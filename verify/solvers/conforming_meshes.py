@@ -37,7 +37,7 @@ from verify.scene import (
 )
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.tool_path import Cut
-from verify.solvers.cells_of_scene import grid_of
+from verify.solvers.runs import grid_of
 
 Array = NDArray[np.float64]
 _WAY = {2: 1 / 16, 3: 1 / 2}  # size of elements along the way of a blade, over that far away

@@ -27,8 +27,7 @@ from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
-from verify.solvers.account import Account
-from verify.solvers.runs import Record
+from verify.solvers.runs import Account, Record
 from verify.solvers.timeline import blade_advance, march, step_sizes, timeline_of
 
 Array = NDArray[np.float64]

@@ -1,10 +1,16 @@
-"""The interface that every solver implements, and how a solver is found by its name."""
+"""The interface that every solver implements, and how a solver is found by its name.
 
+A name may bring parameters, ``xfem tip=partial mass=consistent``: a solver of its own, with rows
+and verdicts beside those of ``xfem``.
+"""
+
+import json
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
+from math import isfinite
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any, Protocol
@@ -16,7 +22,6 @@ from verify.printable import one_line, shown, words_of
 from verify.scene import Scene
 from verify.scene.strict import nearest
 from verify.solution import Solution
-from verify.solvers.named import solver_in
 
 _LONGEST = 400  # characters of a refusal: it stands in every record of the solver
 
@@ -229,3 +234,60 @@ def check_choices(
         if word in given and given[word] not in tuple(known):
             expected = f"expected one of {', '.join(map(str, known))}"
             raise InputError(f"{name}.{word} = '{given[word]}'; {expected}")
+
+
+#
+# Such a name is a solver of its own, with rows and verdicts beside those of ``xfem``.
+
+
+def one_name(asked: str) -> str:
+    """Return `asked` with single spaces: how records and reports name this solver."""
+    return " ".join(asked.split())
+
+
+def solver_in(name: str) -> str:
+    """Return the solver's own name, without parameters."""
+    return name.partition(" ")[0]
+
+
+def parameters_in(name: str) -> dict[str, Any]:
+    """Return the parameters that stand in a name.
+
+    Raises
+    ------
+    InputError
+        If a word of it is not ``PARAMETER=VALUE``, a parameter stands there twice, or a value is
+        not finite.
+    """
+    parameters: dict[str, Any] = {}
+    for word in name.split()[1:]:
+        key, _, value = word.partition("=")
+        if not key or not value or key in parameters:
+            form = "NAME PARAMETER=VALUE …, each parameter once"
+            raise InputError(f"'{word}' in '{name}'; expected {form}", "--solver")
+        parameters[key] = plain_value(value)
+    return parameters
+
+
+def parameters_of(name: str, given: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return those in a name, over what is `given` to its solver under the solver's own name."""
+    return {**given.get(solver_in(name), {}), **parameters_in(name)}
+
+
+def plain_value(text: str) -> Any:
+    """Return what a value says: a number or another value of JSON, else the text itself.
+
+    Raises
+    ------
+    InputError
+        If it is no finite number: records have no word for it.
+    """
+    for read in (json.loads, float):
+        try:
+            found = read(text)
+        except ValueError:
+            continue
+        if isinstance(found, float) and not isfinite(found):
+            raise InputError(f"'{text}' as a parameter; expected a finite value")
+        return found
+    return text

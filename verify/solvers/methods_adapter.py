@@ -20,18 +20,15 @@ from verify.solvers.body_of_scene import (
     errors_of_scene,
     material_of,
 )
-from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.interface import check_choices
-from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import CutMotion, Marching
-from verify.solvers.openings_of_scene import openings_of
+from verify.solvers.opening_bodies import MethodOpening
+from verify.solvers.openings_of_scene import cuts_of, openings_of
 from verify.solvers.runs import Record, check_steps, repeated
 from verify.solvers.timeline import OPENINGS, timeline_of
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_answer import solution_on, springs_left_out
-from verify.solvers.xfem_static import Law, solve_equilibrium
-from verify.solvers.xfem_steps import EXPLICIT, SCHEMES
-from verify.solvers.xfem_system import elasticity_of, system_of
+from verify.solvers.xfem_answer import Law, solution_on, solve_equilibrium, springs_left_out
+from verify.solvers.xfem_system import EXPLICIT, SCHEMES, elasticity_of, system_of
 from verify.system import System
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass

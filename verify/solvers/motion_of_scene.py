@@ -1,9 +1,8 @@
-"""Motion of a body on virtual nodes, which is made anew whenever its cuts open further."""
+"""Motion of a body on virtual nodes, made anew whenever its cuts open further, and its account."""
 
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -12,22 +11,17 @@ from scipy.sparse import csr_array
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.handed_over import CONSISTENT
-from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
+from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.initial import starts_open
-from verify.scene.physics import factor_at, first_factor
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
-from verify.solvers.loads_of_scene import forces_of, is_moving
 from verify.solvers.openings_of_scene import Openings
-from verify.solvers.runs import Record
-from verify.solvers.staged_account import StagedAccount
-from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports
+from verify.solvers.runs import Account, Record
 from verify.solvers.timeline import Timeline, blade_advance, march, step_sizes
-from verify.solvers.xfem_steps import integrator_of, largest_step
+from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
-from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
-from verify.xfem.energy_balance import BalanceRecorder
-from verify.xfem.equilibrium import static_equilibrium
+from verify.xfem.body import DynamicBody, Integrator, MotionState
+from verify.xfem.energy_balance import BalanceRecorder, EnergyBalance
 from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import NewtonIntegrator
@@ -35,9 +29,79 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.release import hold_released
-from verify.xfem.supports import check_bodies
 
 _Floats = NDArray[np.float64]
+_STAGE = {
+    "load_work": "work_of_loads",
+    "support_work": "work_of_supports",
+    "damping": "damping",
+    "algorithmic": "algorithmic",
+    "unbalanced": "unbalanced",
+    "cut_work": "cut_work",
+}
+
+
+class StagedAccount(Account):
+    """Account over the stages between openings; work goes on from stage to stage.
+
+    Parameters
+    ----------
+    removal : bool
+        Whether openings take material away: its energy and mass have entries of their own.
+    """
+
+    def __init__(self, removal: bool = False) -> None:
+        super().__init__()
+        self._done = dict.fromkeys(_STAGE.values(), 0.0)
+        self._turned: float | _Floats = 0.0  # angular impulse of tie forces, N m s
+        self._projection = 0.0
+        self._removed = dict.fromkeys(("removed_energy", "removed_mass") if removal else (), 0.0)
+        self._penalty: list[float] = []
+
+    def leave(self, ledger: EnergyBalance, instants: list[int]) -> None:
+        """Enter the rows of a stage that are asked for, and keep what it has done in all."""
+
+        def done(k: int) -> dict[str, float]:
+            found = {
+                name: self._done[name] + float(getattr(ledger, column)[k])
+                for column, name in _STAGE.items()
+            }
+            return {**found, "projection": self._projection}
+
+        for k in instants:
+            state = {n: float(getattr(ledger, n)[k]) for n in ("kinetic", "strain", "gravity")}
+            momenta = ledger.momentum[k], ledger.angular_momentum[k]
+            self.enter(state, done(k), *momenta, self._turned + ledger.cut_turn[k], self._removed)
+            self._penalty.append(float(ledger.penalty[k]))
+        self._done, self._turned = done(-1), self._turned + ledger.cut_turn[-1]
+
+    def open(
+        self, body: DynamicBody, state: MotionState, further: DynamicBody, inherited: MotionState
+    ) -> None:
+        """Enter the energy that is lost where a body that is cut further takes over a state.
+
+        Nothing without a sliver policy and with masses of one part each. What a policy loses by
+        its projection has an entry of its own, and what EVS and GEVS gain or lose with it.
+        What is removed takes its energy and its mass with it.
+        """
+        before, after = (
+            float(BalanceRecorder(*of).close().mechanical[0])
+            for of in ((body, state), (further, inherited))
+        )
+        if self._removed:
+            self._removed["removed_energy"] += before - after
+            self._removed["removed_mass"] += float(
+                body.mass.weights.sum() - further.mass.weights.sum()
+            )
+        else:
+            self._projection += before - after
+
+    def columns(self) -> dict[str, _Floats]:
+        """All entries (t,) by name; with the share of a ghost penalty in the strain energy."""
+        penalty = {"penalty": np.array(self._penalty)} if any(self._penalty) else {}
+        return super().columns() | penalty
+
+
 # dof nodes and the time at which they are let go, to factors over time
 Fade = Callable[[NDArray[np.int64], float], Callable[[float], _Floats]]
 
@@ -150,7 +214,7 @@ class CutMotion:
         at_once = opening.fading(body.force.phantom) is None
         self._entered = start if at_once else -np.inf  # events until then are taken up
         with record.timed("initial state"):
-            state = _initial_state(scene, body, exact)
+            state = initial_state(scene, body, exact)
         self._take(body, state)
 
     def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
@@ -235,7 +299,7 @@ class CutMotion:
         with self.record.timed(self.opening.phase):
             phantom = self.opening.at(time, passed)
         with self.record.timed("loading"):
-            return _body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
+            return body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
 
     def _take(self, body: DynamicBody, state: MotionState) -> None:
         """Go on with a body and its state."""
@@ -312,70 +376,3 @@ class CutMotion:
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["a tool path opens"] = self.opening.rule
             record.notes |= blade_advance(self.scene, sizes, self.opening.openings.size)
-
-
-def _body_in_motion(scene: Scene, force: InternalForce, mass: Mass, exact: Any) -> DynamicBody:
-    """Give a body with elasticity and mass the loads, supports and damping of a scene."""
-    phantom = force.phantom
-    weight = np.zeros_like(phantom.node_points)
-    driven: list[tuple[Any, Callable[[float], _Floats]]] = []  # history, and forces at a time
-    for i, load in enumerate(scene.loads):
-        if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
-            weight += mass.weight(load.acceleration)
-        else:
-            at = partial(forces_of, scene, i, phantom, exact)
-            driven.append((load.history, at if is_moving(load, exact) else _always(at(0.0))))
-
-    def load_at(time: float) -> _Floats:
-        total = np.zeros_like(weight)
-        for history, forces in driven:
-            total += factor_at(history, time) * forces(time)
-        return total
-
-    return DynamicBody(
-        force,
-        mass,
-        weight,
-        load_at if driven else None,
-        motion_of_supports(scene, phantom, exact),
-        RayleighDamping(*scene.analysis.damping),
-    )
-
-
-def _always(forces: _Floats) -> Callable[[float], _Floats]:
-    return lambda _time: forces
-
-
-def _initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
-    """Return the state of a body at the time 0, before what opens then.
-
-    Raises
-    ------
-    UnsupportedBodyError, NotInEquilibriumError
-        If it is to be an equilibrium, and a piece is not held or none is found.
-    """
-    state, initial, phantom = body.rest(), scene.initial, body.force.phantom
-    free = ~body.fixed
-    if isinstance(initial, Moving):
-        state.velocity[free] = initial.velocities(phantom.node_points)[free]
-    elif isinstance(initial, InitialField):
-        u, v = initial.state(phantom.node_points, phantom.node_piece_points, exact)
-        state.displacement[free], state.velocity[free] = u[free], v[free]
-    elif isinstance(initial, Equilibrium):
-        state.displacement[:] = _equilibrium(scene, body, exact)
-    return state
-
-
-def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
-    """Displacement at rest under the loads and supports as their histories begin."""
-    phantom = body.force.phantom
-    assert body.weight is not None
-    load = body.weight.copy()
-    for i, entry in enumerate(scene.loads):
-        if not isinstance(entry, Gravity):
-            load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
-    path = path_of_supports(scene, phantom, exact)
-    check_bodies(phantom, path(1.0))
-    return static_equilibrium(
-        body.force, body.fixed, lambda share: path(share).values, load
-    ).displacement

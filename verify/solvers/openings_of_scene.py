@@ -1,19 +1,88 @@
-"""Times from which on the cuts of a moving scene have opened what, on any mesh that is cut."""
+"""Cuts of a scene as level sets, and when those of a moving one have opened what of a mesh."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.errors import UnsupportedSceneError
 from verify.geometry.swept_shares import CutSimplices, SweptShares
-from verify.scene import Scene, ToolPathCut
-from verify.solvers.cuts_of_scene import cuts_of
+from verify.methods.tip_nodes import with_tip_nodes
+from verify.scene import (
+    ArcCut,
+    CylinderCut,
+    DiscCut,
+    PolygonCut,
+    Scene,
+    SphereCut,
+    SweptCut,
+    ToolPathCut,
+)
+from verify.solution import Regularisation
 from verify.solvers.timeline import Timeline
-from verify.xfem.cuts import Cut
+from verify.xfem.crossing import TipRule
+from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
+
+_ARC_SEGMENTS_PER_CELL = 8
+
+
+def cuts_of(scene: Scene, size: float) -> list[Cut]:
+    """Return the cuts as the solver's own; an arc that ends is sampled finely against `size`."""
+    return [_cut(cut, size) for cut in scene.cuts]
+
+
+class ToCut(NamedTuple):
+    """What the library is to cut, by what, by which rule, and what was done for that."""
+
+    mesh: SimplexMesh
+    cuts: list[Cut]
+    rule: TipRule
+    done: list[Regularisation]
+
+
+def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
+    """Prepare a mesh for the tip rule `tip`.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the rule is "partial" and the body a solid.
+    """
+    if tip != "partial":
+        return ToCut(mesh, cuts, tip, [])
+    if mesh.dim == 3:
+        raise UnsupportedSceneError(
+            "tip = 'partial' in a solid; it is offered for triangles, other tip rules are for both"
+        )
+    nodes = with_tip_nodes(mesh, cuts)
+    kind, largest = "end of a cut made a node", float(nodes.moved.max(initial=0.0))
+    said = Regularisation(kind, len(nodes.moved), largest, "m")
+    return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said] if len(nodes.moved) else [])
+
+
+def _cut(cut: Any, size: float) -> Cut:
+    match cut:
+        case PolygonCut():
+            return PolygonPatch(cut.points)
+        case DiscCut() | CylinderCut() | SphereCut():
+            (surface,) = cut.pieces()
+            return ImplicitCut(surface.level, None if surface.closed else surface.depth)
+        case SweptCut():  # plane facets: the triangulation is the cut
+            return TriangulatedSurface(*cut.facets())
+        case ToolPathCut() if cut.dimension == 3:
+            return ToolPath.of_tip(cut.points, cut.moments, cut.blade).sweep
+        case ArcCut(sweep=360.0):
+            (circle,) = cut.pieces()
+            return ImplicitCut(circle.level)
+    vertices = cut.vertices(size / _ARC_SEGMENTS_PER_CELL)
+    closed = bool(np.array_equal(vertices[0], vertices[-1]))
+    return Polyline(vertices[:-1] if closed else vertices, closed)
+
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]

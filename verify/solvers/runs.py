@@ -1,6 +1,6 @@
-"""Runs of our solvers: what a run says of itself, repeated and timed."""
+"""What all own solvers share: what a run says of itself, energies over time, cells of a scene."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.scene import Box, Rectangle, Scene, crossed_by_interfaces
 from verify.solution import Regularisation, Solution
 
 
@@ -103,3 +104,95 @@ def repeated[Mesh](
         for phase, seconds in {"meshing": [meshing], **found.timings}.items():
             timings.setdefault(phase, []).extend(seconds)
     return replace(found, timings=timings if repetitions else {})
+
+
+_Floats = NDArray[np.float64]
+_AXES = ("x", "y", "z")
+# entries that only some motions have: left out where they stay zero
+_OF_SOME = ("cut_work", "projection", "cut_angular_impulse")
+_TAKEN = ("damping", "algorithmic", "cut_work", "projection", "removed_energy")
+
+
+class Account:
+    """A row for every output, of whatever has moved."""
+
+    def __init__(self) -> None:
+        self._rows: list[dict[str, float]] = []
+
+    def enter(
+        self,
+        state: Mapping[str, float],
+        done: Mapping[str, float],
+        momentum: _Floats,
+        angular_momentum: _Floats,
+        cut_angular_impulse: _Floats,
+        removed: Mapping[str, float] | None = None,
+    ) -> None:
+        """Enter a row.
+
+        Parameters
+        ----------
+        state : mapping
+            Energies of the state by name, J.
+        done : mapping
+            What was done since the start, J: by the names of `reference.dynamics_step.DONE`.
+        momentum, angular_momentum : (d,), (1 or 3,) array
+            In kg m/s and kg m²/s.
+        cut_angular_impulse : (1 or 3,) array
+            Of the tie forces of what the cuts have released, since the start, N m s.
+        removed : mapping, optional
+            ``removed_energy`` and ``removed_mass``, where openings take material away.
+        """
+        row = {**state, **done, **(removed or {})}
+        total = sum(state.values()) - done["work_of_loads"] - done["work_of_supports"]
+        row["total"] = total + sum(row.get(name, 0.0) for name in _TAKEN)
+        vectors = {
+            "linear_momentum": momentum,
+            "angular_momentum": angular_momentum,
+            "cut_angular_impulse": cut_angular_impulse,
+        }
+        for name, vector in vectors.items():
+            axes = ("z",) if len(vector) == 1 else _AXES[: len(vector)]
+            row |= {f"{name}_{axis}": float(x) for axis, x in zip(axes, vector, strict=True)}
+        self._rows.append(row)
+
+    def columns(self) -> dict[str, _Floats]:
+        """All entries (t,) by name."""
+        names = self._rows[0] if self._rows else {}
+        columns = {name: np.array([row[name] for row in self._rows]) for name in names}
+        return {n: one for n, one in columns.items() if one.any() or not n.startswith(_OF_SOME)}
+
+
+def grid_of(scene: Scene, level: int) -> tuple[list[int] | None, float]:
+    """Cells along each axis, None if unstructured, and element size h in m, of a level.
+
+    Of a mesh that the scene does not give itself, but its pattern and sizes or numbers of cells.
+    """
+    geometry, asked = scene.geometry, scene.mesh
+    if asked.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
+        assert asked.sizes is not None
+        return None, asked.sizes[level]
+    sides = np.subtract(geometry.upper, geometry.lower)
+    if asked.cells is not None:
+        counts = np.array(asked.cells[level])
+    else:
+        assert asked.sizes is not None
+        # a size that divides the side up to round-off is that size
+        counts = np.ceil(sides / asked.sizes[level] * (1 - 1e-9)).astype(int)
+    return counts.tolist(), float((sides / counts).max())
+
+
+def across_interfaces(
+    scene: Scene, points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> list[Regularisation]:
+    """State the cells (m, k + 1) that an interface crosses: of the material at their centroid."""
+    if scene.material.is_uniform:
+        return []
+    crossed = crossed_by_interfaces(scene.material, points, cells)
+    if not crossed.any():
+        return []
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    measures = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0.0))
+    share = float(measures[crossed].sum() / measures.sum())
+    kind = "cell across an interface, of the material at its centroid"
+    return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]

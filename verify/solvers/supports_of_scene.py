@@ -11,7 +11,7 @@ from verify.scene import Scene
 from verify.scene.parts import HeldFacets, held_facets, no_node, points_apart, shifted_ends
 from verify.scene.physics import PrescribedMotion, factor_at, first_factor
 from verify.solution import Regularisation
-from verify.solvers.boundary_of_scene import Boundary
+from verify.solvers.loads_of_scene import Boundary
 from verify.xfem.body import MovingSupports
 from verify.xfem.loads import facet_parts, facet_places
 from verify.xfem.phantom import PhantomMesh

@@ -13,18 +13,15 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, errors_of_scene
-from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import CutMotion, Marching
-from verify.solvers.openings_of_scene import openings_of
+from verify.solvers.opening_bodies import Cutting, XfemOpening
+from verify.solvers.openings_of_scene import cuts_of, openings_of, to_cut
 from verify.solvers.runs import Record, check_steps, repeated
 from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.timeline import OPENINGS, timeline_of
-from verify.solvers.xfem_answer import joined, solution_on, treated
-from verify.solvers.xfem_motion import Cutting, XfemOpening
-from verify.solvers.xfem_static import solve_equilibrium
-from verify.solvers.xfem_steps import MASSES, SCHEMES
-from verify.solvers.xfem_system import elasticity_of, system_of
+from verify.solvers.xfem_answer import joined, solution_on, solve_equilibrium, treated
+from verify.solvers.xfem_system import MASSES, SCHEMES, elasticity_of, system_of
 from verify.system import System
 from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mesh import SimplexMesh

@@ -1,23 +1,44 @@
-"""Elasticity and mass of a body on virtual nodes, and its linear system."""
+"""Elasticity, mass, loads, supports and time steps of a scene for the compact library."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, identity, kron
 
 from verify.accelerated import FAST
-from verify.errors import UnsupportedSceneError
-from verify.scene import Scene
+from verify.errors import InputError, UnsupportedSceneError
+from verify.methods.generalised_alpha import GeneralisedAlpha
+from verify.methods.mass_variants import (
+    eigenvalue_stabilised_mass,
+    generalised_eigenvalue_stabilised_mass,
+    shifted_mass,
+)
+from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
+from verify.scene.physics import factor_at, first_factor
 from verify.solvers.body_of_scene import density_of, material_of
-from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.xfem_steps import MASSES
+from verify.solvers.loads_of_scene import forces_of, is_moving
+from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports, supports_of
 from verify.system import System
 from verify.xfem.block_pattern import body_pattern
+from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
+from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
+from verify.xfem.elasticity import Material
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.linear_solvers import Kernels
-from verify.xfem.mass import Mass
+from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
+from verify.xfem.supports import check_bodies
+
+_Floats = NDArray[np.float64]
 
 
 def elasticity_of(
@@ -83,3 +104,171 @@ def system_of(
         inertia = mass_of(scene, phantom, mass, ghost)
         matrix = csr_array(kron(inertia.matrix, identity(supports.fixed.shape[1])))
     return System(stiffness, matrix, supports.fixed.ravel())
+
+
+SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
+    "newmark": Trapezoidal,
+    "implicit_euler": ImplicitEuler,
+    "energy_momentum": EnergyMomentum,
+    "generalised_alpha": GeneralisedAlpha,
+    "central_differences": CentralDifferences,
+    "symplectic_euler": SymplecticEuler,
+    "forward_euler": ForwardEuler,
+}
+MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
+    "sidewise": side_wise_mass,
+    "consistent": consistent_mass,
+    "evs": eigenvalue_stabilised_mass,
+    "gevs": generalised_eigenvalue_stabilised_mass,
+    "row_sum": lambda phantom, density: shifted_mass(phantom, density, "row sum"),
+    "hrz": lambda phantom, density: shifted_mass(phantom, density, "weighted diagonal"),
+    "thesis": lambda phantom, density: shifted_mass(phantom, density, "enrichment"),
+}
+_REACH = 1.0  # strain up to which the step of a turning body is a bound
+EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+
+
+def integrator_of(
+    body: DynamicBody, step_size: float, scheme: str, spectral_radius: float
+) -> Integrator:
+    """Make the integrator of a scheme.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In s.
+    scheme : str
+        One of `SCHEMES`.
+    spectral_radius : float
+        Of generalised-α, at infinite frequency; the others have none.
+    """
+    if scheme == "generalised_alpha":
+        return GeneralisedAlpha(body, step_size, spectral_radius=spectral_radius)
+    return SCHEMES[scheme](body, step_size)
+
+
+def largest_step(
+    body: DynamicBody,
+    material: Material,
+    density: ArrayLike,
+    scheme: str,
+    factor: float,
+    asked: float | None,
+) -> tuple[float, str]:
+    """Return the largest time step, s, and where it comes from.
+
+    An explicit scheme takes `factor` times its critical step, or the step asked for if that is
+    smaller. Where pieces turn, the critical step is that of strains up to 1, and `RESONANCE_FREE`
+    of it, so that the time grid makes no modes resonate (docs/theory/dynamics.md). An implicit one
+    takes the step asked for, or else `factor` times the critical step of the uncut elements: what
+    an explicit scheme could follow.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    material : Material
+    density : float or (m,) array_like
+    scheme : str
+        One of `SCHEMES`.
+    factor : float
+    asked : float, optional
+        ``analysis.time_step`` of the scene, s.
+    """
+    explicit = scheme in EXPLICIT
+    if not explicit and asked is not None:
+        return asked, "analysis.time_step"
+    critical = _critical(body, material, density, explicit)
+    turning = explicit and body.force.is_corotational
+    found = factor * critical * (RESONANCE_FREE if turning else 1.0)
+    said = f"{factor:g} of {'√½ of ' if turning else ''}the critical step {critical:.4g} s"
+    if not np.isfinite(found) or found <= 0.0:
+        raise InputError(f"the critical step is {critical:g} s; give analysis.time_step")
+    if asked is not None and asked < found:
+        return asked, f"analysis.time_step; the critical step is {critical:.4g} s"
+    return found, said
+
+
+def _critical(body: DynamicBody, material: Material, density: ArrayLike, explicit: bool) -> float:
+    phantom = body.force.phantom
+    if not explicit or body.mass.keeps_element_steps:
+        # side-wise mass: no cut makes it smaller than that of the smallest uncut element
+        strain = _REACH if body.force.is_corotational else 0.0
+        step = float(element_critical_steps(phantom.mesh, material, density, strain).min())
+    else:
+        force: Any = body.force
+        blocks = force.stiffness(body.pattern, np.zeros(body.shape), "rotation-fixed")
+        step = critical_step(csr_array(body.pattern.matrix(blocks)), body.mass, body.fixed)
+    if not explicit:
+        return step
+    # damping is taken at the velocity half a step back: (1 + ξ²)^½ − ξ of the undamped step
+    highest = 2.0 / step
+    ratio = 0.5 * (body.damping.mass / highest + body.damping.stiffness * highest)
+    return step * float(np.hypot(1.0, ratio) - ratio)
+
+
+def body_in_motion(scene: Scene, force: InternalForce, mass: Mass, exact: Any) -> DynamicBody:
+    """Give a body with elasticity and mass the loads, supports and damping of a scene."""
+    phantom = force.phantom
+    weight = np.zeros_like(phantom.node_points)
+    driven: list[tuple[Any, Callable[[float], _Floats]]] = []  # history, and forces at a time
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
+            weight += mass.weight(load.acceleration)
+        else:
+            at = partial(forces_of, scene, i, phantom, exact)
+            driven.append((load.history, at if is_moving(load, exact) else _always(at(0.0))))
+
+    def load_at(time: float) -> _Floats:
+        total = np.zeros_like(weight)
+        for history, forces in driven:
+            total += factor_at(history, time) * forces(time)
+        return total
+
+    return DynamicBody(
+        force,
+        mass,
+        weight,
+        load_at if driven else None,
+        motion_of_supports(scene, phantom, exact),
+        RayleighDamping(*scene.analysis.damping),
+    )
+
+
+def _always(forces: _Floats) -> Callable[[float], _Floats]:
+    return lambda _time: forces
+
+
+def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
+    """Return the state of a body at the time 0, before what opens then.
+
+    Raises
+    ------
+    UnsupportedBodyError, NotInEquilibriumError
+        If it is to be an equilibrium, and a piece is not held or none is found.
+    """
+    state, initial, phantom = body.rest(), scene.initial, body.force.phantom
+    free = ~body.fixed
+    if isinstance(initial, Moving):
+        state.velocity[free] = initial.velocities(phantom.node_points)[free]
+    elif isinstance(initial, InitialField):
+        u, v = initial.state(phantom.node_points, phantom.node_piece_points, exact)
+        state.displacement[free], state.velocity[free] = u[free], v[free]
+    elif isinstance(initial, Equilibrium):
+        state.displacement[:] = _equilibrium(scene, body, exact)
+    return state
+
+
+def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
+    """Displacement at rest under the loads and supports as their histories begin."""
+    phantom = body.force.phantom
+    assert body.weight is not None
+    load = body.weight.copy()
+    for i, entry in enumerate(scene.loads):
+        if not isinstance(entry, Gravity):
+            load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
+    path = path_of_supports(scene, phantom, exact)
+    check_bodies(phantom, path(1.0))
+    return static_equilibrium(
+        body.force, body.fixed, lambda share: path(share).values, load
+    ).displacement

@@ -18,8 +18,7 @@ from verify.runner.tasks import Failure, Limits, Task, made
 from verify.scene import Scene, ValueCheck, restore_scene, scene_content
 from verify.solution import handed_over
 from verify.solvers import Solver, check_parameters, find_solver
-from verify.solvers.interface import checked_refusal
-from verify.solvers.named import one_name, parameters_in, solver_in
+from verify.solvers.interface import checked_refusal, one_name, parameters_in, solver_in
 from verify.study.record import Finding, Study
 
 AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
