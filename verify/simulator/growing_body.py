@@ -33,8 +33,9 @@ from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.pieces import Separated, split_cells
 from verify.xfem.zero_points import ZeroPoints
 
-# the cuts near a patch: the number of each, and the cut as that patch sees it
-CutsNear = Callable[[MeshPatch], tuple[Ints, Sequence[Cut]]]
+# the cuts near a patch: the number of each, the cut as that patch sees it, and which cells each has
+# opened, if not all
+CutsNear = Callable[[MeshPatch], tuple[Ints, Sequence[Cut], Bools | None]]
 
 
 @dataclass(frozen=True)
@@ -169,8 +170,9 @@ class GrowingBody:
         candidates : int array
             Cells that may have to be split.
         cuts_near : callable
-            Gives the cuts near a patch as (number of each, cut as that patch sees it); it must
-            contain every cut that splits a cell of the patch.
+            Gives the cuts near a patch as (number of each, cut as that patch sees it, cells (q,
+            cuts) that each may split or None for all); it must contain every cut that splits a
+            cell of the patch.
 
         Raises
         ------
@@ -180,9 +182,11 @@ class GrowingBody:
         wanted = distinct(candidates)
         while len(wanted):
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
-            numbers, cuts = cuts_near(patch)
+            numbers, cuts, opened = cuts_near(patch)
             held, joint = self._held_in(patch, numbers), self._tied.joint[patch.whole_cells]
-            partition = split_cells(patch, cuts, separated=held, junction_cells=joint)
+            partition = split_cells(
+                patch, cuts, separated=held, opened=opened, junction_cells=joint
+            )
             division = self._compare(patch, partition, numbers)
             all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
             if len(all_wanted) == len(wanted):

@@ -98,6 +98,8 @@ class Stroke:
         Nodal level sets, in metres; NaN where nobody has asked for them yet.
     recorded : (m,) bool array
         Cells whose crossing has been recorded.
+    opens : (m,) float array or None
+        When each cell opens ahead of a blade whose way is known, s; NaN: never.
     """
 
     def __init__(
@@ -112,6 +114,21 @@ class Stroke:
         self._mesh, self._size, self._strokes_near = mesh, size, strokes_near
         self._snap = _ROUND_OFF * mesh.extent
         self._under_way = np.empty(0, dtype=np.int64)
+        self.opens: Floats | None = None
+        self._time = -np.inf
+
+    def open_ahead(self, opens: Floats, alike: "Stroke") -> None:
+        """Open cells at given times (m,), in s, from now on; `alike` has gone the whole way."""
+        self.opens, self.front = opens, alike.front
+        self.near, self.entry, self.leave = alike.near, alike.entry, alike.leave
+        self.values = alike.values
+        self._strokes_near += self.near
+
+    def open_cells(self, cells: Ints) -> Bools:
+        """Whether the stroke may split each of some cells by now."""
+        if self.opens is None:
+            return np.ones(len(cells), dtype=bool)
+        return np.asarray(self.opens[cells] <= self._time)
 
     def advance(self, time: float, elements: BoundingTree) -> Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
@@ -123,6 +140,10 @@ class Stroke:
         elements : BoundingTree
             Of the cells: where the blade comes in.
         """
+        if self.opens is not None:
+            due = np.flatnonzero((self.opens > self._time) & (self.opens <= time))
+            self._time = max(self._time, time)
+            return due
         front = self.path.travel_at(time)
         if front <= self.front or not self.path.sweeps:
             return np.empty(0, dtype=np.int64)
@@ -379,10 +400,14 @@ class SemiProgressiveCutter:
             self._records = []
         return self._crossings
 
-    def _cuts_near(self, patch: MeshPatch) -> tuple[Ints, list[Cut]]:
-        near = [stroke for stroke in self.strokes if stroke.near[patch.whole_cells].any()]
+    def _cuts_near(self, patch: MeshPatch) -> tuple[Ints, list[Cut], Bools | None]:
+        cells = patch.whole_cells
+        near = [stroke for stroke in self.strokes if stroke.near[cells].any()]
         numbers = np.array([stroke.number for stroke in near], dtype=np.int64)
-        return numbers, [stroke.seen_by(patch) for stroke in near]
+        opened = None
+        if any(stroke.opens is not None for stroke in near):
+            opened = np.stack([stroke.open_cells(cells) for stroke in near], axis=1)
+        return numbers, [stroke.seen_by(patch) for stroke in near], opened
 
     def _fix(self, division: Division) -> None:
         """Let the level sets of strokes stay what they are where they divide cells."""

@@ -13,17 +13,19 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
+from verify.simulator.openings import KnownWays
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.stage import Grips, Stage, gripped, held_facets
 from verify.simulator.surfaces import Contacts, Picture, SurfaceCollider, Surfaces
 from verify.xfem.arrays import Floats
-from verify.xfem.body import DynamicBody
+from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
+from verify.xfem.release import TieForces, hold_released
 
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")
@@ -63,6 +65,10 @@ class StepRecord:
         is kept.
     dissipated : float
         By damping and by the scheme since the start, J; likewise.
+    cut_work : (strokes,) float array
+        Work that the forces have taken which held what each stroke has cut, since the start, J.
+    advance : (strokes,) float array
+        How far the blade of each stroke has come, m.
     contacts : int
         Facets of the collision surface that the tool touches.
     """
@@ -79,6 +85,8 @@ class StepRecord:
     potential: float
     work: float
     dissipated: float
+    cut_work: Floats
+    advance: Floats
     contacts: int
 
     @property
@@ -159,13 +167,17 @@ class Session:
     ) -> None:
         self.stage, self._account, self._clock = stage, account, clock
         self.cutter = SemiProgressiveCutter(stage.mesh)
+        ways = KnownWays(stage.mesh, stage.strokes) if stage.opening == "swept" else None
+        self._ways = ways if stage.strokes else None
         for path in stage.strokes:
-            self.cutter.begin(path)
+            stroke = self.cutter.begin(path)
+            if ways is not None:
+                ways.open(stroke)
+        self.cut_work = np.zeros(len(stage.strokes))
         self.surfaces = Surfaces(stage, self.cutter)
         self.collider = SurfaceCollider(self.surfaces.touchable)
         self.records: list[StepRecord] = []
         self._start: dict[int, Floats] = {}
-        self._tool_load: Floats | None = None
         self._crossed = 0
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
@@ -194,7 +206,10 @@ class Session:
     def begin(self, path: ToolPath) -> None:
         """Begin another stroke, to be extended through `cutter.extend` if the tool is live."""
         self.cutter.begin(path)
+        self.cut_work = np.append(self.cut_work, 0.0)
+        tie, tool = self.body.tie, self._grips.tool
         self._assemble()
+        self.body.tie, self._grips.tool = tie, tool
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -213,6 +228,10 @@ class Session:
                 self.integrator.advance(self.state)
             else:
                 self._ledger.record(self.state, self.integrator.step(self.state))
+            if isinstance(self.body.tie, TieForces):
+                change = self.stage.time_step * self.state.velocity
+                count = len(self.cut_work)
+                self.cut_work += self.body.tie.work_by_cut(change, self.state.time, count)
         with self._timed("mapping"):
             self.surfaces.move(self.displacement)
         with self._timed("collision"):
@@ -252,11 +271,12 @@ class Session:
         if increment is None:
             return
         with self._timed("assembly"):
-            state = self.state
+            state, body = self.state, self.body
+            before = MotionState(state.displacement, state.velocity, state.time)
             state.displacement = increment.inherit(state.displacement)
             state.velocity = increment.inherit(state.velocity)
             self._start = {hook: increment.inherit(at) for hook, at in self._start.items()}
-            dragged, self._tool_load = self._tool_load is not None, None
+            dragged = self._grips.tool is not None
             self._assemble()
         with self._timed("cutting"):
             self.surfaces.update(increment)
@@ -264,6 +284,11 @@ class Session:
             with self._timed("collision"):
                 self.surfaces.move(self.displacement)
                 self._collide()
+        if self._ways is not None:
+            with self._timed("assembly"):
+                source = np.append(np.arange(increment.nodes_before), increment.source)
+                fading = self._ways.fading(self.phantom.node_parent, self.stage.time_step)
+                hold_released(body, before, self.body, state, source, fading)
         self._begin_account()
 
     def _begin_account(self) -> None:
@@ -282,7 +307,9 @@ class Session:
         with self._timed("assembly"):
             stage, weights = self.stage, self.body.mass.weights
             grips = Grips(self.phantom, stage.holds, stage.hooks, weights, self._start, self._held)
-            self._follow(self.body.held_by(grips.supports), grips, self._solver)
+            body, grips.tool = self.body.held_by(grips.supports), self._grips.tool
+            body.load = grips.force
+            self._follow(body, grips, self._solver)
         self._begin_account()
 
     def _assemble(self) -> None:
@@ -292,7 +319,7 @@ class Session:
         grips = Grips(phantom, stage.holds, stage.hooks, mass.weights, self._start, self._held)
         force = InternalForce(phantom, stage.material, kernels=FAST)
         weight = mass.weight(stage.gravity)
-        body = DynamicBody(force, mass, weight, self._load, grips.supports, stage.damping)
+        body = DynamicBody(force, mass, weight, grips.force, grips.supports, stage.damping)
         if force.has_one_pass:
             force.prepare(body.pattern)
         held = body.fixed.all(axis=1)  # these need not be solved for
@@ -303,10 +330,6 @@ class Session:
         self.body, self._grips, self.phantom = body, grips, body.force.phantom
         self._solver = solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
-
-    def _load(self, time: float) -> Floats:
-        force = self._grips.force(time)
-        return force if self._tool_load is None else force + self._tool_load
 
     def _collide(self) -> int:
         """Let the collision surface follow, and ask where the tools touch it."""
@@ -320,14 +343,17 @@ class Session:
         self._drag(touched)
         return sum(len(contacts.facet) for contacts, _ in touched)
 
+    @property
+    def _paths(self) -> list[ToolPath]:
+        return [stroke.path for stroke in self.cutter.strokes]
+
     def _under_way(self) -> list[ToolPath]:
         now = self.state.time
-        paths = [stroke.path for stroke in self.cutter.strokes]
-        return [path for path in paths if path.times[0] <= now <= path.times[-1]]
+        return [path for path in self._paths if path.times[0] <= now <= path.times[-1]]
 
     def _drag(self, touched: list[tuple[Contacts, ToolPath]]) -> None:
         """Let the blade drag what it touches along, from the next step on."""
-        self._tool_load = None
+        self._grips.tool = None
         surface = self.surfaces.touchable
         if self.stage.tool_force == 0.0:
             return
@@ -340,7 +366,7 @@ class Session:
             force = self.stage.tool_force / (length * len(contacts.facet)) * (here - before)
             forces = np.tile(force, (len(contacts.facet), 1))
             surface.add_forces(contacts.facet, contacts.at, forces, load)
-        self._tool_load = load
+        self._grips.tool = load
 
     def _spent_so_far(self) -> Floats:
         account = self._ledger.close()
@@ -368,6 +394,8 @@ class Session:
             potential=-float(np.sum(body.weight * state.displacement)),
             work=float(work),
             dissipated=float(lost),
+            cut_work=self.cut_work.copy(),
+            advance=np.array([max(path.travel_at(state.time), 0.0) for path in self._paths]),
             contacts=contacts,
         )
 

@@ -119,6 +119,9 @@ class Stage:
         m.
     tool_force : float
         With which the moving blade drags what it touches, N.
+    opening : str
+        ``"swept"``: elements open ahead of a blade of `strokes`, held by forces that fade;
+        ``"late"``: when it has crossed them through.
     """
 
     mesh: SimplexMesh
@@ -135,6 +138,7 @@ class Stage:
     collision: tuple[Floats, Ints] | None = None
     tool_radius: float = 0.0
     tool_force: float = 0.0
+    opening: str = "swept"
 
     @property
     def steps(self) -> int:
@@ -196,6 +200,11 @@ class Grips:
         Displacement (N, s) at which each hook (by its number) has gripped.
     facets : sequence of (m, d + 1) bool arrays
         `held_facets` of each hold; they do not change as the body is cut.
+
+    Attributes
+    ----------
+    tool : (N, s) float array or None
+        Nodal forces of the blades, N.
     """
 
     def __init__(
@@ -208,6 +217,7 @@ class Grips:
         facets: Sequence[Bools],
     ) -> None:
         shape = (phantom.node_count, phantom.mesh.space)
+        self.tool: Floats | None = None
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
         for k, hold in enumerate(holds):
             at = held_unknowns(phantom, hold.nodes, facets[k])
@@ -232,8 +242,8 @@ class Grips:
         return MovingSupports(self._fixed, self._at)
 
     def force(self, time: float) -> Floats:
-        """Nodal forces (N, s) of the hooks that pull, N."""
-        force = np.zeros(self._values.shape)
+        """Nodal forces (N, s) of the hooks that pull, and of the tool, N."""
+        force = np.zeros(self._values.shape) if self.tool is None else self.tool.copy()
         for hook, nodes, full in self._pulled:
             force[nodes] += hook.share(time) * full
         return force
@@ -292,6 +302,7 @@ def stage_of(scene: Scene, level: int = 0) -> Stage:
             collision=_surface(scene, mesh, replay.collision if replay else None),
             tool_radius=replay.tool_radius if replay else 0.0,
             tool_force=replay.tool_force if replay else 0.0,
+            opening=analysis.opening,
         )
     except XfemError as error:
         raise InputError(str(error), where) from None

@@ -174,8 +174,8 @@ class Openings:
         for k, cut in enumerate(self.asked):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             if isinstance(cut, ToolPathCut):
-                sections = _sections(phantom, cells, k)
-                times[:, k], passed[:, k], _ = shares.add(sections, cut.passed_at)
+                passage = shares.add(sections(phantom, cells, k), cut.passed_at)
+                times[:, k], passed[:, k] = passage.let_go, passage.passed
             else:
                 times[cells, k] = passed[cells, k] = self.times[k]
         return self._by_rule(times, passed, shares)
@@ -235,7 +235,7 @@ def openings_of(scene: Scene, size: float, timeline: Timeline, rule: str) -> Ope
     )
 
 
-def _sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
+def sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
     """Sections of cells by the zero level of a cut, with the shape functions of their nodes."""
     nodes = phantom.mesh.cells[cells]
     value = phantom.level_sets[nodes, k]

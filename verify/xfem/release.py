@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import DynamicBody, FreeMass, MotionState
 from verify.xfem.errors import XfemError
+from verify.xfem.phantom import PhantomMesh
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,14 @@ class Hold:
         At the release, in newtons.
     factor : callable
         Factors (k,) at a time, from 1 to 0.
+    cut : (k,) int array
+        Number of the cut that has released each.
     """
 
     nodes: Ints
     forces: Floats
     factor: Callable[[float], Floats]
+    cut: Ints
 
     def handed_on(self, source: Ints, weights: Floats, time: float) -> "Hold | None":
         """Give the same of a body that is cut further; None if nothing is left of it.
@@ -59,7 +63,8 @@ class Hold:
         nodes = np.flatnonzero(place[source] >= 0)
         row = place[source[nodes]]
         share = weights[nodes] / np.bincount(row, weights[nodes], len(left))[row]
-        return Hold(nodes, share[:, None] * self.forces[row], _Rows(self.factor, row))
+        forces = share[:, None] * self.forces[row]
+        return Hold(nodes, forces, _Rows(self.factor, row), self.cut[row])
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,24 @@ class TieForces:
         for hold in self.holds:
             total[hold.nodes] += hold.factor(time)[:, None] * hold.forces
         return total
+
+    def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
+        """Work (cuts,) in J that the forces of each cut take, as they are at a time.
+
+        Parameters
+        ----------
+        change : (N, d) float array
+            Of the displacement, m.
+        time : float
+            In s.
+        cuts : int
+            Number of cuts.
+        """
+        taken = np.zeros(cuts)
+        for hold in self.holds:
+            done = (change[hold.nodes] * hold.forces).sum(axis=1)
+            taken -= np.bincount(hold.cut, hold.factor(time) * done, cuts)
+        return taken
 
 
 def hold_released(
@@ -135,9 +158,43 @@ def hold_released(
         return
     acceleration = FreeMass(old).solve(-_resisting(old, state))
     forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
+    _balance(forces, nodes, source, new.fixed | old.fixed[source], new.mass.weights)
     forces[new.fixed] = 0.0
-    hold = Hold(nodes, forces[nodes], fading(nodes, time))
+    cut = _parting_cuts(new.force.phantom, nodes, source[nodes])
+    hold = Hold(nodes, forces[nodes], fading(nodes, time), cut)
     new.tie = TieForces(new.shape, (*carried, hold))
+
+
+def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> None:
+    """Spread in proportion to masses what the forces (N, d) on parts of one node sum up to.
+
+    That is round-off, but where loads are shared out anew, as those of hooks are. What supports
+    hold has a sum.
+    """
+    number = np.unique(source[nodes], return_inverse=True)[1]
+    share = weights[nodes] / np.bincount(number, weights[nodes])[number]
+    for axis in range(forces.shape[1]):
+        total = np.bincount(number, forces[nodes, axis])
+        total[np.bincount(number, held[nodes, axis]) > 0.0] = 0.0
+        forces[nodes, axis] -= share * total[number]
+
+
+def _parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
+    """First cut (k,) that has some pieces of the nodes of a parent on one side, others beyond."""
+    row = np.full(phantom.node_count, -1)
+    row[nodes] = np.arange(len(nodes))
+    at = row[phantom.cells]
+    piece, corner = np.nonzero(at >= 0)
+    number = np.unique(parent, return_inverse=True)[1]
+    found = np.zeros(len(nodes), dtype=np.int64)
+    for cut in reversed(range(phantom.label.shape[1])):
+        there = [np.zeros(len(nodes), dtype=bool) for _ in range(2)]
+        for side, here in zip((1, -1), there, strict=True):
+            here[at[piece, corner][phantom.label[piece, cut] == side]] = True
+        above, below = there[0] & ~there[1], there[1] & ~there[0]
+        apart = (np.bincount(number, above) > 0) & (np.bincount(number, below) > 0)
+        found[apart[number]] = cut
+    return found
 
 
 def _resisting(body: DynamicBody, state: MotionState) -> Floats:
