@@ -49,8 +49,7 @@ def assert_bounded(record, seed: int) -> None:
     scale = abs(record.work) + record.kinetic + record.strain
     assert record.mechanical <= record.work + 0.01 * scale + 1e-15, (seed, record)
     # the account itself closes to round-off
-    off = record.mechanical - record.work + record.dissipated
-    assert abs(off) <= 1e-9 * scale + 1e-15, (seed, record)
+    assert abs(record.balance) <= 1e-9 * scale + 1e-15, (seed, record)
 
 
 def _stroke(rng, low, high, begin: float, length: float) -> ToolPath:

@@ -1,4 +1,4 @@
-"""The curved incision of the hand, step by step: where the blade has been, and nowhere else."""
+"""The curved incision of the hand, step by step: along the way of the blade, and nowhere else."""
 
 import numpy as np
 import pytest
@@ -39,10 +39,10 @@ def beside(path, places):
     return distance[each, nearest], along
 
 
-def test_the_cut_lies_on_the_arc_and_never_ahead_of_the_blade(curved) -> None:
+def test_the_cut_lies_on_the_arc_and_opens_two_elements_ahead_of_the_blade(curved) -> None:
     """Element by element the cut is flat: it leaves the arc by at most h²/8R.
 
-    Behind the blade is at most the element in which it is.
+    What opens has a node of an element in which the blade is, and is held until it has passed.
     """
     session, _, faces = curved
     path = session.stage.strokes[0]
@@ -55,12 +55,12 @@ def test_the_cut_lies_on_the_arc_and_never_ahead_of_the_blade(curved) -> None:
     sag = np.abs(away[:, 0] * y - away[:, 1] * x).max() / chord
     radius = (chord**2 / 4.0 + sag**2) / (2.0 * sag)
     seen = [(time, places) for time, places in faces if len(places)]
-    assert len(seen) > 40
+    assert len(seen) > 35
     for time, places in seen:
         off, along = beside(tips, places[:, :2])
         blade = np.interp(time, path.times, travelled)
         assert off.max() < longest**2 / (8.0 * radius)
-        assert blade - longest < along.max() <= blade + ROUND_OFF
+        assert blade - longest < along.max() <= blade + 2.0 * longest
 
 
 def test_the_arc_opens_by_as_much_as_it_is_pulled_and_gains_nothing(curved) -> None:
@@ -73,5 +73,5 @@ def test_the_arc_opens_by_as_much_as_it_is_pulled_and_gains_nothing(curved) -> N
         np.testing.assert_allclose(begun, 0.0, atol=1e-6)  # nothing had moved before
     work = max(record.work for record in session.records)
     for record in session.records:
-        assert abs(record.mechanical - record.work + record.dissipated) < 1e-9 * work
+        assert abs(record.balance) < 1e-9 * work
         assert record.mechanical <= record.work + 1e-9 * work

@@ -99,6 +99,11 @@ class StepRecord:
         """Kinetic, strain and gravity energy, J."""
         return self.kinetic + self.strain + self.potential
 
+    @property
+    def balance(self) -> float:
+        """All energy there is and that was lost, less the work, J: constant to round-off."""
+        return self.mechanical + self.dissipated + float(self.cut_work.sum()) - self.work
+
 
 @dataclass(frozen=True)
 class Spread:
