@@ -25,10 +25,10 @@ from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.calibration import compile_times
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.locate import SolutionField
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.overlap import OverlapSearch
+from verify.compare.sides import distance_to_segments
 from verify.compare.simplices import simplices
 from verify.solution import Solution
 from verify.threads import ONE_THREAD

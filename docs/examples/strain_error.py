@@ -8,9 +8,8 @@ import numpy as np
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.compare.error_norm import ErrorNorm
+from verify.compare.error_norm import ErrorNorm, integrate_norm, rules
 from verify.compare.hooke import hooke
-from verify.compare.integration import integrate_norm, rules
 from verify.compare.realised import field_of
 from verify.scene import restore_scene
 from verify.solution import read_solution

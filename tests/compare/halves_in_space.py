@@ -7,11 +7,10 @@ from membrane_meshes import TILTED, Shape, flat, halved, layers, line, membrane
 from solid_meshes import height, inclined, sliver_body, solid_scene, stacked
 
 from verify.compare.body import body_of
-from verify.compare.cut_line import membrane_cut_rule
+from verify.compare.cut_rule import membrane_cut_rule, surface_rule
 from verify.compare.hooke import MembraneLaw, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.realised import field_of
-from verify.compare.surface_rule import surface_rule
 from verify.scene import Material
 from verify.solution import Solution
 

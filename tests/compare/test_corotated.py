@@ -5,11 +5,11 @@ import pytest
 from cut_meshes import grid, quadratic, solution
 from solid_meshes import cube_grid
 
+from verify.compare.body_rule import Rule
 from verify.compare.error_norm import energy_error
 from verify.compare.hooke import corotated, hooke
 from verify.compare.locate import SolutionField
-from verify.compare.simplex_rule import points_in
-from verify.compare.slabs import Rule
+from verify.compare.simplices import points_in
 from verify.compare.strain_energy import strain_energy
 from verify.scene import Material
 

@@ -9,7 +9,7 @@ from solid_meshes import cube_grid, solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import LIMIT, realised_cut
-from verify.compare.integration import cut_rules
+from verify.compare.error_norm import cut_rules
 
 SEEDS = range(12)
 

@@ -8,10 +8,9 @@ import pytest
 from cut_meshes import scene
 
 from verify.compare.body import body_of
-from verify.compare.error_history import error_history
-from verify.compare.errors import Rules
+from verify.compare.error_norm import spread_of
+from verify.compare.errors import Rules, error_history
 from verify.compare.hooke import law_of
-from verify.compare.integration import spread_of
 from verify.compare.motion import ExactMotion
 from verify.geometry.planar import inside_polygon
 from verify.judge.cut_errors import are_mixed, measured_cut, with_cut, with_other_errors

@@ -6,9 +6,9 @@ import pytest
 import scenes
 
 from verify.compare.body import body_of
-from verify.compare.opening import opening
+from verify.compare.body_rule import area_rule
+from verify.compare.cut_profile import opening
 from verify.compare.realised import field_of
-from verify.compare.slabs import area_rule
 from verify.solvers import find_solver
 
 HOLE, CUT = 0.2, 0.4

@@ -5,8 +5,8 @@ import pytest
 from cut_meshes import grid, quadratic
 from solid_meshes import cube_grid
 
-from verify.compare.kinetic import kinetic
-from verify.compare.ledger import balance, energy_scale, total_energy
+from verify.compare.mass import kinetic
+from verify.compare.motion_account import balance, energy_scale, total_energy
 from verify.solution import Solution
 
 TIMES = np.linspace(0.0, 2.0, 401)

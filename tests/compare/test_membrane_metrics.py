@@ -7,7 +7,7 @@ from halves_in_space import Sheet
 from membrane_meshes import bowl, flat, halved, layers, membrane, roof, upright
 
 from verify.compare.body_rule import body_rule
-from verify.compare.cut_line import membrane_cut_rule
+from verify.compare.cut_rule import membrane_cut_rule
 from verify.compare.error_norm import (
     displacement_error,
     displacement_jump,
@@ -15,8 +15,7 @@ from verify.compare.error_norm import (
     jump_error,
 )
 from verify.compare.membrane_body import cut_membrane
-from verify.compare.membrane_field import MembraneField
-from verify.compare.realised import field_of
+from verify.compare.realised import MembraneField, field_of
 from verify.compare.strain_energy import field_strain_energy, strain_energy
 from verify.scene.cuts import SweptCut
 

@@ -3,12 +3,12 @@ import pytest
 from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
 
 from verify.compare.body import body_of
-from verify.compare.cut_line import cut_rule
+from verify.compare.body_rule import area_rule
+from verify.compare.cut_profile import opening
+from verify.compare.cut_rule import cut_rule
 from verify.compare.error_norm import displacement_error, energy_error, jump_error
 from verify.compare.hooke import hooke
 from verify.compare.locate import SolutionField
-from verify.compare.opening import opening
-from verify.compare.slabs import area_rule
 from verify.compare.strain_energy import strain_energy
 from verify.scene import Material
 

@@ -6,16 +6,17 @@ from halves_in_space import Cube, Sheet
 from membrane_meshes import flat, roof
 
 from verify.compare.body_rule import body_rule
+from verify.compare.cut_profile import opening
 from verify.compare.error_norm import (
     displacement_error,
     displacement_squares,
     energy_error,
+    integrate_norm,
     jump_error,
     opening_squares,
+    rules,
 )
-from verify.compare.integration import integrate_norm, rules
-from verify.compare.opening import opening
-from verify.compare.simplex_rule import points_in
+from verify.compare.simplices import points_in
 
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])
 SHIFT = np.array([0.01, 0.02, -0.03])

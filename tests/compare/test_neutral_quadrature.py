@@ -5,8 +5,8 @@ import pytest
 from cut_meshes import STRAIGHT, scene
 
 from verify.compare.body import _inner_parts, body_of
-from verify.compare.cut_line import cut_rule, place_on_cut
-from verify.compare.slabs import area_rule, slab_angles
+from verify.compare.body_rule import area_rule, slab_angles
+from verify.compare.cut_rule import cut_rule, place_on_cut
 from verify.geometry.curves import Segment
 from verify.geometry.planar import inside_polygon
 

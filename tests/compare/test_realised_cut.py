@@ -6,14 +6,12 @@ from cut_meshes import scene, solution
 from solid_meshes import solid_scene
 
 from verify.compare.body import body_of
-from verify.compare.body_rule import body_rule
-from verify.compare.cut_line import cut_rule
+from verify.compare.body_rule import area_rule, body_rule
 from verify.compare.cut_profile import profile_lines
+from verify.compare.cut_rule import cut_rule, surface_rule
 from verify.compare.error_norm import displacement_error, displacement_jump, jump_error
 from verify.compare.locate import SolutionField
 from verify.compare.realised import SidedField, cut_deviation, field_of
-from verify.compare.slabs import area_rule
-from verify.compare.surface_rule import surface_rule
 from verify.geometry.curves import Arc
 from verify.solution import Solution
 

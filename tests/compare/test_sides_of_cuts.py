@@ -7,8 +7,7 @@ from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, ran
 
 from verify.compare.body import body_of
 from verify.compare.error_field import nodal_error
-from verify.compare.error_norm import displacement_jump
-from verify.compare.integration import cut_rules, rules
+from verify.compare.error_norm import cut_rules, displacement_jump, rules
 from verify.compare.realised import cut_deviation, field_of
 from verify.scene import load_scene
 

@@ -4,7 +4,7 @@ from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.body_rule import body_rule
-from verify.compare.surface_rule import surface_rule
+from verify.compare.cut_rule import surface_rule
 from verify.scene import load_scene
 
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 1.0, 1.0], "radius": 0.3}

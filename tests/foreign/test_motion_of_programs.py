@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from verify.compare.energy_account import account_metrics
 from verify.compare.hooke import law_of
 from verify.compare.motion_account import motion_account
+from verify.compare.part_account import account_metrics
 from verify.exchange import export_case, read_answers
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS

@@ -12,10 +12,10 @@ from lying_solvers import PARTS, faster, hidden
 from scipy.linalg import eigvalsh
 from solid_meshes import cube_grid
 
-from verify.compare.energy_account import account_metrics
 from verify.compare.hooke import law_of
-from verify.compare.lumping import lumped_shares, lumping_range, nodal_weights
+from verify.compare.mass import lumped_shares, lumping_range, nodal_weights
 from verify.compare.motion_account import motion_account
+from verify.compare.part_account import account_metrics
 from verify.compare.simplices import simplices
 from verify.conformance import scenes
 from verify.result import Verdict

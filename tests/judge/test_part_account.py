@@ -7,20 +7,19 @@ import pytest
 from cut_meshes import layered, quadratic, scene
 from solid_meshes import height, inclined, solid_scene, stacked
 
-from verify.compare import energy_account
 from verify.compare.body import body_of
-from verify.compare.energy_account import account_metrics
 from verify.compare.hooke import law_of
+from verify.compare.inertia import separated_parts
 from verify.compare.motion_account import motion_account
-from verify.compare.part_account import part_metrics, part_records
-from verify.compare.separated import separated_parts
-from verify.compare.simplex_rule import points_in
+from verify.compare.part_account import ACCOUNT as ACCOUNT_METRICS
+from verify.compare.part_account import account_metrics, part_metrics, part_records
+from verify.compare.simplices import points_in
 from verify.judge.quantities import Measured, unit_of
 from verify.scene import PartQuantity, Scene
 from verify.solution import Solution
 
 # what a blade releases is measured elsewhere
-ACCOUNT = [name for name in energy_account.ACCOUNT if not name.startswith("released")]
+ACCOUNT = [name for name in ACCOUNT_METRICS if not name.startswith("released")]
 TIMES = np.linspace(0.0, 0.6, 7)
 DENSITY = 3.0
 MOVING = {"kind": "moving", "spin": 1.0}

@@ -5,10 +5,10 @@ import pytest
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.compare.cut_line import cut_rule
+from verify.compare.body_rule import area_rule
+from verify.compare.cut_rule import cut_rule
 from verify.compare.error_norm import displacement_error, energy_error, jump_error
 from verify.compare.hooke import hooke
-from verify.compare.slabs import area_rule
 from verify.judge.quantities import Measured
 from verify.judge.reference import conforming_reference, exact_reference
 from verify.scene import Scene, load_scene

@@ -6,7 +6,7 @@ from reference_scenes import square
 
 from reference.exact import exact_solution
 from verify.compare.hooke import law_of
-from verify.compare.kinetic import density_of, kinetic
+from verify.compare.mass import density_of, kinetic
 from verify.compare.strain_energy import strain_energy
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver

@@ -12,7 +12,7 @@ from reference.meshing import imprint_polygons, open_cut
 from reference.space import conforming_space
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
-from verify.compare.kinetic import kinetic
+from verify.compare.mass import kinetic
 from verify.judge.quantities import Measured
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver

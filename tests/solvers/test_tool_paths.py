@@ -16,7 +16,7 @@ from tool_path_scenes import (
     path_text,
 )
 
-from verify.compare.ledger import energy_scale, total_energy
+from verify.compare.motion_account import energy_scale, total_energy
 from verify.scene import load_scene
 from verify.solvers.interface import find_solver
 from verify.solvers.openings_of_scene import Openings

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from verify.compare.body import body_of
+from verify.compare.cut_deviation import polylines_of
 from verify.compare.hooke import hooke
 from verify.compare.motion import ExactMotion
-from verify.compare.realised_geometry import polylines_of
 from verify.result import Verdict
 from verify.scene import load_scene
 from verify.solvers import find_solver

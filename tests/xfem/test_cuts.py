@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 from surface_measures import sphere
 
-from verify.compare.splitting import measures
+from verify.compare.simplices import measures
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.surfaces import SurfaceCollider

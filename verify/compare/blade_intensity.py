@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
-from verify.compare.cut_line import CutRule
+from verify.compare.cut_profile import cut_place
+from verify.compare.cut_rule import CutRule
 from verify.compare.error_norm import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
-from verify.compare.opening import cut_place
 from verify.compare.solid import SolidBody
 from verify.errors import UnsupportedSceneError
 from verify.scene import Material, Scene, ToolPathCut

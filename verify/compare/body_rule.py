@@ -1,23 +1,280 @@
-"""Quadrature of a cut body in space: neutral simplices, split by the cuts, graded to fronts.
+"""Quadrature of a cut body, split by the cuts and graded to their ends.
 
-A box is divided by a grid of its own, whose planes are shifted at random (with a fixed seed), so
-that its points do not fall in step with a structured mesh; the simplices of a mesh file are
-divided at random points. Plane cuts split them exactly; a cylinder splits them along its linear
-interpolant in tetrahedra so small that the sagitta is a thirtieth of the spacing. The side of a
-point is then a matter of the field that is asked; the rest is in the integration error.
+In the plane it is exact: thin parallel slabs have their borders through every corner, every end
+and every crossing. Inside a slab no two curves cross, so that they are ordered from left to right
+and the strips between them are trapezoids with (perhaps curved) sides. Nothing is clipped, no
+sliver is special: a strip of width 1e-12 is a trapezoid of width 1e-12. The slabs are turned away
+from the axes and diagonals, so that their points do not fall in step with the lines of a structured
+mesh, and away from the cuts, so that strips are not sheared.
+
+In space neutral simplices are split by the cuts. A box is divided by a grid of its own, whose
+planes are shifted at random (with a fixed seed); the simplices of a mesh file are divided at random
+points. Plane cuts split them exactly; a cylinder splits them along its linear interpolant in
+tetrahedra so small that the sagitta is a thirtieth of the spacing. The side of a point is then a
+matter of the field that is asked; the rest is in the integration error.
 """
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.body import Body
 from verify.compare.cell_tree import morton_order
-from verify.compare.simplex_body import SimplexBody
-from verify.compare.simplex_rule import points_in
-from verify.compare.slabs import ROUND_OFF, Rule
-from verify.compare.splitting import bisect, heights, split_at_level
+from verify.compare.locate import Field
+from verify.compare.simplices import bisect, heights, in_frames, points_in, split_at_level
+from verify.compare.solid import SimplexBody
+from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
 
 Array = NDArray[np.float64]
+
+
+# Of the body's size: a piece of the body that is thinner has no place that is surely inside.
+ROUND_OFF = 1e-13
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A quadrature rule of a body.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        Inside, on no cut.
+    weights : (n,) array
+    frames : (n, 3, 3) array, optional
+        Of a membrane: two tangents and the normal at each point, as rows.
+    """
+
+    points: Array
+    weights: Array
+    frames: Array | None = None
+
+    def gradient(self, field: Field) -> Array:
+        """Gradient (n, d, d) of a field at the points; of a membrane (n, 3, 2), see `in_frames`."""
+        gradient = field.gradient(self.points, self.points)
+        return gradient if self.frames is None else in_frames(gradient, self.frames)
+
+
+@dataclass(frozen=True)
+class _Monotone:
+    """A piece between two heights, x as a function of y."""
+
+    low: float
+    high: float
+    piece: Piece
+    bulge: float  # arcs: +1 right half, -1 left half
+    outline: bool
+
+    def x(self, y: Array) -> Array:
+        if isinstance(self.piece, Segment):
+            a, b = self.piece.start, self.piece.end
+            t = (y - a[1]) / (b[1] - a[1])
+            return (1 - t) * a[0] + t * b[0]
+        height = (y - self.piece.centre[1]) / self.piece.radius
+        half = np.sqrt(np.maximum((1 - height) * (1 + height), 0.0))
+        return self.piece.centre[0] + self.bulge * self.piece.radius * half
+
+    def poles(self) -> list[float]:
+        """Heights, at an end or close beyond it, at which x(y) is like a square root."""
+        if isinstance(self.piece, Segment):
+            return []
+        middle, radius = float(self.piece.centre[1]), self.piece.radius
+        reached = [(y - middle) / radius for y in (self.low, self.high)]
+        return [middle + radius * np.sign(s) for s in reached if abs(s) >= 0.95]
+
+
+def area_rule(
+    body: Body,
+    spacing: float,
+    angle: float = 0.5535,
+    order: int = 2,
+    depth: float = 1e-2,
+    grading: float = 1.0,
+) -> Rule:
+    """Quadrature of a body, split by its cuts and graded to its singular points.
+
+    Parameters
+    ----------
+    body : Body
+    spacing : float
+        Size of the cells, m.
+    angle : float
+        Direction of the slabs, rad.
+    order : int
+        Gauss points per cell and direction.
+    depth : float
+        Size of the cells at singular points, relative to `spacing`.
+    grading : float
+        Size of the cells around tips, relative to their distance from them; 1 around other
+        singular points.
+
+    Returns
+    -------
+    Rule
+        Exact areas of the body and, for straight cuts, of each of its parts.
+    """
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    pieces = [(piece.rotated(turn), True) for piece in body.edges]
+    pieces += [
+        (_part(part.piece, part.start, part.end).rotated(turn), False) for part in body.parts
+    ]
+    curves = [m for piece, outline in pieces for m in _monotone(piece, outline)]
+    singular, tips = body.singular @ turn.T, body.tips @ turn.T
+    ends = np.array([[m.low, m.high] for m in curves]).ravel()
+    poles = [y for m in curves for y in m.poles()]
+    ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing)
+    ys = graded_breaks(ys, tips[:, 1], spacing, depth * spacing, grading)
+    if poles:  # x(y) is like a square root there
+        ys = graded_breaks(ys, np.array(poles), spacing, 1e-4 * spacing)
+    corners = body.corners @ turn.T
+    span = np.array([corners[:, 0].min(), corners[:, 0].max()])
+    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
+    xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
+    thinnest = ROUND_OFF * body.size
+    cells = [
+        cell for low, high in pairwise(ys) for cell in _slab(curves, low, high, xs, order, thinnest)
+    ]
+    points = np.vstack([p for p, _ in cells]) @ turn
+    return Rule(points, np.concatenate([w for _, w in cells]))
+
+
+def slab_angles(body: Body) -> tuple[float, float, float]:
+    """Choose three slab directions, rad in [0, π), the best first.
+
+    Each is as far as possible from the cuts and from the lines of structured meshes, and at
+    least 10° from the two others.
+    """
+    straight = [part.piece for part in body.parts if isinstance(part.piece, Segment)]
+    edges = np.array([piece.end - piece.start for piece in straight]).reshape(-1, 2)
+    avoided = np.concatenate([np.arange(4) * np.pi / 4, np.arctan2(edges[:, 1], edges[:, 0])])
+    # 0.0123: no candidate has a simple tangent
+    candidates = np.arange(0.0123, np.pi, np.pi / 180)
+    apart = np.abs(np.sin(candidates[:, None] - avoided)).min(axis=1)
+    chosen: list[float] = []
+    for angle in candidates[np.argsort(-apart, kind="stable")]:
+        if all(abs(np.sin(angle - other)) > np.sin(np.deg2rad(10)) for other in chosen):
+            chosen.append(float(angle))
+    return chosen[0], chosen[1], chosen[2]
+
+
+def graded_breaks(
+    breaks: Array, singular: Array, spacing: float, smallest: float, grading: float = 1.0
+) -> Array:
+    """Sorted break points with gaps of at most `spacing`, halving towards `singular` points.
+
+    A gap is at most `grading` times as long as its distance to the nearest singular point, or
+    `smallest`.
+    """
+    # equal up to round-off is equal: a singular point must be a break to the last bit, or the
+    # gaps beside it are not refined; and a gap of one bit would hold a point on the tip itself
+    within = (singular >= breaks.min()) & (singular <= breaks.max())
+    base = np.unique(np.concatenate([breaks, singular[within]]))
+    same = 16 * np.finfo(float).eps * np.abs(base).max()
+    base = base[np.concatenate([[True], np.diff(base) > same])]
+    if len(singular):
+        nearest = base[np.abs(singular[:, None] - base).argmin(axis=1)]
+        singular = np.where(np.abs(singular - nearest) <= 4 * same, nearest, singular)
+    cells = []
+    for a, b in pairwise(base):
+        n = int(np.ceil((b - a) / spacing))
+        edges = np.linspace(a, b, n + 1)
+        cells.append(np.column_stack([edges[:-1], edges[1:]]))
+    open_cells, done = np.vstack(cells), [base]
+    singular = np.unique(singular)
+    while len(open_cells):
+        done.append(open_cells.ravel())
+        if not len(singular):
+            break
+        after = np.clip(np.searchsorted(singular, open_cells[:, 0], "right"), 0, len(singular))
+        left = open_cells[:, 0] - singular[np.maximum(after - 1, 0)]
+        left = np.where(after > 0, left, np.inf)
+        at = np.minimum(np.searchsorted(singular, open_cells[:, 1], "left"), len(singular) - 1)
+        right = singular[at] - open_cells[:, 1]
+        right = np.where(right >= 0, right, np.inf)
+        length = open_cells[:, 1] - open_cells[:, 0]
+        split = length > np.maximum(grading * np.minimum(left, right), smallest) * (1 + 1e-9)
+        low, high = open_cells[split].T
+        middle = 0.5 * (low + high)
+        open_cells = np.vstack([np.column_stack([low, middle]), np.column_stack([middle, high])])
+    return np.unique(np.concatenate(done))
+
+
+def _part(piece: Piece, start: float, end: float) -> Piece:
+    if isinstance(piece, Segment):
+        a, b = piece.point(np.array([start, end]))
+        return Segment(a, b)
+    angle = piece.start_angle + start * piece.sweep
+    return Arc(piece.centre, piece.radius, angle, (end - start) * piece.sweep)
+
+
+def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
+    if isinstance(piece, Segment):
+        low, high = sorted((float(piece.start[1]), float(piece.end[1])))
+        return [_Monotone(low, high, piece, 0.0, outline)] if high > low else []
+    # split at the poles, at odd multiples of a quarter turn
+    first = np.ceil((piece.start_angle - np.pi / 2) / np.pi)
+    stop = piece.start_angle + piece.sweep
+    angles = [piece.start_angle]
+    while (pole := np.pi / 2 + first * np.pi) < stop:
+        if pole > piece.start_angle:
+            angles.append(pole)
+        first += 1
+    angles.append(stop)
+    found = []
+    for a, b in pairwise(angles):
+        ys = sorted(piece.centre[1] + piece.radius * np.sin([a, b]))
+        bulge = 1.0 if np.cos(0.5 * (a + b)) > 0 else -1.0
+        if ys[1] > ys[0]:
+            found.append(_Monotone(float(ys[0]), float(ys[1]), piece, bulge, outline))
+    return found
+
+
+def _slab(
+    curves: list[_Monotone], low: float, high: float, columns: Array, order: int, thinnest: float
+) -> list[tuple[Array, Array]]:
+    """Quadrature of the body between two heights, one entry per strip between two curves.
+
+    A strip thinner than `thinnest`, in m, is round-off, and its points would be on the cut.
+    """
+    middle = np.array([0.5 * (low + high)])
+    here = [c for c in curves if c.low < middle[0] < c.high]
+    here.sort(key=lambda c: float(c.x(middle)[0]))
+    u, wu = _gauss(order)
+    found, inside = [], False
+    for left, right in pairwise(here):
+        inside ^= left.outline
+        if not inside:
+            continue
+        curved = isinstance(left.piece, Arc) or isinstance(right.piece, Arc)
+        v, wv = _gauss(max(order, 6) if curved else order)
+        ys, wy = low + (high - low) * v, (high - low) * wv
+        x0, x1 = left.x(ys), right.x(ys)
+        m0, m1 = float(left.x(middle)[0]), float(right.x(middle)[0])
+        width = x1 - x0
+        if m1 - m0 <= thinnest:
+            continue  # two curves on each other: a strip of no width
+        between = columns[(columns > m0 + thinnest) & (columns < m1 - thinnest)]
+        s = np.concatenate([[0.0], (between - m0) / (m1 - m0), [1.0]])
+        step = np.diff(s)
+        place = (s[:-1, None] + step[:, None] * u).ravel()
+        share = (step[:, None] * wu).ravel()
+        x = x0[:, None] + width[:, None] * place
+        points = np.stack([x, np.broadcast_to(ys[:, None], x.shape)], axis=2)
+        found.append((points.reshape(-1, 2), ((wy * width)[:, None] * share).ravel()))
+    return found
+
+
+@cache
+def _gauss(n: int) -> tuple[Array, Array]:
+    x, w = np.polynomial.legendre.leggauss(n)
+    x, w = 0.5 * (x + 1), 0.5 * w
+    x.flags.writeable = w.flags.writeable = False  # every strip of every rule has the same
+    return x, w
+
 
 # Kuhn's tetrahedra keep their orientation as long as no node moves by a sixth of the spacing.
 _SHAKE = 0.15

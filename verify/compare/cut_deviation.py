@@ -1,10 +1,12 @@
-"""Deviation of a realised cut from the cut as asked: lateral, and at its ends.
+"""Deviation of a realised cut from the cut as asked, and the realised cut as geometry.
 
-Measured from the facets of the realised cut and the cuts as asked alone, cut by cut: a facet
-belongs to the cut that it is nearest to. A point whose nearest point is a free end lies beyond it:
-there something is missing, or too much. All other distances are lateral deviations.
+Deviations, lateral and at the ends, are measured from the facets of the realised cut and the cuts
+as asked alone, cut by cut: a facet belongs to the cut that it is nearest to. A point whose nearest
+point is a free end lies beyond it: there something is missing, or too much. All other distances are
+lateral deviations. As geometry a realised cut is polylines in the plane, triangles in space.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,23 +16,21 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.cut_line import CutRule
-from verify.compare.facet_kernels import distance_to_segments, nearest_segments
-from verify.compare.integration import cut_rules
+from verify.compare.cut_rule import CutRule
+from verify.compare.error_norm import cut_rules
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.sides import distance_to_cut
-from verify.compare.simplex_rule import points_in
-from verify.compare.simplices import simplices
+from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
+from verify.compare.simplices import heights, points_in, simplices
 from verify.compare.solid import SolidBody
-from verify.compare.splitting import heights
 from verify.geometry.curves import Arc
 from verify.records import CutRecord
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+
+Flags = NDArray[np.bool_]
 
 # Over the longest edge D of an element: what the linear interpolant of the distance from an arc of
 # radius 2D may be off by (docs/theory/judgement.md, "Where the cut is").
@@ -237,3 +237,68 @@ def _radius(body: AnyBody) -> float | None:
     else:
         found = [1.0 / patch.curvature for patch in body.patches if patch.curvature]
     return min(found, default=None)
+
+
+_SAME = 1e-10  # of the size of the cut: corners of segments this close are one
+_CLOSE = 1e-6  # the same of triangles, and the least height of one over its longest edge
+_STRAIGHT = 1e-9
+
+
+def polylines_of(facets: Array) -> list[Array]:
+    """Join segments (f, 2, 2) to polylines, split where more than two of them meet.
+
+    Corners on a straight line are left out. A closed line begins and ends in the same corner.
+    """
+    corners, number = _welded(facets, _SAME)
+    ends = [(int(a), int(b)) for a, b in number]
+    beside: dict[int, set[int]] = defaultdict(set)
+    for a, b in ends:
+        if a != b:
+            beside[a].add(b)
+            beside[b].add(a)
+    unused = {frozenset((a, b)) for a, b in ends if a != b}
+    starts = [node for node in beside if len(beside[node]) != 2] + list(beside)
+    lines = []
+    for start in starts:
+        for step in sorted(beside[start]):
+            if frozenset((start, step)) not in unused:
+                continue
+            line = [start, step]
+            unused.discard(frozenset(line))
+            while len(beside[line[-1]]) == 2 and line[-1] != start:
+                onwards = next(iter(beside[line[-1]] - {line[-2]}))
+                edge = frozenset((line[-1], onwards))
+                if edge not in unused:
+                    break
+                unused.discard(edge)
+                line.append(onwards)
+            lines.append(_without_straight(corners[line]))
+    return lines
+
+
+def triangles_of(facets: Array) -> Array:
+    """Return those of the triangles (f, 3, 3) that have an area, corners side by side made one.
+
+    A cut that passes within 1e-6 of its size of a node leaves slivers there, of which a scene
+    makes no polygons; a conforming mesh has a node on such a cut anyway.
+    """
+    corners, number = _welded(facets, _CLOSE)
+    triangles = corners[number]
+    edges = triangles[:, 1:] - triangles[:, :1]
+    doubled = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    return np.asarray(triangles[doubled > _CLOSE * longest**2])
+
+
+def _welded(facets: Array, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
+    """Corners (c, d), those within `tolerance` of the cut's size made one, and (f, k) numbers."""
+    points = facets.reshape(-1, facets.shape[-1])
+    return welded(facets, tolerance * float(np.ptp(points, axis=0).max()) if len(points) else 0.0)
+
+
+def _without_straight(line: Array) -> Array:
+    step = np.diff(line, axis=0)
+    step /= np.linalg.norm(step, axis=1)[:, None]
+    turn = np.abs(step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0])
+    keep = np.concatenate([[True], turn > _STRAIGHT, [True]])
+    return np.asarray(line[keep])

@@ -1,4 +1,4 @@
-"""Lines on cuts along which an opening profile is drawn, with the arc length along them.
+"""Openings of cuts: at a place, and along the line that an opening profile is drawn on.
 
 A cut in the plane, or in a membrane, is such a line itself. On a cut in space one line is taken:
 the longer axis of a disc, the arc of a cylinder at half its height, a meridian of a sphere, the
@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.cut_line import AWAY, CutRule
+from verify.compare.cut_rule import (
+    AWAY,
+    CutRule,
+    nearest_on_cut,
+    nearest_on_membrane_cut,
+    place_on_cut,
+)
+from verify.compare.error_norm import displacement_jump
+from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.solid import SolidBody
 from verify.geometry.patches import (
@@ -25,6 +33,43 @@ from verify.geometry.patches import (
 )
 
 Array = NDArray[np.float64]
+
+
+def opening(
+    field: Field, body: AnyBody, cut: str, place: float | Sequence[float], component: str
+) -> float:
+    """Jump in m at a place of a cut, along its normal or its tangent.
+
+    In the plane the place is a fraction of the cut's length, and the tangent goes along the
+    cut's direction; in space the place is a point, of which the nearest on the cut is taken,
+    and the tangential jump is the length of what is left of the jump without its normal part.
+    The normal points into the positive side; of a membrane it lies in the surface.
+    """
+    at = cut_place(body, cut, place)
+    normal, jump = at.normals[0], displacement_jump(field, at)[0]
+    if component == "normal":
+        return float(jump @ normal)
+    if body.dimension == 2:
+        return float(jump @ np.array([normal[1], -normal[0]]))
+    return float(np.linalg.norm(jump - (jump @ normal) * normal))
+
+
+def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRule:
+    """Take the point of a cut where an opening is asked for, as a rule of weight 1."""
+    if isinstance(body, Body):
+        assert isinstance(place, float)
+        return place_on_cut(body, cut, place)
+    point = np.array(place, dtype=float)
+    if isinstance(body, MembraneBody):
+        return nearest_on_membrane_cut(body, cut, point)
+    return nearest_on_cut(body, cut, point)
+
+
+def point_displacement(field: Field, point: Sequence[float], component: str) -> float:
+    """Displacement in m of `point` in direction ``x``, ``y`` or ``z``."""
+    at = np.array([point], dtype=float)
+    return float(field.displacement(at, at)[0, "xyz".index(component)])
+
 
 _POINTS = 48  # per straight or curved piece, denser to its ends, where an opening ends in a root
 _PIECES = 200  # of a cut through the triangles of a membrane; of more every n-th is taken

@@ -17,9 +17,8 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
-from verify.compare.lumping import assembled
-from verify.compare.simplex_rule import simplex_rule
-from verify.compare.simplices import EDGES, simplices
+from verify.compare.mass import assembled
+from verify.compare.simplices import EDGES, simplex_rule, simplices
 from verify.errors import InputError
 from verify.solution import Solution
 

@@ -16,9 +16,9 @@ from verify.compare.locate_kernels import (
     evaluate_linear,
     evaluate_quadratic,
     find_cells,
+    nearest_triangles,
     no_sides,
 )
-from verify.compare.membrane_kernels import nearest_triangles
 from verify.compare.simplices import simplices, straight_or_raise, triangle_frames
 from verify.errors import InputError
 from verify.solution import Solution

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from verify.compare.hooke import Law
-from verify.compare.inertia import Inertia, inertia_of
-from verify.compare.kinetic import Kinetic
+from verify.compare.inertia import Inertia, Part, inertia_of
 from verify.compare.load_work import load_work
 from verify.compare.locate import SolutionField
-from verify.compare.separated import Part
+from verify.compare.mass import Kinetic
 from verify.compare.strain_energy import cell_dissipation
 from verify.compare.support_work import support_work
 from verify.errors import InputError

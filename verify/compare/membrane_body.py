@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.facet_kernels import nearest_segments
 from verify.compare.locate import nearest_of_triangles
-from verify.compare.membrane_cuts import SHORT, SurfaceLines, surface_lines
-from verify.compare.simplex_body import SimplexBody
+from verify.compare.sides import nearest_segments
 from verify.compare.simplices import triangle_frames
+from verify.compare.solid import SimplexBody
 from verify.errors import UnsupportedSceneError
 from verify.geometry.nearest import feet
 from verify.geometry.patches import PlanePatch
@@ -20,6 +19,177 @@ from verify.scene.mesh_file import read_mesh
 from verify.scene.tool_path import Cut
 
 Array = NDArray[np.float64]
+
+
+Cells = NDArray[np.int64]
+
+# of the surface's size: a corner that close to the plane of a cut is on it, and what is shorter is
+# no piece of a cut
+_ON = 1e-12
+SHORT = 1e-10
+_EDGES = ((0, 1), (1, 2), (2, 0))
+
+
+@dataclass(frozen=True)
+class SurfaceLines:
+    """Straight pieces of a cut, each across a triangle of a surface or along an edge of two.
+
+    Parameters
+    ----------
+    ends : (s, 2, 3) array
+    positive, negative : (s, 3) array
+        Unit vectors along the surface, square to the piece, into the sides of the cut.
+    """
+
+    ends: Array
+    positive: Array
+    negative: Array
+
+    @property
+    def normals(self) -> Array:
+        """Unit vectors (s, 3) into the positive side; along an edge half-way between its sides."""
+        both = self.positive - self.negative
+        return np.asarray(both / np.linalg.norm(both, axis=1)[:, None])
+
+    @property
+    def lengths(self) -> Array:
+        """Lengths (s,), m."""
+        return np.asarray(np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1))
+
+
+def surface_lines(
+    points: Array, cells: Cells, patches: Sequence[PlanePatch], name: str
+) -> SurfaceLines:
+    """Lines along which the patches of a cut cross a surface.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    cells : (m, 3) array
+        Triangles.
+    patches : sequence of PlanePatch
+    name : str
+        Of the cut, for messages.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the cut lies in a triangle or touches a fold of the surface along an edge: then the
+        two sides of the surface are not two sides of the cut.
+    """
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    rows = []
+    for patch in patches:
+        level = patch.level(points)
+        level[np.abs(level) <= _ON * size] = 0.0
+        for ends, ways in (_across(points, cells, level), _along(points, cells, level)):
+            ends, which = _clipped(ends, patch, SHORT * size)
+            rows.append((ends, *ways[which].swapaxes(0, 1)))
+        _refuse_folds(points, cells, level, patch, name, SHORT * size)
+    return SurfaceLines(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
+    """Segments (s, 2, 3) across triangles, and the ways (s, 2, 3) into both their sides."""
+    value = level[cells]
+    crossed = np.flatnonzero((value.max(axis=1) > 0.0) & (value.min(axis=1) < 0.0))
+    corners, value = points[cells[crossed]], value[crossed]
+    ends = np.zeros((len(crossed), 2, 3))
+    met = np.zeros(len(crossed), dtype=np.int64)
+    rows = np.arange(len(crossed))
+    for i, j in _EDGES:  # at a corner that is on the plane, or inside an edge
+        a, b = value[:, i], value[:, j]
+        share = a / np.where(a == b, 1.0, a - b)
+        place = corners[:, i] + share[:, None] * (corners[:, j] - corners[:, i])
+        here = (a == 0.0) | (a * b < 0.0)
+        ends[rows[here], met[here]] = place[here]
+        met[here] += 1
+    top = corners[rows, value.argmax(axis=1)]
+    into = _square(top - ends[:, 0], ends)
+    return ends, np.stack([into, -into], axis=1)
+
+
+def _edges_on(cells: Cells, level: Array) -> tuple[Cells, Cells]:
+    """Edges (e, 2) of triangles that lie on the plane, and the triangles' third corners (e,)."""
+    pairs = np.concatenate([cells[:, list(edge)] for edge in _EDGES])
+    third = np.concatenate([cells[:, 3 - sum(edge)] for edge in _EDGES])
+    on = (level[pairs] == 0.0).all(axis=1)
+    return np.sort(pairs[on], axis=1), third[on]
+
+
+def _along(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
+    """Edges (s, 2, 3) of triangles that lie on either side of the plane, and the ways into both."""
+    pairs, third = _edges_on(cells, level)
+    above = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] > 0.0}
+    below = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] < 0.0}
+    both = np.array(sorted(above.keys() & below.keys()), dtype=np.int64).reshape(-1, 2)
+    ends = points[both]
+    ways = [
+        _square(points[[side[tuple(e)] for e in both.tolist()]].reshape(-1, 3) - ends[:, 0], ends)
+        for side in (above, below)
+    ]
+    return ends, np.stack(ways, axis=1)
+
+
+def _refuse_folds(
+    points: Array, cells: Cells, level: Array, patch: PlanePatch, name: str, tolerance: float
+) -> None:
+    """Raise if the patch runs along an edge whose triangles are not on either side of it."""
+    pairs, third = _edges_on(cells, level)
+    _, which, times = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    sides = np.bincount(which, np.sign(level[third]), len(times))
+    odd = pairs[(times[which] > 1) & (sides[which] != 0.0) | (level[third] == 0.0)]
+    if len(_clipped(points[odd], patch, tolerance)[0]):
+        raise UnsupportedSceneError(
+            f"cut '{name}' lies along a fold of the membrane or in one of its triangles: it does "
+            "not part what is on its sides, and cannot be compared on"
+        )
+
+
+def _square(way: Array, ends: Array) -> Array:
+    """Make `way` (s, 3) square to segments (s, 2, 3), and of length one."""
+    along = ends[:, 1] - ends[:, 0]
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    way = way - np.sum(way * along, axis=1)[:, None] * along
+    return np.asarray(way / np.linalg.norm(way, axis=1)[:, None])
+
+
+def _clipped(ends: Array, patch: PlanePatch, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
+    """Parts (p, 2, 3) of segments on the plane of a patch that lie on it; of which each is (p,)."""
+    flat = (ends - patch.origin) @ patch.axes[:2].T
+    parts, which = [], []
+    for k, (a, b) in enumerate(flat):
+        length = float(np.linalg.norm(b - a))
+        for low, high in _within(a, b, patch.cells, tolerance / length):
+            parts.append(ends[k, 0] + np.array([[low], [high]]) * (ends[k, 1] - ends[k, 0]))
+            which.append(k)
+    return np.array(parts).reshape(-1, 2, 3), np.array(which, dtype=np.int64)
+
+
+def _within(a: Array, b: Array, triangles: Array, tolerance: float) -> list[tuple[float, float]]:
+    """Ranges of the parameter of a segment ab inside a union of triangles (m, 3, 2)."""
+    found = []
+    for triangle in triangles:
+        low, high = 0.0, 1.0
+        turn = np.sign(np.linalg.det(triangle[1:] - triangle[0]))
+        for p, q in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+            inward = turn * np.array([p[1] - q[1], q[0] - p[0]])
+            at, to = inward @ (a - p), inward @ (b - p)
+            if at < 0.0 and to < 0.0:
+                low, high = 1.0, 0.0
+            elif at < 0.0 or to < 0.0:
+                share = at / (at - to)
+                low, high = (max(low, share), high) if at < 0.0 else (low, min(high, share))
+        if high - low > tolerance:
+            found.append((low, high))
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(found):
+        if merged and low <= merged[-1][1] + tolerance:
+            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        else:
+            merged.append((low, high))
+    return merged
+
 
 _SAME = 2 * SHORT  # of the body's size: ends of lines that are closer are one point
 

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from verify.compare.body import body_of
+from verify.compare.error_norm import cut_rules
 from verify.compare.hooke import Law
-from verify.compare.integration import cut_rules
-from verify.compare.kinetic import density_of
-from verify.compare.ledger import total_energy
+from verify.compare.mass import density_of
 from verify.compare.motion import field_at
-from verify.compare.motion_account import MotionAccount
+from verify.compare.motion_account import MotionAccount, total_energy
 from verify.compare.strain_energy import difference_energy, short_wave_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric

@@ -1,6 +1,6 @@
-"""The body and its cuts as asked, as the comparison sees them in space."""
+"""Simplices in space with cuts that end somewhere, and solid bodies of them, as asked."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate_kernels import holding_cells
-from verify.compare.simplex_body import SimplexBody
-from verify.compare.simplices import simplices
+from verify.compare.sides import distance_to_segments
+from verify.compare.simplices import measures, simplices
 from verify.errors import UnsupportedSceneError
+from verify.geometry.patches import Patch
 from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
@@ -19,6 +20,63 @@ from verify.scene.mesh_file import read_mesh
 
 Array = NDArray[np.float64]
 Inside = Callable[[Array], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimplexBody:
+    """Tetrahedra, or triangles in space, with cuts.
+
+    Parameters
+    ----------
+    corners : (m, k + 1, 3) array
+        Simplices that make up the body.
+    cuts : mapping of str to sequence of Patch
+        The cuts as asked, not trimmed.
+    front : (f, 2, 3) array
+        Where cuts end inside the body, as segments: of a membrane, tips, without length.
+    box : (2, 3) array, optional
+        Lower and upper corner, if it is a box.
+    """
+
+    corners: Array
+    cuts: Mapping[str, Sequence[Patch]]
+    front: Array
+    box: Array | None = None
+    dimension = 3
+
+    @property
+    def cell_dimension(self) -> int:
+        """Dimension k of the simplices: 3 of a solid, 2 of a membrane."""
+        return self.corners.shape[1] - 1
+
+    @property
+    def measure(self) -> float:
+        """Volume, m³, or area, m²."""
+        return float(measures(self.corners).sum())
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box, m."""
+        return float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))
+
+    @property
+    def patches(self) -> list[Patch]:
+        """Patches of all cuts."""
+        return [patch for patches in self.cuts.values() for patch in patches]
+
+    @property
+    def has_cuts(self) -> bool:
+        """Whether anything is cut."""
+        return bool(self.cuts)
+
+    def tip_distance(self, points: Array) -> Array:
+        """Distance (n,) of points (n, 3) to the nearest front; infinite without one."""
+        return distance_to_segments(points, self.front)
+
+    def frames_at(self, points: Array) -> Array | None:
+        """Two tangents and the normal (n, 3, 3) of a surface at points (n, 3); a solid has none."""
+        return None
+
 
 _RIM = 64  # pieces that a rim is divided into per body's size, where it is trimmed to the body
 _MARGIN = 1e-9  # of the body's size: closer to its surface is on it

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.body_rule import Rule
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field, SolutionField
-from verify.compare.simplex_rule import simplex_rule
-from verify.compare.simplices import in_frames, triangle_frames
-from verify.compare.slabs import Rule
+from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
 from verify.errors import InputError
 from verify.solution import Solution
 

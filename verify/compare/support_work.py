@@ -31,9 +31,8 @@ from scipy.sparse.linalg import cg
 
 from verify.compare.extension import Extension
 from verify.compare.hooke import Law
-from verify.compare.load_work import nodal_forces
+from verify.compare.load_work import PrescribedNodes, nodal_forces, prescribed_nodes
 from verify.compare.locate import SolutionField
-from verify.compare.prescribed_motion import PrescribedNodes, prescribed_nodes
 from verify.compare.strain_energy import stress_power, viscous_power
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction

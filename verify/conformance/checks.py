@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from verify.compare.hooke import hooke, law_of
-from verify.compare.ledger import energy_scale, total_energy
-from verify.compare.motion_account import MotionAccount, motion_account
+from verify.compare.motion_account import MotionAccount, energy_scale, motion_account, total_energy
 from verify.conformance import scenes
 from verify.conformance.check import Check, Finding
 from verify.conformance.field_check import (

@@ -19,8 +19,8 @@ import numpy as np
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut, welded
+from verify.compare.error_norm import cut_rules
 from verify.compare.hooke import hooke
-from verify.compare.integration import cut_rules
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import nodal_strain_energy

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from verify.compare.body import body_of
 from verify.compare.error_field import Truth, nodal_differences, truth_of
+from verify.compare.hooke import strain_and_stress
 from verify.compare.locate import SolutionField
-from verify.compare.stress import strain_and_stress
 from verify.errors import InputError
 from verify.json_files import read_json
 from verify.records import CutRecord
@@ -48,7 +48,7 @@ def export_fields(
     """Write the stored solutions of a run for ParaView.
 
     Point data are ``displacement`` (m) and, where a solution has it, ``velocity`` (m/s); cell data
-    ``strain``, ``stress`` (Pa) and ``von_mises`` (Pa) as `verify.compare.stress` has them at the
+    ``strain``, ``stress`` (Pa) and ``von_mises`` (Pa) as `verify.compare.hooke` has them at the
     centres, and ``side``, where the solver labels its parts.
 
     Parameters

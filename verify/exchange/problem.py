@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from reference.exact import ExactSolution, exact_of
 from verify.compare.hooke import hooke
-from verify.compare.splitting import measures
+from verify.compare.simplices import measures
 from verify.errors import UnsupportedSceneError
 from verify.scene import (
     Box,

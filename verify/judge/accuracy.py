@@ -10,15 +10,20 @@ from dataclasses import replace
 import numpy as np
 
 from verify.compare.body import AnyBody, body_of
-from verify.compare.energy_account import ACCOUNT, account_metrics, ledger_notices
-from verify.compare.error_history import ERROR_NAMES, History, compared_times, error_history
-from verify.compare.errors import Rules
+from verify.compare.error_norm import spread_of
+from verify.compare.errors import ERROR_NAMES, History, Rules, compared_times, error_history
 from verify.compare.hooke import Law, law_of
-from verify.compare.integration import spread_of
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import SolutionMotion
 from verify.compare.motion_account import motion_account
-from verify.compare.part_account import motion_history, part_metrics, part_records
+from verify.compare.part_account import (
+    ACCOUNT,
+    account_metrics,
+    ledger_notices,
+    motion_history,
+    part_metrics,
+    part_records,
+)
 from verify.compare.released import released_metrics
 from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError

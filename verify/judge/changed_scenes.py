@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from verify.compare.realised_geometry import polylines_of, triangles_of
+from verify.compare.cut_deviation import polylines_of, triangles_of
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut, realised_cut
-from verify.compare.error_history import error_history
-from verify.compare.errors import Rules
+from verify.compare.errors import Rules, error_history
 from verify.compare.hooke import Law
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import Motion, SolutionMotion

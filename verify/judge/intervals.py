@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import inf
 
-from verify.compare.energy_account import ACCOUNT
-from verify.compare.error_history import ERROR_NAMES
+from verify.compare.errors import ERROR_NAMES
+from verify.compare.part_account import ACCOUNT
 from verify.result import Metric
 from verify.scene.acceptance import OVERLAP
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.opening import cut_place
-from verify.compare.simplex_rule import points_in
+from verify.compare.cut_profile import cut_place
+from verify.compare.simplices import points_in
 from verify.judge.quantities import Measured
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
 

@@ -5,12 +5,12 @@ import numpy as np
 from verify.compare.blade_intensity import blade_intensity
 from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut
+from verify.compare.cut_profile import opening, point_displacement
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
-from verify.compare.opening import opening, point_displacement
-from verify.compare.part_quantity import part_quantity, part_unit
+from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError

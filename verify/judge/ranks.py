@@ -5,7 +5,7 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from verify.compare.energy_account import ACCOUNT
+from verify.compare.part_account import ACCOUNT
 from verify.judge.cost import (
     cost_comparisons,
     data_profiles,

@@ -9,21 +9,23 @@ from typing import Any, Protocol
 import numpy as np
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.body_rule import body_rule
-from verify.compare.error_history import (
+from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
+from verify.compare.error_norm import ErrorNorm
+from verify.compare.errors import (
     ERROR_NAMES,
+    ERRORS,
+    NEAR,
     History,
+    Rules,
     base_of,
     compared_times,
     error_history,
+    near_radius,
 )
-from verify.compare.error_norm import ErrorNorm
-from verify.compare.errors import ERRORS, NEAR, Rules, near_radius
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import simplices
-from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.error_fall import counted_order, cut_on_the_way, error_fall

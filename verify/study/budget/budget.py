@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
-from verify.compare.error_history import mean_over
-from verify.compare.error_norm import ErrorNorm, displacement_error, energy_error
+from verify.compare.error_norm import ErrorNorm, displacement_error, energy_error, rules
+from verify.compare.errors import mean_over
 from verify.compare.hooke import Hooke, Law
-from verify.compare.integration import rules
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
 from verify.judge.intervals import quotient_half_width

@@ -6,9 +6,8 @@ from statistics import median
 from typing import Any
 
 from verify.compare.body import AnyBody
-from verify.compare.error_norm import ErrorNorm
+from verify.compare.error_norm import ErrorNorm, rules, spread_of
 from verify.compare.hooke import Law, hooke, law_of
-from verify.compare.integration import rules, spread_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.changed_scenes import at_rest, with_kinematics

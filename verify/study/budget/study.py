@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
+from verify.compare.cut_deviation import polylines_of
 from verify.compare.hooke import hooke
-from verify.compare.realised_geometry import polylines_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.geometry.nearest import feet
 from verify.judge.changed_scenes import coarsest
