@@ -4,6 +4,7 @@ A front has the columns of its supernode and, below them, the rows that these co
 factor columns are stored one after the other: a panel (width, height) of which row j is column j
 of the factor, from its diagonal on. What is before the diagonal is never read. The update matrix of
 a front waits on a stack until the parent front adds it. Products of many columns are those of BLAS.
+`plan` is a `verify.accelerated.fronts.FrontPlan`.
 """
 
 import numpy as np

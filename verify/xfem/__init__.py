@@ -119,8 +119,8 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.s
 
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
-`rigid_motion`, `slack_membranes`, `stability`, `equilibrium`
-    load steps at finite rotation: rigid motion first, second paths, stability
+`rigid_motion`, `stability`, `equilibrium`
+    load steps at finite rotation: rigid motion first, second paths, stability, slack membranes
 `energy_balance`, `energy_momentum`, `real_time`, `inherit`, `release`
     energies of a motion; a scheme that keeps energy and momentum, one of a linear solve per step;
     the state of a body that is cut on the way, and forces that fade where it lets go

@@ -9,14 +9,8 @@ from verify.xfem.arrays import Bools, Floats, finite_array
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.rigid_motion import RigidMotions
-from verify.xfem.static_newton import (
-    ROUND_OFF,
-    Descent,
-    Newton,
-    NotInEquilibriumError,
-    is_stable,
-    way_out,
-)
+from verify.xfem.stability import Descent, is_stable, way_out
+from verify.xfem.static_newton import ROUND_OFF, Newton, NotInEquilibriumError
 from verify.xfem.supports import check_fixed
 
 _HALVINGS = 6  # of a load step
