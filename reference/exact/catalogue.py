@@ -6,7 +6,7 @@ from typing import Any
 
 from reference.exact.arc_crack import ArcCrack, CircularCut
 from reference.exact.field import Hooke, Parameters, hooke
-from reference.exact.moving_cracks import BladeStrip
+from reference.exact.moving_cracks import BladeStrip, ReleasedBar
 from reference.exact.penny import Penny
 from reference.exact.smooth_fields import (
     Airy,
@@ -93,6 +93,11 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "3D, moving: mode III crack that advances through a strip gripped at ±grip: half_width, "
         "grip, speed, tip at the time 0, angle of its way in the x-y plane",
     ),
+    "released_bar": (
+        ReleasedBar,
+        "moving: a strained bar between held ends, let go across at the time 0: strain, ends along "
+        "x, at, origin",
+    ),
 }
 _LAYERS = (
     "linear on each of four parts, two materials and a cut: point, slope or angle, interface_slope "
@@ -100,8 +105,9 @@ _LAYERS = (
 )
 _IN_SPACE = (
     "linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "straight_front",
-    "blade_strip",
+    "blade_strip", "released_bar",
 )  # fmt: skip
+_IN_BOTH = ("linear", "released_bar")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 
@@ -158,7 +164,7 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         raise InputError(
             f"exact solution '{name}' is plane; material.plane = 'strain' or 'stress' is missing"
         )
-    if law.dimension == 2 and name in _IN_SPACE and name != "linear":
+    if law.dimension == 2 and name in _IN_SPACE and name not in _IN_BOTH:
         raise InputError(f"exact solution '{name}' is one of space; this scene is plane")
     given = Parameters(name, parameters)
     solution = make(law, given)

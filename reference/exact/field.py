@@ -226,6 +226,10 @@ class ExactField(ABC):
         """Stress (n, d, d), Pa."""
         return self.law.stress(self.gradient(points, near))
 
+    def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
+        """Whether (n,) stress is smooth within a distance of points, m: no front of a wave is."""
+        return np.ones(len(points), dtype=bool)
+
     def kinks(self, start: Array, end: Array) -> list[float]:
         """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`.
 

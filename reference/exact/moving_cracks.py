@@ -1,13 +1,13 @@
-"""Cracks in motion: a blade through a prestretched strip, and a crack that is loaded suddenly."""
+"""Motions known exactly: a blade through a prestretched strip, a bar let go, a sudden crack."""
 
 from copy import copy
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from reference.exact.field import Hooke, Parameters
-from reference.exact.solution import Array, ExactSolution
+from reference.exact.solution import Array, ExactSolution, Plane
 from verify.errors import InputError
 from verify.scene import Scene
 
@@ -135,6 +135,117 @@ class BladeStrip(ExactSolution):
         """Places ahead of the tip and across the cut, m."""
         x, y = ((np.asarray(points, dtype=float)[:, :2] - self._tip) @ self._axes.T).T
         return x - self._v * self.time, y
+
+
+class ReleasedBar(ExactSolution):
+    """Uniaxial strain of a bar between held ends, let go across at the time 0: d'Alembert's waves.
+
+    Until then u_x = ε (x − x₀). Then both faces of the cut, or the end that was
+    pulled, are free of traction, and waves run at c = √((λ+2μ)/ρ), in space without lateral
+    contraction in which the sides are held or Poisson's ratio is zero; see `wave`.
+
+    Parameters ``strain`` ε, ``ends`` of the bar along x (m), ``at``, where it is let go (m):
+    between the ends, or one of them, and ``origin`` x₀ (m, default 0). The material needs a
+    density.
+    """
+
+    moves = True
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        super().__init__(law)
+        self._strain = float(parameters.take("strain", ()))
+        self._ends = parameters.take("ends", (2,))
+        self._at = float(parameters.take("at", ()))
+        self._origin = float(parameters.take("origin", (), default=0.0))
+        if parameters.has("ends") and not self._ends[0] <= self._at <= self._ends[1]:
+            raise InputError(f"parameters.at = {self._at:g}; expected between the ends")
+        if law.density is None:
+            raise InputError("a bar in motion needs the density of the material")
+        self._speed = float(np.sqrt((law.lame + 2 * law.shear) / law.density))
+        self.time = 0.0
+
+    def at(self, time: float) -> Self:
+        """Return the field at a time, s."""
+        other = copy(self)
+        other.time = float(time)
+        return other
+
+    @property
+    def cut_plane(self) -> Plane | None:
+        """Where the bar is let go across, unless at an end."""
+        axis = np.eye(self.dimension)[0]
+        if self._at in self._ends:
+            return None
+        return self._at * axis, axis
+
+    def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
+        """Whether no front of a wave is within a distance of points; see `ExactField`."""
+        _, far, length = self._local(points, None)
+        run = self._speed * self.time
+        front = length - np.abs(run % (2 * length) - length)
+        return np.asarray(np.abs(far - front) > reach)
+
+    def strain_energy(self, body: Array | Scene) -> float:
+        """Refuse: the tractions on the surface do not say it."""
+        raise InputError("the strain energy of a moving field is no work on the surface")
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, d), m; see `ExactSolution`."""
+        side, far, length = self._local(points, near)
+        start = np.asarray(points)[:, 0] - self._origin
+        return self._along(start + side * wave(far, length, self._speed * self.time)[0])
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
+        _, far, length = self._local(points, near)
+        slope = 1.0 + wave(far, length, self._speed * self.time)[1]
+        return self._along(slope)[:, :, None] * np.eye(self.dimension)[0]
+
+    def velocity(self, points: Array, near: Array | None = None) -> Array:
+        """Velocity (n, d), m/s; see `ExactSolution`."""
+        side, far, length = self._local(points, near)
+        return self._along(side * self._speed * wave(far, length, self._speed * self.time)[2])
+
+    def _along(self, values: Array) -> Array:
+        """Vectors (n, d) along the bar, of values (n,) per strain."""
+        return self._strain * values[:, None] * np.eye(self.dimension)[0]
+
+    def _local(self, points: Array, near: Array | None) -> tuple[Array, Array, Array]:
+        """Side (n,) of the release, 1 or −1, distance from it, and length of that part, m."""
+        x = np.asarray(points, dtype=float)[:, 0]
+        decides = (x if near is None else np.asarray(near)[:, 0]) - self._at
+        above = (decides >= 0.0) & (self._at < self._ends[1])
+        side = np.where(above, 1.0, -1.0)
+        length = np.where(above, self._ends[1] - self._at, self._at - self._ends[0])
+        return side, side * (x - self._at), length
+
+
+def wave(distance: ArrayLike, length: ArrayLike, run: float) -> tuple[Array, Array, Array]:
+    """Displacement (m), slope and rate per strain of a bar whose free end is loaded suddenly.
+
+    d'Alembert's sum over reflections; the stress at the end corresponds to the strain. The slope
+    is by the distance from the end, the rate by the way that the wave has run.
+
+    Parameters
+    ----------
+    distance : array
+        From the loaded end, m; the other end is held.
+    length : array
+        Of the bar, m.
+    run : float
+        Way that a wave has run since, c t, m.
+    """
+    distance, length = np.broadcast_arrays(np.asarray(distance, float), np.asarray(length, float))
+    found, slope, rate = np.zeros((3, *distance.shape))
+    just = -1e-12 * length  # behind the front, in spite of round-off
+    sign, way = 1.0, np.zeros(distance.shape)
+    while (way <= run).any():
+        out, back = run - way - distance, run - way - 2 * length + distance
+        found += sign * (np.maximum(out, 0.0) - np.maximum(back, 0.0))
+        slope -= sign * ((out >= just).astype(float) + (back >= just))
+        rate += sign * ((out >= just).astype(float) - (back >= just))
+        sign, way = -sign, way + 2 * length
+    return found, slope, rate
 
 
 def sudden_intensity(

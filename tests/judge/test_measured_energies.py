@@ -162,6 +162,7 @@ def test_a_hidden_loss_of_three_thousandths_fails_the_prestrained_bar():
     """0.3 % of its energy, taken by a damping that the case has not; no opening shows it."""
     case = load_scene("dynamics/prestrained_bar")
     asked = case.model_dump(mode="json", by_alias=True) | {"mesh": {"cells": [[31, 2]]}}
+    asked["exact"] = None
     asked["acceptance"] = [one for one in asked["acceptance"] if one["check"] == "error"]
     honest = XfemSolver().solve(Scene.model_validate(asked), 0, 0)
     damped = Scene.model_validate(asked | {"analysis": {**asked["analysis"], "damping": [D, 0.0]}})

@@ -1,4 +1,4 @@
-"""The exact blade through a prestretched strip: motion, faces, grips, K_III and G."""
+"""Exact motions: the blade through a prestretched strip, the bar that is let go."""
 
 from itertools import pairwise
 
@@ -170,3 +170,33 @@ def test_a_facet_that_opens_behind_the_blade_costs_the_higher_order(lead, least,
     # scheme takes the waves (the table of the strip, by a scalar program)
     errors = [_strip(cells, 0.6, lead) for cells in (8, 16)]
     assert least < np.log2(errors[0] / errors[1]) < most
+
+
+@pytest.mark.parametrize("at", [0.3, 1.1, -0.2])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_bar_that_is_let_go_moves_by_waves(at, dimension):
+    """Derivatives, free faces, held ends; at rest before. Waves: study/test_cost_study.py."""
+    plane = {"plane": "strain"} if dimension == 2 else {}
+    material = Material(young=2.0, poisson=0.3, density=0.7, **plane)
+    given = {"strain": 0.02, "ends": [-0.2, 1.1], "at": at, "origin": 0.4}
+    bar = exact_solution("released_bar", given, material)
+    points = np.random.default_rng(2).uniform(-0.2, 1.1, (300, dimension))
+    step, shift = 1e-4, 1e-4 * np.eye(dimension)[0]
+    assert bar.at(-1.0).displacement(points)[:, 0] == pytest.approx(0.02 * (points[:, 0] - 0.4))
+    for time in (0.11, 0.74, 3.3):
+        field = bar.at(time)
+        far = field.smooth(points, 5e-4) & (np.abs(points[:, 0] - at) > 5e-4)
+        here = points[far]
+        assert len(here) > 280
+        along = (field.displacement(here + shift) - field.displacement(here - shift)) / (2 * step)
+        np.testing.assert_allclose(field.gradient(here)[:, :, 0], along, atol=1e-10)
+        late, early = (bar.at(time + s).displacement(here) for s in (step, -step))
+        np.testing.assert_allclose(field.velocity(here), (late - early) / (2 * step), atol=1e-10)
+        for side in (-1.0, 1.0):
+            face = np.full((1, dimension), at)
+            beside = face + side * shift
+            if -0.2 < beside[0, 0] < 1.1:
+                assert np.abs(field.stress(face, beside)).max() < 1e-14
+        for end in {-0.2, 1.1} - {at}:
+            held = np.full((1, dimension), end)
+            assert field.displacement(held)[0, 0] == pytest.approx(0.02 * (end - 0.4), abs=1e-15)

@@ -206,6 +206,7 @@ class _Fit:
         middle, half = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
         free = samples.distances(self._cuts, middle) > half
         free &= self._one_material(middle, np.stack([a, b]))
+        free &= field.smooth(middle, half)
         a, b = a[free], b[free]
         free = samples.holds(self._mesh, a) & samples.holds(self._mesh, b)
         a, b = a[free], b[free]
@@ -255,7 +256,11 @@ class _Fit:
         far = samples.distances(self._cuts, points) > _OFF * self._size
         d = scene.dimension
         around = 2 * h * np.vstack([np.eye(d), -np.eye(d)])
-        points = points[far & self._one_material(points, points + around[:, None])]
+        far &= self._one_material(points, points + around[:, None])
+        for k in range(-2, 3) if self._exact.moves else ():
+            beside = self._exact.at(time + k * _STEP * self._times[-1])
+            far &= beside.smooth(points, 3 * h)
+        points = points[far]
         if not len(points):
             return
         terms = np.zeros((len(points), d, d + 2))

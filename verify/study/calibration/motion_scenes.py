@@ -6,33 +6,15 @@ from typing import Literal
 import numpy as np
 
 from reference.exact.field import hooke
-from reference.exact.moving_cracks import sudden_intensity
+from reference.exact.moving_cracks import sudden_intensity, wave
 from verify.scene import Material
 from verify.study.calibration.still_scenes import Content, Random
 
 _YOUNG, _DENSITY, _LENGTH = 1.0, 1.0, 1.0
 
 
-def wave(distance: float, length: float, run: float) -> float:
-    """Displacement per strain of a bar whose free end is loaded suddenly, m.
-
-    d'Alembert's sum over reflections; the stress at the end corresponds to the strain.
-
-    Parameters
-    ----------
-    distance : float
-        From the loaded end, m; the other end is held.
-    length : float
-        Of the bar, m.
-    run : float
-        Way that a wave has run since, c t, m.
-    """
-    found, sign, way = 0.0, 1.0, 0.0
-    while way < run:
-        out, back = way + distance, way + 2 * length - distance
-        found += sign * (max(run - out, 0.0) - max(run - back, 0.0))
-        sign, way = -sign, way + 2 * length
-    return found
+def _moved(distance: float, length: float, run: float) -> float:
+    return float(wave(distance, length, run)[0])
 
 
 def stretched(length: float, run: float) -> float:
@@ -85,11 +67,11 @@ def bar(random: Random) -> Content:
              "time": time / speed}
         )  # fmt: skip
         if not cut:
-            values[name] = strain * wave(_LENGTH - x, _LENGTH, time)
+            values[name] = strain * _moved(_LENGTH - x, _LENGTH, time)
         elif x < at:
-            values[name] = strain * (x - wave(at - x, at, time))
+            values[name] = strain * (x - _moved(at - x, at, time))
         else:
-            values[name] = strain * (x + wave(x - at, _LENGTH - at, time))
+            values[name] = strain * (x + _moved(x - at, _LENGTH - at, time))
     if cut:
         content["initial"] = {"kind": "equilibrium"}
         pulled = {"where": "right", "components": ["x"], "displacement": [strain * _LENGTH]}
@@ -100,7 +82,7 @@ def bar(random: Random) -> Content:
             name, time = f"opening {k}", share * run
             asked = {"kind": "opening", "name": name, "time": time / speed}
             content["quantities"].append(asked | place)
-            values[name] = strain * (wave(0.0, at, time) + wave(0.0, _LENGTH - at, time))
+            values[name] = strain * (_moved(0.0, at, time) + _moved(0.0, _LENGTH - at, time))
         energy = released(at, run) + released(_LENGTH - at, run)
     else:
         pull = [modulus * strain, *[0.0] * (dimension - 1)]
