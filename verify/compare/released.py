@@ -6,9 +6,12 @@ an element. With an exact field they are the difference from it; without one, mo
 below 4h/c, c the speed of shear waves.
 """
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.compare.body import body_of
 from verify.compare.error_norm import cut_rules
@@ -21,6 +24,8 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
+
+Array = NDArray[np.float64]
 
 _UNIT = "J/m²"
 _PERIODS = 4.0  # shortest waves last up to that many h/c
@@ -83,11 +88,81 @@ def released_metrics(
     return metrics, notes
 
 
+def blade_forces(scene: Scene, account: MotionAccount) -> dict[str, list[float]]:
+    """Return the forces on blades over the output times, in newtons (in the plane N/m).
+
+    ``driving_force_`` and the name of the cut: what the forces that hold the released cut take of
+    the body's energy per advance of the blade; positive pulls the blade on. Where the cut has a
+    toughness R, ``resistance_`` and the name: R times the width that is cut, less the driving
+    force. Both are smoothed over two intervals between outputs, and NaN while the blade rests.
+    Without an entry ``cut_work_`` and the name of the cut in the ledger, a single blade has the
+    whole ``cut_work``. Empty if no blade has any.
+    """
+    paths = [cut for cut in scene.cuts if isinstance(cut, ToolPathCut)]
+    times, found = account.times, {}
+    for cut in paths:
+        work = account.stated.get(f"cut_work_{cut.name}")
+        if work is None and len(paths) == 1:
+            work = account.stated.get("cut_work")
+        if work is None or len(times) < 2:
+            continue
+        way = travelled(cut, times)
+        length = 2.0 * float(np.diff(way).max())
+        found[f"driving_force_{cut.name}"] = driving_force(way, work, length).tolist()
+        if cut.toughness is not None:
+            steps = [swept_area(scene, [cut], *ends) for ends in pairwise(times.tolist())]
+            area = np.concatenate([[0.0], np.cumsum(steps)])
+            left = cut.toughness * (scene.material.thickness or 1.0) * area - work
+            found[f"resistance_{cut.name}"] = driving_force(way, left, length).tolist()
+    return found
+
+
+def travelled(cut: ToolPathCut, times: Array) -> Array:
+    """Length (n,) of the way that the tip of a blade has come at some times, m."""
+    steps = np.linalg.norm(np.diff(np.array(cut.points, dtype=float), axis=0), axis=1)
+    return np.interp(times, cut.moments, np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
+    """Energy (n,) per advance of a blade, smoothed, in newtons.
+
+    Parameters
+    ----------
+    advance : (n,) array
+        How far the blade has come, m; it does not decrease.
+    cut_work : (n,) array
+        Energy that it has taken since the start, J.
+    length : float
+        Of the advance over which it is smoothed, half of it before and after, m; ends cut it off.
+
+    Returns
+    -------
+    (n,) array
+        NaN where the blade does not move.
+    """
+    goes = np.diff(advance) > 0.0
+    moving = np.append(goes, False) | np.append(False, goes)
+    found = np.full(len(advance), np.nan)
+    last = np.append(goes, True)  # of instants at which the blade is in one place
+    low, high = (
+        np.clip(advance[moving] + end, advance[0], advance[-1])
+        for end in (-0.5 * length, 0.5 * length)
+    )
+    before, after = (np.interp(x, advance[last], cut_work[last]) for x in (low, high))
+    found[moving] = (after - before) / (high - low)
+    return found
+
+
 def advance(scene: Scene) -> float:
     """Area that the blades of a scene sweep in its body during the motion, m² (2D: m)."""
     duration = scene.analysis.duration
     paths = [cut for cut in scene.cuts if isinstance(cut, ToolPathCut)]
-    parts = [part for cut in paths if (part := _between(cut, 0.0, duration or 0.0)) is not None]
+    return swept_area(scene, paths, 0.0, duration or 0.0)
+
+
+def swept_area(scene: Scene, paths: Sequence[ToolPathCut], start: float, end: float) -> float:
+    """Area that blades sweep in the body of a scene between two times, m² (2D: m)."""
+    parts = [part for cut in paths if (part := _between(cut, start, end)) is not None]
     total = 0.0
     for part in parts:
         alone = scene.model_copy(update={"cuts": [part]})

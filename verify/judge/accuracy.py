@@ -24,7 +24,7 @@ from verify.compare.part_account import (
     part_metrics,
     part_records,
 )
-from verify.compare.released import released_metrics
+from verify.compare.released import blade_forces, released_metrics
 from verify.compare.simplices import simplices, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
@@ -267,7 +267,9 @@ def _measure(
             metrics, notes = metrics + kept, notes | why
         if account.lighter:
             notes["parts"] = f"{account.lighter} lighter parts are not listed"
-        record = replace(record, account=motion_history(account), parts=parts)
+        history = motion_history(account)
+        history |= blade_forces(scene, account) if history else {}
+        record = replace(record, account=history, parts=parts)
     if reference is None:
         without = _named(scene, missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes

@@ -98,6 +98,7 @@ def _over_time(
         f"change of the total energy, {unit}",
         [(s.solver, s.account["time"], [v - total[0] for v in total]) for s, total in totals],
     )
+    yield from _blade_forces(solves, unit.replace("J", "N"))
     for name, unit_ in _MOMENTA:
         curves = []
         for s in solves:
@@ -105,6 +106,20 @@ def _over_time(
                 size = [math.hypot(*at) for at in zip(*rows, strict=True)]
                 curves.append((s.solver, s.account["time"], size))
         yield f"magnitude of the {name.replace('_', ' ')}, {unit_}", curves
+
+
+def _blade_forces(solves: Sequence[SolveRecord], unit: str) -> Iterator[tuple[str, list[Curve]]]:
+    """Yield the forces on each blade: what drives it, and what is left of the toughness."""
+    names = dict.fromkeys(name for s in solves for name in s.account)
+    for prefix, words in (
+        ("driving_force_", "driving force of the blade"),
+        ("resistance_", "resistance against the blade"),
+    ):
+        for name in names:
+            if name.startswith(prefix):
+                title = f"{words} of {name.removeprefix(prefix)}, over two outputs, {unit}"
+                yield title, [(s.solver, s.account["time"], s.account[name])
+                              for s in solves if name in s.account]  # fmt: skip
 
 
 def _panels(

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.nearest import feet, nearest_parts
@@ -40,9 +40,19 @@ class CutShape(Strict):
     """What every kind of cut answers."""
 
     name: Line = "cut"
+    toughness: Positive | None = Field(
+        default=None, description="of a tool_path: energy that cutting takes, J/m²"
+    )
 
     on_the_way: ClassVar[bool] = False  # whether a tool makes it, place by place
     faceted: ClassVar[bool] = False  # whether its facets are the cut itself, however few
+
+    @field_validator("toughness")
+    @classmethod
+    def _of_a_blade(cls, toughness: float | None) -> float | None:
+        if toughness is not None and not cls.on_the_way:
+            raise ValueError("no blade makes this cut; expected it with kind = 'tool_path' alone")
+        return toughness
 
     def whole(self) -> Any:
         """Return the cut that is there in the end."""

@@ -1,4 +1,4 @@
-"""Opening of elements ahead of blades whose ways are known, and the force that drives the blades.
+"""Opening of elements ahead of blades whose ways are known.
 
 The rule of all solvers (`swept`): an element opens in the step in which the blade begins to sweep
 the cut in the support of one of its nodes; what is then released is held by forces that fade with
@@ -62,38 +62,3 @@ class KnownWays:
 
 def _passes(path: ToolPath) -> Callable[[Floats], Floats]:
     return lambda points: path.time_at(path.sweep.probed(points)[:, 2])
-
-
-def driving_force(advance: Floats, cut_work: Floats, length: float) -> Floats:
-    """Energy (n,) that a blade takes from a body per advance, smoothed, in newtons.
-
-    It pulls the blade on where it is positive; in the plane it is per metre of thickness.
-
-    Parameters
-    ----------
-    advance : (n,) float array
-        How far the blade has come, m; it does not decrease.
-    cut_work : (n,) float array
-        Work that the forces of its cut have taken since the start, J.
-    length : float
-        Of the advance over which it is smoothed, half of it before and after, m.
-
-    Returns
-    -------
-    (n,) float array
-        NaN where the blade does not move.
-    """
-    moving = np.append(np.diff(advance) > 0.0, False) | np.append(False, np.diff(advance) > 0.0)
-    found = np.full(len(advance), np.nan)
-    if not moving.any():
-        return found
-    # of instants at which the blade is in one place, the last counts
-    last = np.append(np.diff(advance) > 0.0, True)
-    low, high = (
-        np.clip(advance[moving] + end, advance[0], advance[-1])
-        for end in (-0.5 * length, 0.5 * length)
-    )
-    gained = (np.interp(x, advance[last], cut_work[last]) for x in (low, high))
-    before, after = gained
-    found[moving] = (after - before) / (high - low)
-    return found
