@@ -1,14 +1,23 @@
 """A ledger fed with a known drift gives that drift; momenta of known motions are theirs."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from case_texts import body_text
 from cut_meshes import grid, quadratic
 from solid_meshes import cube_grid
 
 from verify.compare.mass import kinetic
 from verify.compare.motion_account import balance, energy_scale, total_energy
+from verify.compare.released import blade_forces, driving_force
+from verify.errors import InputError
+from verify.scene import load_scene
 from verify.solution import Solution
+from verify.solvers.interface import find_solver
 
+CASES = Path(__file__).parents[2] / "cases/cutting"
 TIMES = np.linspace(0.0, 2.0, 401)
 
 
@@ -96,3 +105,77 @@ def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order):
             density * (place[0] * push[1] - place[1] * push[0])
         ]  # fmt: skip
         assert found.angular[step] == pytest.approx(inertia * rate + orbit, rel=1e-12)
+
+
+def test_a_blade_that_rests_has_no_driving_force_and_one_that_moves_has_the_mean():
+    advance = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 2.0, 3.0])
+    work = np.array([0.0, 0.0, 1.0, 2.0, 2.5, 3.0, 5.0, 7.0])
+    found = driving_force(advance, work, 1.0)
+    assert np.isnan(found[[0, 4]]).all()
+    # over half a metre before and after, cut off at the ends; what came at rest is before 1.0
+    np.testing.assert_allclose(found[[1, 2, 6, 7]], [2.0, 3.0, 2.0, 2.0])
+    assert np.isnan(driving_force(np.zeros(3), work[:3], 1.0)).all()
+
+
+MOTION = '[analysis]\nkind = "dynamic"\nduration = 4.0\noutputs = 5\n'
+BLADE = """
+[[cuts]]
+kind = "tool_path"
+name = "{name}"
+points = [[0, {y}, 1.2], [0.6, {further}, 1.2], [1.2, {y}, 1.2]]
+speed = 0.5
+depth = 0.7
+direction = [0, 0, -1]
+"""
+
+
+def blades(tmp_path, text):
+    body = body_text(
+        "blades", "Forces shall be right.", [2.0, 1.0, 1.0], [[4, 4, 4]], density="1e3"
+    )
+    (tmp_path / "blades.toml").write_text(body + MOTION + text)
+    return load_scene(tmp_path / "blades.toml")
+
+
+def test_what_a_toughness_asks_is_that_of_the_area_in_the_body_less_the_driving_force(tmp_path):
+    """The way is two slopes of 0.6 by 0.8 m, 0.5 m of the blade is in the body."""
+    one = BLADE.format(name="first", y=0.1, further=0.9) + "toughness = 30.0\n"
+    scene = blades(tmp_path, one)
+    times = np.array([0.0, 0.5, 1.0, 3.0, 4.0])
+    stated = {"cut_work": np.array([0.0, 1.0, 2.0, 6.0, 8.0])}
+    forces = blade_forces(scene, SimpleNamespace(times=times, stated=stated))
+    assert list(forces) == ["driving_force_first", "resistance_first"]
+    np.testing.assert_allclose(forces["driving_force_first"], 4.0)  # 2 J/s at 0.5 m/s
+    np.testing.assert_allclose(forces["resistance_first"], 30.0 * 0.5 - 4.0)
+    # of two blades the ledger has to tell them apart
+    two = blades(tmp_path, one + BLADE.format(name="second", y=0.95, further=0.95))
+    assert blade_forces(two, SimpleNamespace(times=times, stated=stated)) == {}
+    told = stated | {"cut_work_second": 3.0 * stated["cut_work"]}
+    forces = blade_forces(two, SimpleNamespace(times=times, stated=told))
+    assert list(forces) == ["driving_force_second"]
+
+
+def test_a_cut_that_no_blade_makes_has_no_toughness(tmp_path):
+    cut = '[[cuts]]\nkind = "disc"\ncentre = [1, 0.5, 0.5]\nnormal = [1, 0, 0]\nradius = 0.2\n'
+    with pytest.raises(InputError, match=r"toughness: no blade makes this cut; expected it with"):
+        blades(tmp_path, cut + "toughness = 30.0\n")
+
+
+def test_the_driving_force_of_the_exact_strip_is_the_energy_release_rate_times_its_width(tmp_path):
+    """XFEM, 0.3 of the waves' speed; over the middle of the way.
+
+    At that speed forces that fade over two elements take 0.95 to 1 of G (blade.md), with lumped
+    masses on cut elements 0.85; another tenth is the mesh of 13 elements across the strip. The ends
+    are left out: what opened at the start was held by nothing, and where a way ends inside an
+    element the rule opens none.
+    """
+    text = (CASES / "blade_strip_03.toml").read_text(encoding="utf-8")
+    text = text.replace("[99, 33, 1]", "[39, 13, 1]").replace("outputs = 3", "outputs = 9")
+    (tmp_path / "strip.toml").write_text(text.replace("[51, 17, 1]", "[33, 11, 1]"))
+    scene = load_scene(tmp_path / "strip.toml")
+    found = find_solver("xfem").solve(scene, 2, 0)
+    stated = SimpleNamespace(times=found.times, stated=found.ledger)
+    force = np.array(blade_forces(scene, stated)["driving_force_cut"])
+    middle = (found.times > 0.04) & (found.times < 0.14)
+    np.testing.assert_allclose(force[middle] / (0.36 * 0.005), 1.0, atol=0.25)
+    assert force[middle].mean() / (0.36 * 0.005) == pytest.approx(1.0, abs=0.15)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from verify.compare.released import driving_force
 from verify.simulator import Hold, Session, Stage
 from verify.simulator import session as played
-from verify.simulator.openings import driving_force
 from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
 from verify.xfem.elasticity import isotropic
@@ -201,12 +201,3 @@ def test_the_driving_force_of_a_stretched_strip_is_its_energy_release_rate() -> 
     between = (advance > 0.6) & (advance < 0.9)  # a height away from both ends
     np.testing.assert_allclose(found[between], expected, rtol=0.1)
     assert np.isnan(found[advance == 0.0][:-1]).all()
-
-
-def test_a_blade_that_rests_has_no_driving_force_and_one_that_moves_has_the_mean() -> None:
-    advance = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 2.0, 3.0])
-    work = np.array([0.0, 0.0, 1.0, 2.0, 2.5, 3.0, 5.0, 7.0])
-    found = driving_force(advance, work, 1.0)
-    assert np.isnan(found[[0, 4]]).all()
-    # over half a metre before and after, cut off at the ends; what came at rest is before 1.0
-    np.testing.assert_allclose(found[[1, 2, 6, 7]], [2.0, 3.0, 2.0, 2.0])
