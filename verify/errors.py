@@ -1,5 +1,7 @@
 """Errors that users see, and what to use instead of what was removed."""
 
+import signal
+
 
 class InputError(ValueError):
     """Bad input (case file, mesh, result directory, command line).
@@ -23,6 +25,14 @@ class UnsupportedSceneError(Exception):
 
     It becomes a row of the result with its reason; it is not a crash.
     """
+
+
+class RunStoppedError(Exception):
+    """A run was asked to stop by a signal; what is finished stays."""
+
+    def __init__(self, signum: int) -> None:
+        self.signum = signum
+        super().__init__(f"interrupted by {signal.Signals(signum).name}")
 
 
 _INSTEAD = {

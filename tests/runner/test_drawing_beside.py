@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from verify.errors import RunStoppedError
 from verify.report import render, rendering
-from verify.runner import Options, RunStoppedError, drawing, run_cases
+from verify.runner import Options, drawing, run_cases
 from verify.scene import load_scene
 
 

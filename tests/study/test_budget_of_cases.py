@@ -9,8 +9,8 @@ from verify.records import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.budget.links import Solved
 from verify.study.budget.study import budget_study
+from verify.study.solving import Solved
 
 
 def solve(scenes, place, solvers, parameters=None, timed=False):

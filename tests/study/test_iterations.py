@@ -1,12 +1,15 @@
 """The study of iterations against error, by a solver whose errors are known."""
 
 import csv
+import io
 import sys
 import textwrap
+from contextlib import redirect_stdout
 
 import pytest
 
 from verify.cli import main
+from verify.study.solving import Making
 
 # nodes of the field u = t (1 + 2^-iterations + 0.01 / substeps) x; solved: without the middle part
 SOLVER = """
@@ -31,18 +34,21 @@ class Halving:
 """
 
 
-@pytest.fixture
-def found(tmp_path, monkeypatch, capsys):
-    (tmp_path / "halving.py").write_text(textwrap.dedent(SOLVER))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The rows of its table and what it said; and where it is kept."""
+    folder, said = tmp_path_factory.mktemp("halving"), io.StringIO()
+    (folder / "halving.py").write_text(textwrap.dedent(SOLVER))
     words = ["study", "iterations", "dynamics/block_falls_apart", "--solver", "halving:Halving"]
-    words += ["--iterations", "2", "4", "7", "8", "--substeps", "1", "2", "--most", "14"]
-    words += ["--tolerance", "0.02", "--out", "studies"]
-    assert main(words) == 0
+    words += ["--substeps", "1", "2", "--most", "14", "--tolerance", "0.02", "--out", "studies"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.syspath_prepend(folder)
+        with redirect_stdout(said):
+            assert main([*words, "--iterations", "2", "7", "8"]) == 0
     sys.modules.pop("halving")
-    with open("studies/iterations.csv", newline="") as file:
-        return list(csv.DictReader(file)), capsys.readouterr().out
+    with open(folder / "studies" / "iterations.csv", newline="") as file:
+        return list(csv.DictReader(file)), said.getvalue(), folder / "studies"
 
 
 def test_both_errors_are_those_of_the_solver(found):
@@ -62,6 +68,15 @@ def test_both_errors_are_those_of_the_solver(found):
 def test_the_findings_say_from_which_setting_on(found):
     out = found[1]
     assert "From 8 iterations on" in out
-    assert "No number of iterations up to 4" in out
+    assert "No number of iterations up to 2" in out
     assert out.count("Without an answer: 7.") == 2
     assert "has 8 iterations and substeps 1: 8 s" in out
+
+
+def test_every_setting_is_a_solve_that_is_kept_until_another_question_is_asked(found):
+    (run,) = found[2].glob("iterations-*/run.json")
+    solves = [path.parent.name for path in run.parent.glob("cases/*/*/record.json")]
+    assert len(solves) == 7  # 2, 7, 8 with one substep, 2, 7 with two, and both solved
+    place = Making(found[2]).place_of("iterations", "another question")
+    assert not run.exists()
+    assert place.startswith("iterations-")

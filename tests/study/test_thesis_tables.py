@@ -17,7 +17,14 @@ from verify.simulator.thesis.real_time import (
     StepTime,
     step_times,
 )
-from verify.study.thesis.measured import Measured, MethodOnCase, exponent, sliver_systems
+from verify.study.thesis import measured as measuring
+from verify.study.thesis.measured import (
+    METHODS,
+    Measured,
+    MethodOnCase,
+    exponent,
+    sliver_systems,
+)
 from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 _HOLD = (
@@ -61,8 +68,10 @@ def crossed():
 
 @pytest.fixture(scope="module")
 def slivers():
-    rows = load_scenes("slivers/plane_edges")
-    return sliver_systems([row for row in rows if row.row.value in (0.1, 1e-4, 1e-6)])
+    rows = [s for s in load_scenes("slivers/plane_edges") if s.row.value in (0.1, 1e-4, 1e-6)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measuring, "load_scenes", lambda family: rows)
+        return [one for name in METHODS for one in sliver_systems("slivers/plane_edges", name)]
 
 
 def test_a_strip_of_n_cut_triangles_enriches_n_plus_2_nodes(strips) -> None:

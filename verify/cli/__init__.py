@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from verify import __version__
 from verify.cli.signatures import Arg, Member, Parser, add_commands, arguments_of, call
 from verify.cli.streams import printable_streams
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError, RunStoppedError, UnsupportedSceneError
 from verify.printable import one_line
 from verify.threads import pin_to_one_thread
 from verify.whole_files import DISK_FAILURES
@@ -51,6 +51,8 @@ def _run(argv: Sequence[str] | None) -> int:
         return _fail(
             "this command needs numba, which is not installed: python -m pip install numba", 3
         )
+    except RunStoppedError as stop:
+        return _fail(f"{stop}; the same command resumes it", 128 + stop.signum)
     except KeyboardInterrupt:
         return _fail("interrupted", 130)
     except BrokenPipeError:  # `verify list | head`

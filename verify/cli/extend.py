@@ -119,7 +119,7 @@ def import_(
     from verify.exchange import read_answers
     from verify.exchange.comparison import compare_answers
     from verify.report import render
-    from verify.runner import Options, RunStoppedError, exit_code
+    from verify.runner import Options, exit_code
     from verify.runner.checking import check_solver_name
     from verify.scene import load_scene
 
@@ -129,14 +129,9 @@ def import_(
     found = read_answers(scene, answers)
     options = Options(solvers=tuple(beside), repetitions=repetitions, timeout=timeout)
     with progress_on(sys.stderr) as progress:
-        try:
-            result = compare_answers(
-                scene, found, solver, out, options, progress, judged_as, command_line()
-            )
-        except RunStoppedError as stop:
-            progress.close()
-            print(f"verify: {stop}; the same command resumes it", file=sys.stderr)
-            return 128 + stop.signum
+        result = compare_answers(
+            scene, found, solver, out, options, progress, judged_as, command_line()
+        )
     rank_run(out, [result], {}, False, timeout, print)
     page, code = render(out), exit_code([result], strict)
     if as_json:

@@ -21,7 +21,7 @@ from verify.cli.signatures import (
     positive,
 )
 from verify.cli.streams import command_line, print_json, print_line
-from verify.errors import InputError
+from verify.errors import InputError, RunStoppedError
 
 if TYPE_CHECKING:
     from verify.result import CaseResult
@@ -233,7 +233,7 @@ def _solved(
     """Solve, rank and render; return the exit code of a run that was stopped."""
     from verify.cli.progress import progress_on
     from verify.cli.ranking import rank_run
-    from verify.runner import RunStoppedError, run_cases
+    from verify.runner import run_cases
 
     beside = not asked.no_report and options.jobs > 1 and len(scenes) > 1
     with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:

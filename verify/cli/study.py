@@ -14,33 +14,61 @@ Writes NAME.json, NAME.csv and NAME.html into the directory. Exit code 0 whateve
 findings say: they compare methods, most of which are known to fail somewhere.
 """
 
-from argparse import Namespace
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from verify.cli.signatures import Actions, Arg, Case, Out, Repetitions, count, positive, seed
+from verify.cli.streams import command_line
+from verify.errors import InputError
+
+if TYPE_CHECKING:
+    from verify.scene import Scene
+    from verify.study.measured_scenes import MeasuredStudy
+    from verify.study.record import Study
+    from verify.study.solving import Making, Solved
 
 _SOLVER = "'NAME [PARAMETER=VALUE …]'"
 Quick = Annotated[bool, Arg("less of it, in under a minute")]
-AsJson = Annotated[bool, Arg("print the findings as JSON", flags=("--json",))]
-Variants = Annotated[
-    Sequence[str],
-    Arg(
-        "solver, with parameters of its solves; repeat for several (default: xfem and conforming)",
-        _SOLVER,
-        ("--solver",),
-    ),
-]
-Jobs = Annotated[
-    int | None,
-    Arg(
-        "processes side by side (default: all cores; nothing measured is a time)",
-        "N",
-        ("-j", "--jobs"),
-        count,
-    ),
-]
 Tolerance = Annotated[float, Arg("relative error that is good enough", "T", read=positive)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """Where a study writes, and how it says what it found."""
+
+    out: Out
+    as_json: Annotated[bool, Arg("print the findings as JSON", flags=("--json",))] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """What a study of measured scenes runs."""
+
+    solvers: Annotated[
+        Sequence[str],
+        Arg(
+            "solver, with parameters of its solves; repeat for several "
+            "(default: xfem and conforming)",
+            _SOLVER,
+            ("--solver",),
+        ),
+    ] = ()
+    processes: Annotated[
+        int | None,
+        Arg(
+            "processes side by side (default: all cores; nothing measured is a time)",
+            "N",
+            ("-j", "--jobs"),
+            count,
+        ),
+    ] = None
+    quick: Quick = False
 
 
 def slivers(
@@ -48,14 +76,16 @@ def slivers(
         Sequence[str], Arg("names, patterns or files; none: cases/slivers", "CASE")
     ] = (),
     *,
-    solvers: Variants = (),
-    processes: Jobs = None,
-    quick: Quick = False,
-    out: Out,
-    as_json: AsJson = False,
+    measured: Measured,
+    answer: Answer,
 ) -> int:
     """Errors, conditioning and explicit steps of any solver, over families of scenes."""
-    return _study("slivers", **locals())
+    from verify.study.slivers import sliver_study
+
+    def study(making: "Making") -> "Study":
+        return _over_scenes(sliver_study, cases or ["slivers/*"], None, measured, making)
+
+    return _written("slivers", answer, study)
 
 
 def energy(
@@ -63,30 +93,35 @@ def energy(
         Sequence[str], Arg("names, patterns or files; none: those tagged energy", "CASE")
     ] = (),
     *,
-    solvers: Variants = (),
-    processes: Jobs = None,
-    quick: Quick = False,
-    out: Out,
-    as_json: AsJson = False,
+    measured: Measured,
+    answer: Answer,
 ) -> int:
     """What any solver keeps of energy and momenta, over cases that move."""
-    return _study("energy", **locals())
+    from verify.study.energy import energy_study
+
+    def study(making: "Making") -> "Study":
+        return _over_scenes(energy_study, cases, None if cases else "energy", measured, making)
+
+    return _written("energy", answer, study)
 
 
-def thesis(*, quick: Quick = False, out: Out, as_json: AsJson = False) -> int:
+def thesis(*, quick: Quick = False, answer: Answer) -> int:
     """The tables and figures of the thesis measured again, its claims judged."""
-    return _study("thesis", **locals())
+    from verify.study.thesis import thesis_study
+
+    return _written("thesis", answer, lambda making: thesis_study(making, quick))
 
 
 def calibration(
     *,
     seed: Annotated[int, Arg("of the scenes", "N", read=seed)] = 30,
     quick: Quick = False,
-    out: Out,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> int:
     """Stated uncertainty of the reference against its true error."""
-    return _study("calibration", **locals())
+    from verify.study.calibration import calibration_study
+
+    return _written("calibration", answer, lambda making: calibration_study(making, quick, seed))
 
 
 def cost(
@@ -106,11 +141,29 @@ def cost(
         Literal["displacement_l2", "energy_norm", "jump_l2"], Arg("the error that is held equal")
     ] = "energy_norm",
     repetitions: Repetitions = 5,
-    out: Out,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> int:
     """Work against precision while the first cut of a case grows, at equal accuracy."""
-    return _study("cost", **locals())
+    from verify.result_files import folder_of_case
+    from verify.runner.checking import check_solver_name
+    from verify.scene import load_scene
+    from verify.study.cost import cost_study, growing_scenes
+
+    asked = tuple(dict.fromkeys(solvers)) or ("xfem", "conforming")
+
+    def study(making: "Making") -> "Study":
+        scene = load_scene(case)
+        for name in asked:
+            check_solver_name(name, "--solver")
+        scenes = growing_scenes(scene, steps)
+        # on the other mesh of this solver only the cut cells are made anew
+        given = {"conforming": {"mesh": "remeshed"}} if "conforming" in asked else {}
+        start, place = perf_counter(), f"cost-{folder_of_case(scene.name)}"
+        making.announce(f"{steps} steps of the cut '{scene.cuts[0].name}', into {place}")
+        results = making.run(scenes, place, asked, repetitions, given)
+        return cost_study(scene.name, results, metric, perf_counter() - start)
+
+    return _written("cost", answer, study)
 
 
 def budget(
@@ -132,11 +185,41 @@ def budget(
         Arg("timed repetitions of each solve (default: 5; with --quick 2)", "N", read=count),
     ] = None,
     quick: Annotated[bool, Arg("the two coarsest mesh levels, fewer models")] = False,
-    out: Out,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> int:
     """Where the error of the XFEM answer comes from, and the cheapest adequate model."""
-    return _study("budget", **locals())
+    from verify.result_files import folder_of_case
+    from verify.scene import load_scene
+    from verify.study.budget.study import budget_study
+
+    timed_repetitions = repetitions or (2 if quick else 5)
+
+    def study(making: "Making") -> "Study":
+        scene, exact = load_scene(case), None
+        if scene.judged_by_exact:
+            from reference.exact import exact_of
+
+            exact = exact_of(scene)
+
+        def solve(
+            scenes: "Sequence[Scene]",
+            place: str,
+            solvers: tuple[str, ...],
+            parameters: Mapping[str, Mapping[str, Any]] | None = None,
+            timed: bool = False,
+        ) -> "list[Solved]":
+            names = ", ".join(one.name for one in scenes)
+            making.announce(f"{place}: {', '.join(solvers)} on {names}")
+            times = timed_repetitions if timed else 1
+            below = f"budget-{folder_of_case(scene.name)}/{place}"
+            return making.solved(scenes, below, solvers, times, parameters)
+
+        found = budget_study(scene, level, tolerance, metric, exact, solve, quick)
+        for missing in found.missing:
+            making.announce(f"not available: {missing.source}: {missing.reason} ({missing.where})")
+        return found
+
+    return _written("budget", answer, study)
 
 
 def iterations(
@@ -166,17 +249,71 @@ def iterations(
         "substeps",
     ),
     tolerance: Tolerance = 0.01,
-    out: Out,
-    as_json: AsJson = False,
+    answer: Answer,
 ) -> int:
     """A solver of motion that stops by a count: its error, energy and cost."""
-    return _study("iterations", **locals())
+    from verify.scene import load_scene
+    from verify.study.iterations import Grid, iterations_study
+    from verify.study.measured_scenes import variant_of
+
+    def study(making: "Making") -> "Study":
+        scene, own = load_scene(case), variant_of(solver)
+        steps = variant_of(truth or f"{solver} step=solved")
+        grid = Grid(iterations, substeps, (names[0], names[1]), most)
+        return iterations_study(scene, own, steps, grid, tolerance, making)
+
+    return _written("iterations", answer, study)
 
 
-def _study(kind: str, **asked: Any) -> int:
-    from verify.cli.study_command import execute
+def _over_scenes(
+    study: "Callable[..., MeasuredStudy]",
+    cases: Sequence[str],
+    expression: str | None,
+    measured: Measured,
+    making: "Making",
+) -> "MeasuredStudy":
+    """Run a study of measured scenes over the cases and solvers that are asked for."""
+    from verify.runner.selection import select_cases
+    from verify.study.measured_scenes import variant_of
 
-    return execute(Namespace(study=kind, **asked))
+    named = bool(cases) and list(cases) != ["slivers/*"]
+    scenes = select_cases(cases, expression, "quick" if measured.quick and not named else "heavy")
+    variants = [variant_of(text) for text in measured.solvers or ("xfem", "conforming")]
+    processes = measured.processes or len(os.sched_getaffinity(0))
+    return study(scenes, variants, replace(making, processes=processes), measured.quick)
+
+
+def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> int:
+    """Make a study, write its record and table, render its page, and say what it found."""
+    from verify.cli.progress import progress_on
+    from verify.report.study_page import render_study
+    from verify.study.record import make_directory, write_study
+    from verify.study.solving import Making
+
+    def announce(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    new = not answer.out.exists()
+    make_directory(answer.out)  # before minutes of work
+    making = Making(answer.out, announce, progress=lambda: progress_on(sys.stderr))
+    try:
+        found = study(making)
+    except InputError:
+        if new:
+            with suppress(OSError):  # something is in it
+                answer.out.rmdir()
+        raise
+    written = write_study(answer.out, kind, found, command_line())
+    page = render_study(answer.out, kind)
+    if answer.as_json:
+        said = [asdict(finding) for finding in found.findings]
+        print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
+        return 0
+    for finding in found.findings:
+        mark = "shown" if finding.verdict is None else str(finding.verdict)
+        print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
+    print(f"report: {page}")
+    return 0
 
 
 ACTIONS = Actions((slivers, energy, thesis, calibration, cost, budget, iterations), metavar="STUDY")

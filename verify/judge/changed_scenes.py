@@ -26,22 +26,22 @@ def with_kinematics(scene: Scene, kinematics: str) -> Scene:
         raise UnsupportedSceneError(
             "the error of a membrane is not taken apart: it has no linear kinematics to begin with"
         )
-    return _changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
+    return changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
 
 
 def coarsest(scene: Scene, count: int) -> Scene:
     """Return `scene` with its first `count` mesh levels only, under its own name."""
-    return _changed(scene, "", {"mesh": _levels(scene, slice(0, count))})
+    return changed(scene, "", {"mesh": _levels(scene, slice(0, count))})
 
 
 def on_one_level(scene: Scene, level: int) -> Scene:
     """Return `scene` with one of its mesh levels only."""
-    return _changed(scene, f"level-{level}", {"mesh": _levels(scene, slice(level, level + 1))})
+    return changed(scene, f"level-{level}", {"mesh": _levels(scene, slice(level, level + 1))})
 
 
 def with_time_step(scene: Scene, step: float) -> Scene:
     """Return a dynamic `scene` with another largest time step, s."""
-    return _changed(scene, f"step-{step:.3g}", {"analysis": {"time_step": step}})
+    return changed(scene, f"step-{step:.3g}", {"analysis": {"time_step": step}})
 
 
 def at_rest(scene: Scene) -> Scene:
@@ -61,7 +61,7 @@ def at_rest(scene: Scene) -> Scene:
     }  # fmt: skip
     for key, value in (("supports", "displacement"), ("loads", "traction")):
         update[key] = [_at_last(part, value) for part in content[key]]
-    return _changed(scene, "static", update)
+    return changed(scene, "static", update)
 
 
 def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) -> Scene:
@@ -100,7 +100,7 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     changes = {"cuts": cuts, "quantities": energy, "mesh": _levels(scene, slice(level, level + 1))}
     changes["analysis"] = {"kinematics": kinematics}
     try:
-        return _changed(scene, f"realised-{kinematics}", changes)
+        return changed(scene, f"realised-{kinematics}", changes)
     except ValidationError as fault:
         what = fault.errors()[0]["msg"].removeprefix("Value error, ")
         raise UnsupportedSceneError(f"the realised cut is no geometry: {what}") from None
@@ -129,7 +129,8 @@ def _at_last(part: dict[str, Any], value: str) -> dict[str, Any]:
     return kept
 
 
-def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
+def changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
+    """Return `scene` with parts of its content replaced, as ``CASE@name``; without acceptance."""
     content = scene.model_dump(mode="json", by_alias=True)
     content |= {"acceptance": [], "known_findings": [], "tags": [], "adequacy": {}}
     for key, value in update.items():

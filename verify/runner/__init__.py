@@ -4,14 +4,13 @@ The runner knows solvers by their names only and judges nothing: the comparison 
 case (`verify.study`) runs in a process of its own too.
 """
 
-from verify.runner.run import RunStoppedError, RunSummary, exit_code, run_cases
+from verify.runner.run import RunSummary, exit_code, run_cases
 from verify.runner.selection import Options, select_cases
 from verify.runner.work import Progress
 
 __all__ = [
     "Options",
     "Progress",
-    "RunStoppedError",
     "RunSummary",
     "exit_code",
     "run_cases",

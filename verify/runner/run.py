@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from verify.errors import InputError
+from verify.errors import InputError, RunStoppedError
 from verify.processes import start_server
 from verify.provenance import provenance
 from verify.result import COMPARISON_FAILED, CaseResult, Status, Verdict
@@ -40,14 +40,6 @@ SOLVER_FAILED = 3
 NOTHING_RAN = 4
 ONLY_WARNINGS = 5
 _BROKEN = (Status.FAILED, Status.TIMEOUT, Status.MEMORY)
-
-
-class RunStoppedError(Exception):
-    """The run was asked to stop by a signal."""
-
-    def __init__(self, signum: int) -> None:
-        self.signum = signum
-        super().__init__(f"interrupted by {signal.Signals(signum).name}")
 
 
 class StopRequest:

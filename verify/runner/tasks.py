@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from importlib import import_module
 from pathlib import Path
+from shutil import rmtree
 from time import sleep
 from typing import Any, get_type_hints
 
@@ -98,6 +99,8 @@ def made(
 ) -> list[Any]:
     """Make the tasks that are not kept in `folder`; return what each has found, or a `Failure`.
 
+    In the end those of other tasks are removed from it.
+
     Parameters
     ----------
     tasks : sequence of Task
@@ -130,6 +133,10 @@ def made(
     finally:
         for child, _ in running.values():
             child.kill()
+    asked = {_folder_name(task) for task in tasks}
+    for other in folder.glob("*/task.json"):
+        if other.parent.name not in asked:
+            rmtree(other.parent)
     return [found[number] for number in range(len(tasks))]
 
 

@@ -269,6 +269,12 @@ def parameters_in(name: str) -> dict[str, Any]:
     return parameters
 
 
+def name_with(solver: str, parameters: Mapping[str, Any]) -> str:
+    """Return the name of a solver with parameters, from which `parameters_in` reads them again."""
+    said = {k: v if isinstance(v, str) else json.dumps(v) for k, v in parameters.items()}
+    return " ".join([solver, *(f"{key}={value}" for key, value in said.items())])
+
+
 def parameters_of(name: str, given: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Return those in a name, over what is `given` to its solver under the solver's own name."""
     return {**given.get(solver_in(name), {}), **parameters_in(name)}

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.judge.changed_scenes import changed
 from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
 from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.scene import PolylineCut, Scene
@@ -244,14 +244,10 @@ def growing_scenes(scene: Scene, steps: int) -> list[Scene]:
     grown = []
     for step in range(1, steps + 1):
         points = _beginning(np.array(first.points, dtype=float), step / steps)
+        content = [cut.model_dump(mode="json", by_alias=True) for cut in scene.cuts]
         expected = first.expected if step == steps else None
-        content = scene.model_dump(mode="json", by_alias=True)
-        content |= {"acceptance": [], "known_findings": [], "tags": []}
-        content["cuts"][0] |= {"points": points, "expected": expected}
-        one = Scene.model_validate(content)
-        one._file = scene.file or Path(f"{scene.name}.toml")
-        one._name = f"{scene.name}@{step}"
-        grown.append(one)
+        content[0] |= {"points": points, "expected": expected}
+        grown.append(changed(scene, str(step), {"cuts": content}))
     return grown
 
 

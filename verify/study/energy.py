@@ -8,7 +8,6 @@ from verify.result import Verdict
 from verify.scene import Scene
 from verify.study.measured_scenes import (
     AT_MOST,
-    Making,
     MeasuredStudy,
     Measurement,
     Variant,
@@ -17,6 +16,7 @@ from verify.study.measured_scenes import (
     missing_solutions,
 )
 from verify.study.record import Finding
+from verify.study.solving import Making
 
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see
 _KEPT = 1e-8
@@ -54,7 +54,7 @@ def energy_study(
     if not cases:
         raise InputError("no case with a dynamic analysis; see `verify list`")
     start = perf_counter()
-    every = measured_families(measured_scene, cases, variants, making)
+    every = measured_families("energy", measured_scene, cases, variants, making)
     return MeasuredStudy(
         findings=list(_findings(every)), seconds=perf_counter() - start, quick=quick,
         measurements=every,

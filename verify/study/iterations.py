@@ -5,7 +5,7 @@ of the whole is the distance from the smallest steps, solved. Who solves them is
 default the same one with ``step=solved``; both answer on one mesh, and nodes are compared.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from time import perf_counter
 from typing import Any
@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.judge.accuracy import assess_accuracy
+from verify.judge.changed_scenes import coarsest
 from verify.result import SolveRecord, Status
-from verify.scene import Scene
-from verify.solution import Solution, handed_over
+from verify.scene import Scene, scene_content
+from verify.solution import Solution
+from verify.solvers.interface import name_with
 from verify.study.measured_scenes import Variant
 from verify.study.record import Finding, Study
+from verify.study.solving import Making, Solved
 
 Array = NDArray[np.float64]
 
@@ -47,12 +50,12 @@ class Grid:
         most = np.inf if self.most is None else self.most
         return [count for count in sorted(self.iterations) if count * substeps <= most]
 
-    def set(self, variant: Variant, iterations: int | None, substeps: int) -> Variant:
-        """Return the variant with a setting; without iterations those that it has."""
+    def set(self, variant: Variant, iterations: int | None, substeps: int) -> str:
+        """Return the name of the variant with a setting; without iterations those that it has."""
         given = {**variant.parameters, self.names[1]: substeps}
         if iterations is not None:
             given[self.names[0]] = iterations
-        return replace(variant, parameters=given)
+        return name_with(variant.solver, given)
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def iterations_study(
     truth: Variant,
     grid: Grid,
     tolerance: float,
-    announce: Callable[[str], None] = lambda text: None,
+    making: Making,
 ) -> IterationsStudy:
     """Solve the scene's coarsest level by every setting, one after the other.
 
@@ -125,7 +128,7 @@ def iterations_study(
     grid : Grid
     tolerance : float
         Relative error that is good enough.
-    announce : callable
+    making : Making
 
     Raises
     ------
@@ -134,30 +137,32 @@ def iterations_study(
     """
     if scene.analysis.kind != "dynamic":
         raise InputError(f"{scene.name} does not move; a dynamic analysis is needed")
-    clock, solved = perf_counter(), dict[int, Solution]()
-    for count in sorted(grid.substeps):
-        announce(f"{truth.label}: {grid.names[1]} {count}, solved")
-        found = _answer(scene, grid.set(truth, None, count))
-        if isinstance(found, str):
-            raise InputError(f"'{truth.label}' has no answer: {found}", "--truth")
-        solved[count] = found
+    clock = perf_counter()
+    truths = {count: grid.set(truth, None, count) for count in sorted(grid.substeps)}
+    counted = {
+        (count, iterations): grid.set(variant, iterations, count)
+        for count in truths
+        for iterations in grid.counts(count)
+    }
+    names = tuple(dict.fromkeys([*truths.values(), *counted.values()]))
+    place = making.place_of("iterations", [scene_content(scene), names])
+    making.announce(f"{len(names)} settings of {scene.name}, into {place}")
+    (found,) = making.solved([coarsest(scene, 1)], place, names)
+    solved = {count: _truth(found, name) for count, name in truths.items()}
     finest = solved[max(solved)]
     scale = max(_rms(frame) for frame in finest.displacement)
     settings = []
-    for count in sorted(grid.substeps):
+    for count, own in solved.items():
         step = scene.analysis.time_step
         for iterations in [*grid.counts(count), None]:
-            answer: Solution | str = solved[count]
-            if iterations is not None:
-                announce(f"{variant.label}: {iterations} {grid.names[0]}, {grid.names[1]} {count}")
-                answer = _answer(scene, grid.set(variant, iterations, count))
+            name = truths[count] if iterations is None else counted[count, iterations]
             one = Setting(iterations, count, None if step is None else step / count)
-            if isinstance(answer, str):
-                one = replace(one, reason=answer)
-            else:
-                errors = [_distance(answer, other) / scale for other in (solved[count], finest)]
+            if answer := found.solutions.get(name, {}).get(0):
+                errors = [_distance(answer, other) / scale for other in (own, finest)]
                 one = replace(one, iteration_error=errors[0], whole_error=errors[1])
                 one = _measured(scene, answer, one)
+            else:
+                one = replace(one, reason=found.reason(name))
             settings.append(one)
     return IterationsStudy(
         case=scene.name, solver=variant.label, truth=truth.label, tolerance=tolerance,
@@ -166,11 +171,10 @@ def iterations_study(
     )  # fmt: skip
 
 
-def _answer(scene: Scene, variant: Variant) -> Solution | str:
-    try:
-        return handed_over(variant.found().solve(scene, 0, repetitions=1, **variant.parameters))
-    except Exception as problem:  # a guest may raise anything
-        return f"{type(problem).__name__}: {problem}"
+def _truth(found: Solved, name: str) -> Solution:
+    if solution := found.solutions.get(name, {}).get(0):
+        return solution
+    raise InputError(f"'{name}' has no answer: {found.reason(name)}", "--truth")
 
 
 def _rms(field: Array) -> float:

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,13 @@ from verify.judge.accuracy import assess_accuracy
 from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
-from verify.runner.tasks import Failure, Limits, Task, made
+from verify.runner.tasks import Failure, Task
 from verify.scene import Scene, ValueCheck, restore_scene, scene_content
 from verify.solution import handed_over
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import checked_refusal, one_name, parameters_in, solver_in
 from verify.study.record import Finding, Study
+from verify.study.solving import Making
 
 AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
 
@@ -145,26 +145,8 @@ def _place(scene: Scene) -> tuple[str, float | None]:
     return (scene.row.family, scene.row.value) if scene.row else (scene.name, None)
 
 
-@dataclass(frozen=True)
-class Making:
-    """How a study makes its parts.
-
-    Attributes
-    ----------
-    folder : Path
-        In which they are kept, for the next time.
-    announce : callable
-        Told what has ended.
-    processes : int
-        Side by side.
-    """
-
-    folder: Path
-    announce: Callable[[str], None] = lambda text: None
-    processes: int = 1
-
-
 def measured_families(
+    study: str,
     measure: Callable[[dict[str, Any], dict[str, Any]], list[Measurement]],
     families: Mapping[str, Sequence[Scene]],
     variants: Sequence[Variant],
@@ -174,6 +156,8 @@ def measured_families(
 
     Parameters
     ----------
+    study : str
+        Its name.
     measure : callable
         Of a variant and the content of a scene; as `measured_scene`.
     families : mapping of str to sequence of Scene
@@ -194,7 +178,7 @@ def measured_families(
         )
         for variant, scene in parts
     ]
-    found = made(tasks, making.folder, making.announce, Limits(making.processes))
+    found = making.parts(study, tasks, may_fail=True)
     rows = []
     for (variant, scene), own in zip(parts, found, strict=True):
         if isinstance(own, Failure):

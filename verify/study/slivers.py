@@ -29,7 +29,6 @@ from verify.scene import Box, Rectangle, Scene, restore_scene
 from verify.solvers import Solver
 from verify.study.energy import account_findings
 from verify.study.measured_scenes import (
-    Making,
     MeasuredStudy,
     Measurement,
     Variant,
@@ -38,6 +37,7 @@ from verify.study.measured_scenes import (
     missing_solutions,
 )
 from verify.study.record import Finding
+from verify.study.solving import Making
 from verify.study.step_by_running import step_by_running
 
 _FITTED = (CONDITION, SCALED, STEP)
@@ -87,7 +87,7 @@ def sliver_study(
     if not families:
         raise InputError("no case with a list of values for a parameter; see `verify list`")
     start = perf_counter()
-    every = measured_families(measured_row, families, variants, making)
+    every = measured_families("slivers", measured_row, families, variants, making)
     growths = _growths(every)
     return SliverStudy(
         findings=list(findings(every, growths)), seconds=perf_counter() - start, quick=quick,

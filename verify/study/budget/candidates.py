@@ -17,8 +17,9 @@ from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.budget import Times, distances, norm_names
-from verify.study.budget.links import JUDGED, Chain, Solve, Solved
+from verify.study.budget.links import JUDGED, Chain, Solve
 from verify.study.record import Finding
+from verify.study.solving import Solved
 
 
 @dataclass(frozen=True)

@@ -13,41 +13,12 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.changed_scenes import with_kinematics
 from verify.judge.quantities import Measured
 from verify.judge.reference import Reference, conforming_reference
-from verify.result import CaseResult
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.budget import Answer
+from verify.study.solving import Solved
 
 REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
-
-
-@dataclass(frozen=True)
-class Solved:
-    """A scene that was run: its result, and the solutions by solver and level."""
-
-    scene: Scene
-    result: CaseResult
-    solutions: Mapping[str, Mapping[int, Solution]]
-
-    def solution(self, solver: str, level: int) -> Solution:
-        """Return one solution.
-
-        Raises
-        ------
-        InputError
-            If there is none, with the reason.
-        """
-        try:
-            return self.solutions[solver][level]
-        except KeyError:
-            reason = self.reason(solver) or "not run"
-            text = f"'{self.scene.name}' was not solved by {solver} on level {level}: {reason}"
-            raise InputError(text) from None
-
-    def reason(self, solver: str) -> str:
-        """Why a solver has not solved all that it was to solve; empty if it has."""
-        reasons = {r.reason for r in self.result.solves if r.solver == solver and r.reason}
-        return "; ".join(sorted(reasons))
 
 
 class Solve(Protocol):

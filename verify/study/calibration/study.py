@@ -3,10 +3,9 @@
 A trial is one reference on a case whose truth is known: what it states, and what is true.
 """
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
-from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -24,12 +23,13 @@ from verify.judge.reference import (
     size_of,
 )
 from verify.result import Verdict
-from verify.runner.tasks import Task, all_made
+from verify.runner.tasks import Task
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
 from verify.study.calibration.families import Family, Trial, families, series_families
 from verify.study.record import Finding, Study
+from verify.study.solving import Making
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 _LEVELS = 3  # that a reference is made of
@@ -103,7 +103,6 @@ def _left_out(one: Trial) -> str:
     return ""
 
 
-FOLDER = "calibration-parts"
 COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked for
 WASTED = 10.0  # an error bar that is so many times the error judges little
 SIGNIFICANCE = 0.05  # of the binomial test that rejects a share
@@ -134,21 +133,16 @@ class CalibrationStudy(Study):
         return [{**asdict(one), "covered": one.covered, "ratio": one.ratio} for one in self.trials]
 
 
-def calibration_study(
-    quick: bool, announce: Callable[[str], None], seed: int, directory: Path
-) -> CalibrationStudy:
+def calibration_study(making: Making, quick: bool, seed: int) -> CalibrationStudy:
     """Have the reference state its uncertainty where its true error is known.
 
     Parameters
     ----------
+    making : Making
     quick : bool
         Two scenes of each family that is cheap: too few to judge a family by.
-    announce : callable
-        Is told what is being solved.
     seed : int
         Of all random numbers.
-    directory : Path
-        Where trials are kept scene by scene, so that a run that is broken off can be resumed.
 
     Raises
     ------
@@ -156,7 +150,7 @@ def calibration_study(
         If a scene cannot be solved; what was found of the others is kept.
     """
     start = perf_counter()
-    announce(f"seed {seed}")
+    making.announce(f"seed {seed}")
     found = [one for family in series_families(quick) for one in family.trials(seed)]
     tasks = [
         Task(
@@ -168,7 +162,7 @@ def calibration_study(
         for family in families(quick)
         for index in range(family.scenes)
     ]
-    found += chain.from_iterable(all_made(tasks, directory / FOLDER, announce))
+    found += chain.from_iterable(making.parts("calibration", tasks))
     findings = calibration_findings(found, quick)
     return CalibrationStudy(
         findings=findings, seconds=perf_counter() - start, trials=found, quick=quick, seed=seed

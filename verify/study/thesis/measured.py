@@ -4,7 +4,7 @@ Slivers: explicit step and condition of bodies whose cut comes ever nearer to no
 energy, step and time of each against one conforming reference or exact solution.
 """
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,14 +14,14 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.cost import work_points
 from verify.judge.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.result import CaseResult, Metric, SolveRecord, Status
-from verify.scene import Scene
+from verify.scene import load_scenes, restore_scene
 from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import Delay, Frames
 from verify.simulator.thesis.real_time import RealTime, StepTime
 from verify.solvers import find_solver
 from verify.study.measured_scenes import variant_of
 
-_METHODS = (
+METHODS = (
     "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
     "snapping",
 )  # fmt: skip
@@ -52,24 +52,21 @@ class SliverSystem:
     scaled: float
 
 
-def sliver_systems(
-    scenes: Sequence[Scene], methods: Sequence[str] = _METHODS
-) -> list[SliverSystem]:
-    """Measure the systems of rows of families of slivers, those of ε = 0 left out."""
+def sliver_systems(family: str, method: str) -> list[SliverSystem]:
+    """Measure the systems of a method on a family of slivers, the row of ε = 0 left out."""
+    variant = variant_of(method)
+    system: Any = getattr(variant.found(), "system", None)
     found = []
-    for method in _METHODS:
-        variant = variant_of(method)
-        system: Any = getattr(variant.found(), "system", None)
-        for scene in scenes:
-            if scene.row is None or not 0.0 < scene.row.value < 0.5:
-                continue
-            try:
-                own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
-            except UnsupportedSceneError:
-                continue
-            ratio = critical_step(own) / critical_step(whole)
-            raw, scaled = condition_numbers(own)
-            found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
+    for scene in load_scenes(family):
+        if scene.row is None or not 0.0 < scene.row.value < 0.5:
+            continue
+        try:
+            own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
+        except UnsupportedSceneError:
+            continue
+        ratio = critical_step(own) / critical_step(whole)
+        raw, scaled = condition_numbers(own)
+        found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
     return found
 
 
@@ -120,11 +117,23 @@ class MethodOnCase:
     changed: str
 
 
-def compare_methods(scenes: Sequence[Scene], results: Sequence[CaseResult]) -> list[MethodOnCase]:
-    """Sum up what the runner has solved and measured, and add critical steps."""
+@dataclass(frozen=True)
+class CriticalStep:
+    """Critical explicit step of a solver on a mesh level of a case, over that of the uncut mesh."""
+
+    case: str
+    solver: str
+    level: int
+    ratio: float
+
+
+def compare_methods(
+    results: Sequence[CaseResult], steps: Sequence[CriticalStep]
+) -> list[MethodOnCase]:
+    """Sum up what the runner has solved and measured, beside critical steps."""
+    known = {(one.case, one.solver, one.level): one.ratio for one in steps}
     found = []
-    for scene, result in zip(scenes, results, strict=True):
-        steps = _critical_steps(scene, {record.solver for record in result.solves})
+    for result in results:
         times = {
             (point.solver, point.level): point.seconds
             for metric in ("displacement_l2", "energy_norm")
@@ -133,7 +142,8 @@ def compare_methods(scenes: Sequence[Scene], results: Sequence[CaseResult]) -> l
         for record in result.solves:
             if record.solver != "reference":
                 key = record.solver, record.level
-                found.append(_summed_up(scene.name, record, times.get(key), steps.get(key)))
+                step = known.get((result.case, *key))
+                found.append(_summed_up(result.case, record, times.get(key), step))
     return found
 
 
@@ -174,20 +184,30 @@ def _relative(metric: Metric | None) -> float | None:
     return metric.value / metric.reference - 1.0
 
 
-def _critical_steps(scene: Scene, solvers: Set[str]) -> Mapping[tuple[str, int], float]:
-    """Over that of the uncut mesh, by solver and level, of those that hand over their system."""
+def critical_steps(content: dict[str, Any], solvers: Sequence[str]) -> list[CriticalStep]:
+    """Measure those solvers that hand over their system.
+
+    Parameters
+    ----------
+    content : dict
+        Scene, as `verify.scene.scene_content` writes it.
+    solvers : sequence of str
+    """
+    scene = restore_scene(content)
+    name = scene.name
     # any density does: the ratio does not depend on it
     heavy = scene.material.model_copy(update={"density": scene.material.density or 1.0})
     scene = scene.model_copy(update={"material": heavy})
-    found = {}
-    for name in sorted(solvers - {"reference"}):
-        system: Any = getattr(find_solver(name), "system", None)
+    found = []
+    for solver in solvers:
+        system: Any = getattr(find_solver(solver), "system", None)
         for level in range(scene.mesh.count) if system is not None else ():
             try:
                 own, whole = with_uncut_twin(system, scene, level, {})
-                found[name, level] = critical_step(own) / critical_step(whole)
+                ratio = critical_step(own) / critical_step(whole)
             except (UnsupportedSceneError, InputError):
                 continue  # the solver has said why
+            found.append(CriticalStep(name, solver, level, ratio))
     return found
 
 

@@ -6,19 +6,29 @@ from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
-from verify.result import CaseResult
-from verify.scene import Scene, load_scenes
+from verify.judge.changed_scenes import coarsest
+from verify.runner.tasks import Task
+from verify.scene import load_scene, scene_content
 from verify.simulator.thesis.added_nodes import count_face, count_strips
 from verify.simulator.thesis.delays import (
     SPEEDS,
+    Delay,
+    Frames,
     delays,
     published_rows,
     published_source,
     with_other_frames,
 )
-from verify.simulator.thesis.real_time import CUTS, TETRAHEDRA, real_time, step_times
+from verify.simulator.thesis.real_time import CUTS, TETRAHEDRA, RealTime, real_time, step_times
 from verify.study.record import Study
-from verify.study.thesis.measured import Measured, compare_methods, sliver_systems
+from verify.study.solving import Making
+from verify.study.thesis.measured import (
+    METHODS,
+    Measured,
+    compare_methods,
+    critical_steps,
+    sliver_systems,
+)
 from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 # exact without tips, exact with tips inside elements, and references in the plane and in space
@@ -89,59 +99,109 @@ def _line(
     }  # fmt: skip
 
 
-def thesis_study(
-    scenes: Sequence[Scene],
-    results: Sequence[CaseResult],
-    quick: bool,
-    announce: Callable[[str], None],
-    seconds: float = 0.0,
-) -> ThesisStudy:
-    """Measure the tables, and judge them together with solved cases.
+def thesis_study(making: Making, quick: bool) -> ThesisStudy:
+    """Solve the cases by all methods, measure the tables, and judge both.
 
     Parameters
     ----------
-    scenes, results : sequences
-        Cases that the methods have solved, and what the runner found.
+    making : Making
     quick : bool
-        Fewer rows of each table.
-    announce : callable
-        Told what is under way.
-    seconds : float
-        That solving the cases took, for the record.
+        Fewer cases, methods, levels, and rows of each table.
+
+    Raises
+    ------
+    ChildProcessError
+        If a table cannot be measured; what is finished is kept.
     """
     start = perf_counter()
-    announce("time of a step (Tables 4.4 and 4.5)")
-    steps = step_times(TETRAHEDRA[::4] if quick else TETRAHEDRA, CUTS[::2] if quick else CUTS)
-    announce("real time")
-    hand = real_time()
-    contended = _contention()
-    announce("unknowns (Table 4.3)")
-    strips = count_strips((1, 2, 7, 50) if quick else (1, 2, 3, 7, 50, 500))
-    face = count_face(_ROWS[:3] if quick else _ROWS)
-    announce("delays (Table 4.6)")
-    waited = delays(TETRAHEDRA[::4] if quick else TETRAHEDRA)
-    fast = next(row.speed for row in waited if row.speed_name == SPEEDS[-1])
-    frames = with_other_frames(TETRAHEDRA[0 if quick else -1], fast, (1 / 240, 1 / 15, 0.5))
-    announce("slivers and limits")
+    names, solvers = (CASES[:2], SOLVERS[:4]) if quick else (CASES, SOLVERS)
+    scenes = [coarsest(load_scene(name), 2 if quick else 3) for name in names]
+    making.announce(f"{len(solvers)} solvers on {', '.join(names)}, into thesis-cases")
+    results = making.run(scenes, "thesis-cases", solvers, 1 if quick else 3)
     families = _FAMILIES[:1] if quick else _FAMILIES
+    tables = _tables(quick)
+    slivers = [
+        Task(f"slivers, {name}, {method}", sliver_systems, {"family": name, "method": method})
+        for method in METHODS
+        for name in families
+    ]
+    steps = [
+        Task(f"critical steps, {scene.name}", critical_steps,
+             {"content": scene_content(scene), "solvers": solvers}, solvers)
+        for scene in scenes
+    ]  # fmt: skip
+    found = making.parts("thesis", [*tables.values(), *slivers, *steps])
+    rest = iter(found[len(tables) :])
+    own = dict(zip(tables, found, strict=False))
+    timed, waited = own.pop("hand"), own.pop("waits")
     measured = Measured(
-        strips=strips,
-        face=face,
-        steps=steps,
-        delays=waited,
-        frames=frames,
-        hand=hand,
-        methods=compare_methods(scenes, results),
-        slivers=sliver_systems([one for name in families for one in load_scenes(name)]),
-        contended=contended,
+        **own,
+        delays=waited.delays,
+        frames=waited.frames,
+        hand=timed.hand,
+        contended=timed.contended,
+        slivers=[one for _ in slivers for one in next(rest)],
+        methods=compare_methods(results, [one for _ in steps for one in next(rest)]),
     )
     findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
     return ThesisStudy(
-        findings=findings, seconds=seconds + perf_counter() - start, measured=measured, quick=quick
+        findings=findings, seconds=perf_counter() - start, measured=measured, quick=quick
     )
 
 
-def _contention() -> str:
-    """Say so if the machine has more to do than it has cores."""
+def _tables(quick: bool) -> dict[str, Task]:
+    """Return the parts that the simulator measures, by their names in `Measured`."""
+    tetrahedra = TETRAHEDRA[::4] if quick else TETRAHEDRA
+    cuts, rows = (CUTS[::2], _ROWS[:3]) if quick else (CUTS, _ROWS)
+    frames = {"tetrahedra": tetrahedra, "other": TETRAHEDRA[0 if quick else -1],
+              "frames": (1 / 240, 1 / 15, 0.5)}  # fmt: skip
+    lengths = (1, 2, 7, 50) if quick else (1, 2, 3, 7, 50, 500)
+    asked: dict[str, tuple[str, Callable[..., Any], dict[str, Any]]] = {
+        "steps": ("Tables 4.4 and 4.5, time of a step", step_times,
+                  {"tetrahedra": tetrahedra, "cuts": cuts}),
+        "hand": ("real time", timed_hand, {}),
+        "strips": ("Table 4.3, strips", count_strips, {"lengths": lengths}),
+        "face": ("Table 4.3, face", count_face, {"rows": rows}),
+        "waits": ("Table 4.6, delays", waits, frames),
+    }  # fmt: skip
+    return {key: Task(*one) for key, one in asked.items()}
+
+
+@dataclass(frozen=True)
+class TimedHand:
+    """Real time of the hand, and why times may be too long, if they may."""
+
+    hand: RealTime
+    contended: str
+
+
+def timed_hand() -> TimedHand:
+    """Measure the hand, and say so if the machine has more to do than it has cores."""
+    hand = real_time()
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    return f"the machine was busy: load {load:.1f} on {cores} cores" if load > cores else ""
+    busy = f"the machine was busy: load {load:.1f} on {cores} cores" if load > cores else ""
+    return TimedHand(hand, busy)
+
+
+@dataclass(frozen=True)
+class Waits:
+    """Table 4.6: delays, and what other lengths of frames change of them."""
+
+    delays: list[Delay]
+    frames: list[Frames]
+
+
+def waits(tetrahedra: Sequence[int], other: int, frames: Sequence[float]) -> Waits:
+    """Measure delays over sizes of meshes, and at the fastest speed with frames of other lengths.
+
+    Parameters
+    ----------
+    tetrahedra : sequence of int
+    other : int
+        Size of the mesh on which frames are of other lengths.
+    frames : sequence of float
+        Those lengths, s.
+    """
+    found = delays(tetrahedra)
+    fast = next(row.speed for row in found if row.speed_name == SPEEDS[-1])
+    return Waits(found, with_other_frames(other, fast, frames))
