@@ -155,7 +155,8 @@ def split_at_part_ends(
     names = (*scene.geometry.parts(), "boundary")
     parts = {s.where for s in scene.supports}
     parts |= {load.where for load in scene.loads if isinstance(load, Traction)}
-    formulas = [one for one in sorted(parts - set(names)) if is_affine(one)]
+    formulas = [one for one in sorted(parts - set(names)) if not scene.geometry.is_part(one)]
+    formulas = [one for one in formulas if is_affine(one)]
     for _ in range(_MOST_PASSES):
         edges, places = _ends_in_facets(scene, formulas, points, _boundary(cells))
         if not len(edges):

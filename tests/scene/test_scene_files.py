@@ -94,16 +94,16 @@ def test_a_mesh_file_gives_simplices_of_positive_orientation(tmp_path):
 @pytest.mark.parametrize(
     "options, expected",
     [
-        ({"cells": (("quad", [[0, 1, 2, 3]]),)}, "not simplicial: has quad; expected triangles"),
-        ({"cells": (("line", [[0, 1]]),)}, "not simplicial: has line"),
-        ({"cells": (("triangle", TRIANGLES), ("quad", [[0, 1, 2, 3]]))}, "simplicial: has quad"),
+        ({"cells": (("tetra", [[0, 1, 2, 3]]),)}, "has tetra; expected triangles"),
+        ({"cells": (("line", [[0, 1]]),)}, "has line; expected triangles"),
+        ({"cells": (("triangle", TRIANGLES), ("tetra", [[0, 1, 2, 3]]))}, "has tetra; expected"),
         ({"points": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0]])}, "not plane"),
         ({"points": SQUARE * [[1.0, 0.0]]}, "2 cells without volume"),
         ({"cells": (("triangle", [*TRIANGLES, TRIANGLES[0]]),)}, "cells 0 and 2 overlap"),
         ({"cells": (("triangle", [*TRIANGLES, [0, 1, 3]]),)}, "cells 0 and 2 overlap"),
         ({"points": np.array([[0.0, 0], [1, 0], [1, np.nan], [0, 1]])}, "not finite"),
     ],
-    ids=["quadrangles", "only lines", "mixed", "not plane", "flat", "twice", "overlapping", "nan"],
+    ids=["tetrahedra", "only lines", "mixed", "not plane", "flat", "twice", "overlapping", "nan"],
 )  # fmt: skip
 def test_a_bad_mesh_file_is_said_in_one_line(tmp_path, options, expected):
     with pytest.raises(InputError, match=expected) as caught:

@@ -110,7 +110,7 @@ def _description(scene: "Scene") -> str:
 
     parts: list[tuple[str, list[str]]] = [
         ("tags", [", ".join(scene.tags)] if scene.tags else []),
-        ("body", [_keys(scene.geometry), *filter(None, [_size(scene)])]),
+        ("body", [_keys(scene.geometry), *filter(None, _size(scene))]),
         ("material", [_keys(scene.material)]),
         ("mesh", [_mesh(scene)]),
         ("cuts", [f"{cut.name}: {_keys(cut, 'name', 'opens_at')}" for cut in scene.cuts]),
@@ -144,13 +144,14 @@ def _description(scene: "Scene") -> str:
     return "\n".join(lines)
 
 
-def _size(scene: "Scene") -> str:
+def _size(scene: "Scene") -> list[str]:
     from verify.runner.cost import body_text
+    from verify.runner.mesh_faults import body_notes
 
     try:
-        return body_text(scene)
+        return [body_text(scene), *body_notes(scene)]
     except (InputError, OSError) as error:  # a case is described without its mesh file, too
-        return str(error)
+        return [str(error)]
 
 
 def _demand(check: Any) -> str:
@@ -235,10 +236,12 @@ def check(
                 print(f"{row['file']}: ok ({row['title']})")
                 if row["body"]:
                     print(f"  body: {row['body']}")
+                for note in row["notes"]:
+                    print(f"    {note}")
                 costs = [LevelCost(**one) for one in row["cost"]]
                 for line in case_lines(costs):
                     print(f"  {line}")
-                for warning in filter(None, [memory_line(costs), row["warning"]]):
+                for warning in filter(None, [memory_line(costs), *row["warnings"]]):
                     print(f"verify: {row['file']}: warning: {warning}", file=sys.stderr)
     if not as_json and not cache_folder().exists():  # nothing was ever run here
         print("which suite first: `verify run -k demo` (a minute) shows that all works here")
@@ -250,7 +253,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
-    from verify.runner.mesh_faults import mesh_warning
+    from verify.runner.mesh_faults import body_notes, mesh_warning, unused_groups
     from verify.scene import load_scenes
 
     try:
@@ -258,15 +261,16 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         for scene in scenes:
             check_scene(scene)
     except InputError as error:
-        error_row = {"title": None, "error": one_line(error), "body": "", "warning": ""}
-        return {"file": file, **error_row, "cost": []}
+        error_row = {"title": None, "error": one_line(error), "body": ""}
+        return {"file": file, **error_row, "notes": [], "warnings": [], "cost": []}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
     return {
         "file": file,
         "title": f"{scenes[0].title}{rows}",
         "error": None,
         "body": body_text(scenes[0]),
-        "warning": mesh_warning(scenes[0]),
+        "notes": body_notes(scenes[0]),
+        "warnings": [*filter(None, [mesh_warning(scenes[0]), unused_groups(scenes[0])])],
         "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
     }
 

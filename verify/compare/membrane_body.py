@@ -15,7 +15,7 @@ from verify.geometry.nearest import feet
 from verify.geometry.patches import PlanePatch
 from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
-from verify.scene.mesh_file import read_mesh
+from verify.scene.loading import read_mesh
 from verify.scene.tool_path import Cut
 
 Array = NDArray[np.float64]

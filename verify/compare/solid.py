@@ -16,7 +16,7 @@ from verify.geometry.spatial import rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.geometry import Box, MeshFile
-from verify.scene.mesh_file import read_mesh
+from verify.scene.loading import read_mesh
 
 Array = NDArray[np.float64]
 Inside = Callable[[Array], NDArray[np.bool_]]

@@ -95,3 +95,29 @@ def _distances(points: Array, parts: Array) -> Array:
         height /= np.linalg.norm(normal, axis=1)
         away = np.where(above, np.minimum(away, height), away)
     return away
+
+
+def on_simplices(points: Array, corners: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Tell which points (n, d) lie on simplices (m, c, d) with c corners, within a tolerance, m."""
+    from scipy.spatial import cKDTree  # commands that only read cases shall not load scipy
+
+    found = np.zeros(len(points), dtype=bool)
+    start, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    # rates of the barycentric coordinates but the first
+    rates = np.linalg.pinv(edges) if edges.shape[1] else np.swapaxes(edges, 1, 2)
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1.0 + 1e-12)
+    for begin in range(0, len(points), _AT_ONCE // 16):
+        some = points[begin : begin + _AT_ONCE // 16]
+        near = cKDTree(some).query_ball_point(middle, reach + tolerance)
+        which = np.repeat(np.arange(len(near)), [len(one) for one in near])
+        point = np.concatenate([*near, []]).astype(np.int64)
+        away = some[point] - start[which]
+        share = np.einsum("nd,ndc->nc", away, rates[which])
+        on = np.linalg.norm(away - np.einsum("nc,ncd->nd", share, edges[which]), axis=1)
+        on = on <= tolerance
+        on &= (share >= -tolerance * np.linalg.norm(rates[which], axis=1)).all(axis=1)
+        last = np.linalg.norm(rates.sum(axis=2), axis=1)[which]
+        on &= 1.0 - share.sum(axis=1) >= -tolerance * last
+        found[begin + point[on]] = True
+    return found

@@ -1,5 +1,7 @@
 """Frames, and predicates in space: triangulated cuts against a box, and each other."""
 
+from math import factorial
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -29,7 +31,11 @@ def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
 
 
 def measures(simplices: Array) -> Array:
-    """Lengths (m,) of segments (m, 2, d), or areas of triangles (m, 3, 3)."""
+    """Lengths, areas, volumes (m,) of segments, triangles, tetrahedra (m, c, d); of a point 1."""
+    count = simplices.shape[1] - 1
+    if count in (0, simplices.shape[2]):
+        sides = simplices[:, 1:] - simplices[:, :1]
+        return np.abs(np.linalg.det(sides)) / factorial(count) if count else np.ones(len(sides))
     edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
     across = 0.5 * np.cross(*edges) if len(edges) == 2 else edges[0]
     return np.asarray(np.linalg.norm(across, axis=1))

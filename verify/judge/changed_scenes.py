@@ -137,6 +137,6 @@ def changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
         merged = isinstance(value, dict) and key != "initial"  # of which each kind has its own keys
         content[key] = {**content[key], **value} if merged else value
     changed = Scene.model_validate(content)
-    changed._file = scene.file or Path(f"{scene.name}.toml")
-    changed._name = f"{scene.name}@{name}" if name else scene.name
+    file = scene.file or Path(f"{scene.name}.toml")
+    changed.came_from(file, f"{scene.name}@{name}" if name else scene.name)
     return changed

@@ -6,7 +6,7 @@ from verify.errors import InputError
 from verify.runner.mesh_faults import check_overlaps
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.placement import empty_region, part_without_mesh
+from verify.scene.placement import empty_region, group_fault, part_without_mesh
 from verify.scene.strict import nearest
 from verify.solvers import solver_names
 from verify.solvers.interface import parameters_in, solver_in
@@ -20,9 +20,8 @@ def check_scene(scene: Scene) -> None:
     if isinstance(scene.geometry, MeshFile):
         try:
             mesh = read_mesh(scene)
-            if fault := part_without_mesh(scene, *mesh) or empty_region(
-                scene, mesh[0][mesh[1]].mean(1)
-            ):
+            fault = group_fault(scene) or part_without_mesh(scene, *mesh)
+            if fault := fault or empty_region(scene, mesh[0][mesh[1]].mean(1)):
                 raise InputError(fault, where)
             check_overlaps(scene, *mesh)
         except InputError:

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.nearest import feet
+from verify.geometry.spatial import measures
 from verify.result import Notice, NoticeKind
 from verify.scene import MeshFile, Scene, read_mesh
+from verify.scene.geometry import GROUP
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,6 +24,8 @@ _CLOSE = 1e-6
 _FLAT = 1e-9  # of the same: what lies in the plane of a triangle
 # A gap is at most as wide as coordinates of three digits leave it, and narrow beside its facets.
 _GAP, _NARROW = 1e-3, 0.1
+_PARTS = {1: ("nodes", ""), 2: ("lines", "m"), 3: ("triangles", "m²"), 4: ("tetrahedra", "m³")}
+_LISTED = 5
 
 
 def check_overlaps(scene: Scene, points: Array, cells: Ints) -> None:
@@ -65,6 +69,47 @@ def mesh_warning(scene: Scene) -> str:
         f"'{scene.geometry.file}' is not joined where {'; '.join(said)}: the body is apart there; "
         "merge nodes or mesh it anew if it is not meant to be"
     )
+
+
+def body_notes(scene: Scene) -> list[str]:
+    """Say what was done to the mesh of a file, and list its groups with measure and extent."""
+    if not isinstance(scene.geometry, MeshFile):
+        return []
+    body, used = scene.geometry.body(), _used_groups(scene)
+    said = [f"of the mesh file, {note}" for note in body.notes]
+    for name, group in body.groups.items():
+        parts = {**group.parts, **({0: body.points[body.cells[group.cells]]} if len(group.cells)
+                                   else {})}  # fmt: skip
+        words = []
+        for key in sorted(parts, key=lambda c: c or 9, reverse=True):
+            what, power = _PARTS[parts[key].shape[1]]
+            size = f", {measures(parts[key]).sum():.3g} {power}" if power else ""
+            words.append(f"{len(parts[key])} {what}{size}")
+        places = np.concatenate([part.reshape(-1, scene.dimension) for part in parts.values()])
+        if not len(places):
+            continue
+        ends = zip(places.min(axis=0), places.max(axis=0), strict=True)
+        box = " × ".join(f"[{low:.3g}, {high:.3g}]" for low, high in ends)
+        unused = "" if name in used else " (unused)"
+        said.append(f"{GROUP}{name}: {', '.join(words)}, in {box} m{unused}")
+    return said
+
+
+def unused_groups(scene: Scene) -> str:
+    """Warn of groups of a mesh file that its case does not use, or say ""."""
+    if not isinstance(scene.geometry, MeshFile):
+        return ""
+    left = [name for name in scene.geometry.body().groups if name not in _used_groups(scene)]
+    if not left:
+        return ""
+    names = ", ".join(f"'{name}'" for name in left[:_LISTED]) + (", …" if left[_LISTED:] else "")
+    return f"groups of '{scene.geometry.file}' that the case does not use: {names}"
+
+
+def _used_groups(scene: Scene) -> set[str]:
+    places = [*scene.supports, *scene.loads, *scene.material.regions]
+    texts = [getattr(one, "where", "") for one in places]
+    return {text.removeprefix(GROUP) for text in texts if text.startswith(GROUP)}
 
 
 def mesh_notices(scene: Scene) -> list[Notice]:

@@ -19,13 +19,13 @@ from verify.scene.loading import (
     load_scene,
     load_scenes,
     mesh_path,
+    read_mesh,
     restore_scene,
     scene_content,
     scene_hash,
     scene_schema,
 )
 from verify.scene.materials import Material, crossed_by_interfaces
-from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
     Analysis,
     BodyForce,

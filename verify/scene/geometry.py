@@ -10,10 +10,11 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from verify.geometry.nearest import distance_to_outline, feet
 from verify.geometry.planar import inside_polygon, polygon_defect
+from verify.scene.mesh_file import FileBody, read_body
 from verify.scene.strict import (
     Count,
     Point2,
@@ -28,6 +29,8 @@ from verify.scene.strict import (
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+#: before the name of a group of a mesh file, in a text that says where
+GROUP = "group:"
 _AXES = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
 
 
@@ -42,6 +45,10 @@ class _Body(Strict):
     def parts(self) -> tuple[str, ...]:
         """Names of the boundary parts: none, use inequalities."""
         return ()
+
+    def is_part(self, where: str) -> bool:
+        """Whether a text is the name of a part of it, not an inequality."""
+        return where in self.parts()
 
     def extremes(self) -> Array:
         """Points (n, d) whose bounding box is that of the body; none where it is not known."""
@@ -168,7 +175,7 @@ class Box(_Body):
 
 
 class MeshFile(_Body):
-    """A simplicial mesh in any format that meshio reads; parts are said by inequalities."""
+    """A mesh file; parts of it are said by inequalities, or are its groups: ``group:NAME``."""
 
     kind: Literal["file"]
     file: Path = Field(description="mesh file, relative to the case file")
@@ -176,11 +183,20 @@ class MeshFile(_Body):
     cells: Literal["volume", "surface"] = Field(
         default="volume", description="surface: triangles in space, a membrane"
     )
+    scale: Positive = Field(
+        default=1.0, description="metres per unit of the file: 1e-3 for millimetres"
+    )
+    weld: Positive | None = Field(
+        default=None, description="nodes of the file that are as close become one, m"
+    )
 
     rules: ClassVar[Rules] = (
         ("", lambda b: b.cells == "surface" and b.dimension == 2,
          "cells = 'surface' is a membrane in space: dimension = 3"),
     )  # fmt: skip
+
+    # of the case file; set where a scene is read
+    _folder: Path | None = PrivateAttr(default=None)
 
     @property
     def dimension(self) -> int:
@@ -191,6 +207,23 @@ class MeshFile(_Body):
     def is_membrane(self) -> bool:
         """Whether its elements are triangles in space."""
         return self.cells == "surface"
+
+    @property
+    def path(self) -> Path:
+        """The mesh file."""
+        return (self._folder or Path.cwd()) / self.file
+
+    def body(self) -> FileBody:
+        """Read the body; see `verify.scene.mesh_file.read_body`."""
+        return read_body(self.path, self.dimension, self.is_membrane, self.scale, self.weld or 0.0)
+
+    def is_part(self, where: str) -> bool:
+        """Whether a text is the name of a group."""
+        return where.startswith(GROUP)
+
+    def on(self, part: str, points: Array, tolerance: float) -> Bools:
+        """Tell which points (n, d) of the boundary lie on a group, to a tolerance, m."""
+        return self.body().on(part.removeprefix(GROUP), points, tolerance)
 
 
 class Skin(_Body):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from verify.errors import InputError
@@ -141,7 +142,7 @@ def _scene(row: Row | None, content: dict[str, Any], file: Path, name: str, path
     except (ArithmeticError, MemoryError, RecursionError, np.linalg.LinAlgError) as error:
         text = f"its numbers cannot be computed with ({words_of(error)})"
         raise InputError(text, where) from None
-    scene._file, scene._name, scene._row = file, f"{name}{row.label if row else ''}", row
+    scene.came_from(file, f"{name}{row.label if row else ''}", row)
     if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
         raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", where)
     return scene
@@ -203,17 +204,29 @@ def scene_content(scene: Scene) -> dict[str, Any]:
 def restore_scene(content: dict[str, Any]) -> Scene:
     """Read the scene that `scene_content` wrote down."""
     scene = Scene.model_validate(content["scene"])
-    scene._name = content["name"]
-    scene._file = Path(content["file"]) if content["file"] else None
-    scene._row = Row(**content["row"]) if content.get("row") else None
+    file = Path(content["file"]) if content["file"] else None
+    row = Row(**content["row"]) if content.get("row") else None
+    scene.came_from(file, content["name"], row)
     return scene
 
 
 def mesh_path(scene: Scene) -> Path:
     """Absolute path of the mesh file of a scene whose geometry is one."""
     assert isinstance(scene.geometry, MeshFile)
-    folder = scene.file.parent if scene.file else Path.cwd()
-    return folder / scene.geometry.file
+    return scene.geometry.path
+
+
+def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Read nodes (n, d), m, and cells (m, k) of a scene whose geometry is a mesh file.
+
+    Raises
+    ------
+    InputError
+        As of `verify.scene.mesh_file.read_body`.
+    """
+    assert isinstance(scene.geometry, MeshFile)
+    body = scene.geometry.body()
+    return body.points.copy(), body.cells.copy()
 
 
 def scene_hash(scene: Scene) -> str:

@@ -4,8 +4,9 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
+from verify.scene.geometry import GROUP, MeshFile
 from verify.scene.regions import parse_region
 from verify.scene.strict import Positive, Rules, Strict
 
@@ -28,7 +29,10 @@ class Moduli(NamedTuple):
 class MaterialRegion(Strict):
     """A region of another material; what it does not name is that of ``[material]``."""
 
-    where: str = Field(description="an inequality in x, y, z; of regions that overlap, the last")
+    where: str = Field(
+        description="an inequality in x, y, z, or 'group:NAME' of a mesh file; of regions that "
+        "overlap, the last"
+    )
     young: Positive | None = Field(default=None, description="Young's modulus E, Pa")
     poisson: float | None = Field(
         default=None, strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio"
@@ -39,6 +43,14 @@ class MaterialRegion(Strict):
         ("", lambda r: r.young is None and r.poisson is None and r.density is None,
          "expected young, poisson or density of the region"),
     )  # fmt: skip
+
+    _geometry: MeshFile | None = PrivateAttr(default=None)  # whose groups it names; set by a scene
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Tell which points (n, d) lie in it."""
+        if self._geometry is not None and self._geometry.is_part(self.where):
+            return self._geometry.body().inside(self.where.removeprefix(GROUP), points)
+        return parse_region(self.where, points.shape[1])(points)
 
 
 class Material(Strict):
@@ -71,7 +83,7 @@ class Material(Strict):
         """Return the number (n,) in `each` of the material at points (n, d)."""
         found = np.zeros(len(points), dtype=np.int64)
         for k, region in enumerate(self.regions):
-            found[parse_region(region.where, points.shape[1])(points)] = k + 1
+            found[region.holds(points)] = k + 1
         return found
 
     def at(self, points: Array) -> Moduli:

@@ -47,7 +47,7 @@ def on_part(geometry: Geometry, where: str, points: Array, size: float) -> NDArr
     """
     if where == "boundary":
         return np.ones(len(points), dtype=bool)
-    if where in geometry.parts():
+    if geometry.is_part(where):
         return geometry.on(where, points, _TOLERANCE * size)
     steps = _TOLERANCE * size * np.eye(geometry.dimension)
     return _in_or_beside(where, points, [*steps, *-steps])
@@ -136,9 +136,11 @@ def pieces_on_part(
     boundary = corners if boundary is None else boundary
     if where == "boundary":
         return Pieces.whole(np.arange(count), k)
-    if where in geometry.parts():
-        on = geometry.on(where, corners.reshape(-1, d), _TOLERANCE * size_of(boundary))
-        return Pieces.whole(np.flatnonzero(on.reshape(count, k).all(axis=1)), k)
+    if geometry.is_part(where):
+        # the middle too: three corners on the rim of a group are no facet of it
+        asked = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+        on = geometry.on(where, asked.reshape(-1, d), _TOLERANCE * size_of(boundary))
+        return Pieces.whole(np.flatnonzero(on.reshape(count, k + 1).all(axis=1)), k)
     return _of_formula(where, k, d, *(x.astype(float).tobytes() for x in (corners, boundary)))
 
 

@@ -28,6 +28,7 @@ from verify.scene.strict import (
 Array = NDArray[np.float64]
 
 _OUTPUTS = 11
+_WHERE = "name of a boundary part, 'boundary', an inequality, or 'group:NAME' of a mesh file"
 
 
 def _ordered(history: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -143,7 +144,7 @@ class Rotation(Strict):
 class Support(Strict):
     """Prescribed displacement on a part of the boundary."""
 
-    where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
+    where: str = Field(description=_WHERE)
     displacement: Components | Literal["exact"] = Field(
         description="m, one number or formula in x, y, z, t per component held; or 'exact' (see "
         "[exact])"
@@ -306,7 +307,7 @@ class Traction(_Load):
     """Force per area on a part of the boundary (dead load)."""
 
     kind: Literal["traction"]
-    where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
+    where: str = Field(description=_WHERE)
     traction: Components | Literal["exact"] = Field(
         description="Pa, a number or a formula in x, y, z, t per component; or 'exact'"
     )

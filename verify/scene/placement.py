@@ -15,7 +15,7 @@ from verify.geometry.nearest import distance_to_outline, distance_to_pieces
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
 from verify.scene.cuts import ArcCut
-from verify.scene.geometry import Box, Polygon, Rectangle
+from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle
 from verify.scene.parts import held_facets, on_part, pieces_on_part
 from verify.scene.physics import Traction
 from verify.scene.tables import SceneTables
@@ -59,6 +59,40 @@ def empty_region(scene: SceneTables, points: Array) -> str | None:
     return None
 
 
+def group_fault(scene: SceneTables) -> str | None:
+    """Which group of a mesh file is missing, has no cells, or shares some with other material."""
+    if not isinstance(scene.geometry, MeshFile):
+        return None
+    body = scene.geometry.body()
+    named: list[tuple[str, str, int | None]] = [
+        (f"material.regions[{i}].where", region.where, i)
+        for i, region in enumerate(scene.material.regions)
+    ]
+    named += [(key, where, None) for key, where, _ in _inequalities(scene)]
+    owner, moduli = np.full(len(body.cells), -1), scene.material.each[1:]
+    for key, where, own in named:
+        if not scene.geometry.is_part(where):
+            continue
+        name = where.removeprefix(GROUP)
+        try:
+            cells = body.group(name).cells
+        except InputError as error:
+            return f"{key}: {error.what}"
+        if own is None:
+            continue
+        if not len(cells):
+            return f"{key}: group '{name}' has no cells of the body, only parts of its boundary"
+        before = owner[cells]
+        for other in np.unique(before[before >= 0]):
+            if moduli[other] != moduli[own]:
+                return (
+                    f"{key}: {int((before == other).sum())} cells of group '{name}' are also in "
+                    f"'{scene.material.regions[other].where}' of another material"
+                )
+        owner[cells] = own
+    return None
+
+
 # ---------------------------------------------------------------------------- parts of the boundary
 def part_without_facets(scene: SceneTables) -> str | None:
     """Which support or traction would act nowhere, as far as the scene alone tells.
@@ -90,7 +124,8 @@ def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:
         for i, load in enumerate(scene.loads)
         if isinstance(load, Traction)
     ]
-    return [part for part in parts if part[1] not in (*scene.geometry.parts(), "boundary")]
+    named = (*scene.geometry.parts(), "boundary")  # groups are known from the mesh file alone
+    return [part for part in parts if part[1] not in named]
 
 
 def _without_facets(scene: SceneTables, facets: Array, where_it_is: str) -> str | None:

@@ -18,7 +18,7 @@ from pydantic import model_validator
 from verify.geometry.nearest import feet
 from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, OF_MOVING_PARTS, OVERLAP
 from verify.scene.cuts import DiscCut, PolygonCut
-from verify.scene.geometry import MeshFile, Polygon, Skin
+from verify.scene.geometry import GROUP, MeshFile, Polygon, Skin
 from verify.scene.placement import (
     empty_region,
     misplaced_cut,
@@ -89,12 +89,14 @@ def _cut(scene: SceneTables, name: str) -> Any:
     return next(cut for cut in scene.cuts if cut.name == name)
 
 
-def _unknown_part(scene: SceneTables, where: str) -> str | None:
-    """Why a text is neither the name of a part of the boundary nor an inequality."""
-    names = (*scene.geometry.parts(), "boundary")
-    if where in names:
+def _unknown_part(scene: SceneTables, where: str, of_boundary: bool = True) -> str | None:
+    """Why a text is neither the name of a part, or of a group, nor an inequality."""
+    names = (*scene.geometry.parts(), "boundary") if of_boundary else ()
+    if where in names or (isinstance(scene.geometry, MeshFile) and scene.geometry.is_part(where)):
         return None
-    if where.replace("_", "").isalnum():
+    if where.startswith(GROUP):
+        return f"'{where}' is of a mesh file; the body is a {scene.geometry.kind}"
+    if of_boundary and where.replace("_", "").isalnum():
         return f"no part '{where}'{nearest(where, names)}"
     return _fault_of(parse_region, where, scene.dimension)
 
@@ -269,8 +271,7 @@ RULES: Rules = (
      "{:.0e} steps to the end at {:g} s; expected at most {:.0e}"),
     ("supports[*].where", lambda s, p: _unknown_part(s, p.where), "{}"),
     ("loads[traction].where", lambda s, p: _unknown_part(s, p.where), "{}"),
-    ("material.regions[*].where", lambda s, p: _fault_of(parse_region, p.where, s.dimension),
-     "{}"),
+    ("material.regions[*].where", lambda s, p: _unknown_part(s, p.where, of_boundary=False), "{}"),
     ("material.regions[*].density",
      lambda s, p: p.density is not None and s.material.density is None,
      "material.density is missing"),
@@ -411,4 +412,7 @@ class Scene(SceneTables):
     def _is_consistent(self) -> "Scene":
         if fault := first_fault_of_parts(self):
             raise ValueError(fault)
+        if isinstance(self.geometry, MeshFile):
+            for region in self.material.regions:
+                region._geometry = self.geometry
         return self

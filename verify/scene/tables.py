@@ -7,7 +7,7 @@ from pydantic import Field, PrivateAttr
 
 from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
 from verify.scene.family import Row
-from verify.scene.geometry import Geometry, MeshLevels, ReferenceLevels, Skin
+from verify.scene.geometry import Geometry, MeshFile, MeshLevels, ReferenceLevels, Skin
 from verify.scene.initial import AtRest, Initial
 from verify.scene.materials import Material
 from verify.scene.physics import Analysis, Exact, Load, Support
@@ -120,7 +120,7 @@ class SceneTables(Strict):
     known_findings: list[KnownFinding] = Field(default_factory=list)
     adequacy: Adequacy = Field(default_factory=Adequacy)
 
-    # where it was read from; set by `load_scene`
+    # set by `came_from`
     _file: Path | None = PrivateAttr(default=None)
     _name: str = PrivateAttr(default="scene")
     _row: Row | None = PrivateAttr(default=None)
@@ -132,6 +132,12 @@ class SceneTables(Strict):
         Of a row of a family with the value: ``slivers/plane[epsilon=0.01]``.
         """
         return self._name
+
+    def came_from(self, file: Path | None, name: str, row: Row | None = None) -> None:
+        """Note the case file, name and row of a scene; its mesh file is beside its case file."""
+        self._file, self._name, self._row = file, name, row
+        if isinstance(self.geometry, MeshFile):
+            self.geometry._folder = None if file is None else file.parent
 
     @property
     def row(self) -> Row | None:

@@ -1,0 +1,399 @@
+"""Bodies of files that people have: their groups, kinds of cells, units; and what is no body."""
+
+import itertools
+
+import meshio
+import numpy as np
+import pytest
+from independent_p1 import energy, energy_of_field
+
+from verify.cli import main
+from verify.errors import InputError
+from verify.scene import load_scene, read_mesh
+from verify.scene.mesh_file import read_body
+from verify.solvers.xfem import XfemSolver
+from verify.xfem.structured_meshes import box_mesh
+
+CASE = """
+title = "A body of one's own"
+requirement = "It shall hang."
+[geometry]
+kind = "file"
+file = "{file}"
+dimension = 3
+{geometry}
+[mesh]
+pattern = "given"
+[material]
+young = 1e4
+poisson = 0.3
+density = 1000.0
+[[material.regions]]
+where = "{hard}"
+young = 5e4
+[[supports]]
+where = "{held}"
+displacement = [0.0, 0.0, 0.0]
+[[supports]]
+where = "{held_too}"
+displacement = [0.0, 0.0, 0.0]
+[[loads]]
+kind = "gravity"
+acceleration = [1.0, 2.0, -9.81]
+[[cuts]]
+kind = "polygon"
+points = {cut}
+"""
+NORMAL, MIDDLE = np.array([0.98, 0.1, -0.08]), np.array([0.49, 0.5, 0.5])
+
+
+def case(folder, file, turn=None, hard="group:hard", held="group:left", held_too="group:right",
+         geometry=""):  # fmt: skip
+    turn = np.eye(3) if turn is None else turn
+    across = np.linalg.svd(NORMAL[None])[2][1:]
+    corners = [MIDDLE + 9 * (a * across[0] + b * across[1])
+               for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
+    text = CASE.format(
+        file=file, hard=hard, held=held, held_too=held_too, geometry=geometry,
+        cut=(np.array(corners) @ turn).tolist(),
+    )  # fmt: skip
+    (folder / "case.toml").write_text(text)
+    return load_scene(folder / "case.toml")
+
+
+def block(seed, count=3):
+    """A cube of tetrahedra, which of them are hard, its ends, and a turn: in general position."""
+    mesh = box_mesh((count,) * 3, (0.0,) * 3, (1.0,) * 3)
+    points, cells = mesh.points, mesh.cells
+    rng = np.random.default_rng(seed)
+    inner = ((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1)
+    points = points + np.where(inner[:, None], rng.uniform(-0.05, 0.05, points.shape), 0.0)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    hard = rng.random(len(cells)) < 0.4  # a sponge: groups of any shape
+    ends = [faces(cells, np.abs(points[:, 0] - x) < 1e-9) for x in (0.0, 1.0)]
+    return points, cells, hard, ends, turn
+
+
+def faces(cells, on):
+    """Facets of cells of which all corners are `on`."""
+    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(4)]), axis=1)
+    return np.unique(facets[on[facets].all(axis=1)], axis=0)
+
+
+def write(folder, form, points, cells, hard, ends):
+    """Write a body with its groups in one of the formats that people have; name of the groups."""
+    triangles = np.concatenate(ends)
+    blocks = [("tetra", cells), ("triangle", triangles)]
+    side = np.repeat([3, 4], [len(ends[0]), len(ends[1])])
+    ids = [np.where(hard, 2, 1), side]
+    names = {"hard": (2, 3), "left": (3, 2), "right": (4, 2)}
+    fields = {name: np.array(value) for name, value in names.items()}
+    if form == "gmsh22":
+        data = {"gmsh:physical": ids, "gmsh:geometrical": ids}
+        mesh = meshio.Mesh(points, blocks, cell_data=data, field_data=fields)
+        mesh.write(folder / "body.msh", file_format=form, binary=True)
+        return "body.msh", ["group:hard", "group:left", "group:right"]
+    if form == "gmsh":
+        parts = [(3, cells[~hard], [1]), (3, cells[hard], [2, 1])]  # hard ones in two groups
+        parts += [(2, ends[0], [3]), (2, ends[1], [4])]
+        (folder / "body.msh").write_text(msh41(points, parts, {**names, "all": (1, 3)}))
+        return "body.msh", ["group:hard", "group:left", "group:right"]
+    if form == "medit":
+        meshio.Mesh(points, blocks, cell_data={"medit:ref": ids}).write(folder / "body.mesh")
+        return "body.mesh", ["group:2", "group:3", "group:4"]
+    if form == "vtk":
+        meshio.Mesh(points, blocks, cell_data={"part": ids}).write(folder / "body.vtu")
+        return "body.vtu", ["group:part=2", "group:part=3", "group:part=4"]
+    if form == "abaqus":
+        ends_of = {name: np.unique(end) for name, end in zip(("L", "R"), ends, strict=True)}
+        lines = ["*NODE"]
+        lines += [f"{i + 1}, " + ", ".join(map(repr, p.tolist())) for i, p in enumerate(points)]
+        lines.append("*ELEMENT, TYPE=C3D4")
+        lines += [f"{i + 1}, " + ", ".join(map(str, c + 1)) for i, c in enumerate(cells)]
+        lines += ["*ELSET, ELSET=HARD", *(f"{i + 1}," for i in np.flatnonzero(hard))]
+        for name, nodes in ends_of.items():
+            lines += [f"*NSET, NSET={name}", *(f"{i + 1}," for i in nodes)]
+        (folder / "body.inp").write_text("\n".join(lines) + "\n")
+        return "body.inp", ["group:HARD", "group:L", "group:R"]
+    assert form == "xdmf"
+    grids = [("cells", "Tetrahedron", cells, ids[0]), ("facets", "Triangle", triangles, side)]
+    text = '<Xdmf Version="3.0"><Domain><Grid Name="mesh" GridType="Uniform">'
+    text += (
+        topology("Tetrahedron", cells) + f"<Geometry GeometryType='XYZ'>{item(points)}</Geometry>"
+    )
+    for name, kind, some, values in grids:
+        text += f'</Grid><Grid Name="{name}" GridType="Uniform">{topology(kind, some)}'
+        text += f'<Attribute Name="{name}" Center="Cell">{item(values[:, None])}</Attribute>'
+    (folder / "body.xdmf").write_text(text + "</Grid></Domain></Xdmf>")
+    return "body.xdmf", ["group:cells=2", "group:facets=3", "group:facets=4"]
+
+
+def msh41(points, parts, names):
+    """A file of gmsh 4.1: of each part its dimension, cells, and the tags of its groups."""
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
+    lines += [f'{dim} {tag} "{name}"' for name, (tag, dim) in names.items()]
+    counts = [sum(dim == d for dim, _, _ in parts) for d in range(4)]
+    lines += ["$EndPhysicalNames", "$Entities", " ".join(map(str, counts))]
+    order = sorted(range(len(parts)), key=lambda i: parts[i][0])
+    for i in order:
+        dim, _, tags = parts[i]
+        box = "0 0 0 1 1 1" if dim else "0 0 0"
+        lines.append(f"{i + 1} {box} {len(tags)} {' '.join(map(str, tags))} 0")
+    n = len(points)
+    lines += ["$EndEntities", "$Nodes", f"1 {n} 1 {n}", f"3 1 0 {n}", *map(str, range(1, n + 1))]
+    lines += [" ".join(map(repr, point.tolist())) for point in points]
+    total = sum(len(cells) for _, cells, _ in parts)
+    lines += ["$EndNodes", "$Elements", f"{len(parts)} {total} 1 {total}"]
+    number = 0
+    for i in order:
+        dim, cells, _ = parts[i]
+        lines.append(f"{dim} {i + 1} {dim if dim < 3 else 4} {len(cells)}")
+        for cell in cells:
+            number += 1
+            lines.append(f"{number} " + " ".join(map(str, np.asarray(cell) + 1)))
+    return "\n".join([*lines, "$EndElements", ""])
+
+
+def topology(kind, cells):
+    return f'<Topology TopologyType="{kind}">{item(cells)}</Topology>'
+
+
+def item(values):
+    rows = "\n".join(" ".join(map(repr, row)) for row in values.tolist())
+    return f'<DataItem Dimensions="{len(values)} {len(values[0])}" Format="XML">{rows}</DataItem>'
+
+
+def measured(scene):
+    """Strain energy of the answer of xfem, from its linear pieces."""
+    found = XfemSolver().solve(scene, 0, 0)
+    moduli = scene.material.at(found.points[found.cells].mean(axis=1))
+    lam = moduli.young * 0.3 / (1.3 * 0.4)
+    return energy_of_field(
+        found.points, found.cells, found.displacement[0], lam, moduli.young / 2.6
+    )
+
+
+def expected(points, cells, hard, ends, turn):
+    """The energy by the independent program; its body is not turned, its weight is."""
+    gravity = turn @ np.array([1.0, 2.0, -9.81])
+    young = np.where(hard, 5e4, 1e4)
+    held = np.unique(np.concatenate(ends))
+    return energy(points, cells, young, 0.3, 1000.0, gravity, held, (MIDDLE, NORMAL))
+
+
+@pytest.mark.parametrize(
+    ("form", "seed"),
+    [*zip(("gmsh22", "gmsh", "medit", "vtk", "abaqus", "xdmf"), range(6), strict=True),
+     ("gmsh", 6), ("vtk", 7), ("medit", 8), ("xdmf", 9)],
+)  # fmt: skip
+def test_groups_of_ten_files_give_the_energy_of_an_independent_program(tmp_path, form, seed):
+    """Materials by groups of cells, clamps by groups of facets; 1e-9 is that of both solves."""
+    points, cells, hard, ends, turn = block(seed)
+    file, names = write(tmp_path, form, points @ turn, cells, hard, ends)
+    scene = case(tmp_path, file, turn, *names)
+    value = expected(points, cells, hard, ends, turn)
+    assert measured(scene) == pytest.approx(value, rel=1e-9)
+    soft = expected(points, cells, ~hard, ends, turn)
+    assert abs(soft - value) > 0.01 * value  # the materials matter
+
+
+def said_by_check(folder, capsys, code=0):
+    assert main(["check", str(folder / "case.toml")]) == code
+    said = capsys.readouterr()
+    return said.err if code else said.out, said.err
+
+
+def test_check_and_describe_list_groups_and_warn_of_unused_ones(tmp_path, capsys):
+    points, cells, hard, ends, _ = block(0)
+    file, names = write(tmp_path, "gmsh", points, cells, hard, ends)
+    case(tmp_path, file, None, names[0], names[1], "x > 0.999")
+    out, err = said_by_check(tmp_path, capsys)
+    volume = (
+        np.abs(np.linalg.det(points[cells[hard][:, 1:]] - points[cells[hard][:, :1]])).sum() / 6
+    )
+    assert f"group:hard: {hard.sum()} tetrahedra, {volume:.3g} m³, in [0, 1] × [0, 1]" in out
+    assert f"group:left: {len(ends[0])} triangles, 1 m², in [0, 0] × [0, 1] × [0, 1] m\n" in out
+    assert out.count("(unused)") == 2
+    assert "that the case does not use: 'right', 'all'" in err
+    assert main(["describe", str(tmp_path / "case.toml")]) == 0
+    assert "group:left" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        (
+            {"held": "group:lefd"},
+            "supports[0].where: no group 'lefd' in the mesh file; did you",
+        ),
+        (
+            {"hard": "group:left"},
+            "group 'left' has no cells of the body, only parts",
+        ),
+        ({"hard": "group:nothing"}, "material.regions[0].where: no group 'nothing'"),
+    ],
+)
+def test_a_group_that_is_not_there_or_of_another_kind_is_named(
+    tmp_path, capsys, changed, expected
+):  # fmt: skip
+    points, cells, hard, ends, _ = block(0)
+    file, _ = write(tmp_path, "gmsh", points, cells, hard, ends)
+    case(tmp_path, file, **changed)
+    err, _ = said_by_check(tmp_path, capsys, code=2)
+    assert expected in err
+    assert err.count("\n") == 1
+
+
+def test_a_cell_in_two_groups_of_different_materials_is_refused(tmp_path, capsys):
+    points, cells, hard, ends, _ = block(0)
+    file, _ = write(tmp_path, "gmsh", points, cells, hard, ends)
+    case(tmp_path, file)
+    path = tmp_path / "case.toml"
+    second = '[[material.regions]]\nwhere = "group:all"\nyoung = {}\n[[supports]]'
+    text = path.read_text()
+    path.write_text(text.replace("[[supports]]", second.format("6e4"), 1))
+    err, _ = said_by_check(tmp_path, capsys, code=2)
+    assert f"{hard.sum()} cells of group 'all' are also in 'group:hard' of another material" in err
+
+
+def test_a_group_belongs_to_a_mesh_file(tmp_path):
+    box = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]\n'
+    text = CASE.format(file="", hard="z < 0.5", held="group:left", held_too="top", geometry="",
+                       cut="[[0.5, -1, -1], [0.5, 2, -1], [0.5, 2, 2], [0.5, -1, 2]]")  # fmt: skip
+    text = text.replace('kind = "file"\nfile = ""\ndimension = 3\n', box)
+    (tmp_path / "case.toml").write_text(text.replace('pattern = "given"', "cells = [[2, 2, 2]]"))
+    with pytest.raises(InputError, match="'group:left' is of a mesh file; the body is a box"):
+        load_scene(tmp_path / "case.toml")
+
+
+def mixed(rng):
+    """Layers of hexahedra, of wedges and of pyramids; nodes in any order."""
+    points = np.array([[x, y, z] for x in range(4) for y in range(4) for z in range(4)], float)
+    cells = {"hexahedron": [], "wedge": [], "pyramid": []}
+    for x, y, z in itertools.product(range(3), repeat=3):
+        i = [
+            16 * (x + a) + 4 * (y + b) + z + c
+            for a, b, c in (
+                (0, 0, 0),
+                (1, 0, 0),
+                (1, 1, 0),
+                (0, 1, 0),
+                (0, 0, 1),
+                (1, 0, 1),
+                (1, 1, 1),
+                (0, 1, 1),
+            )
+        ]
+        if z == 0:
+            cells["hexahedron"].append(i)
+        elif z == 1:
+            cells["wedge"] += [[i[k] for k in w] for w in ((0, 3, 7, 1, 2, 6), (0, 7, 4, 1, 6, 5))]
+        else:
+            points = np.vstack([points, points[i].mean(axis=0)])
+            apex = len(points) - 1
+            cells["pyramid"] += [[*(i[k] for k in f), apex] for f in
+                                 ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2),
+                                  (2, 6, 7, 3), (3, 7, 4, 0))]  # fmt: skip
+    number = rng.permutation(len(points))
+    shuffled = np.empty_like(points)
+    shuffled[number] = points
+    return shuffled, [(kind, number[np.array(some)]) for kind, some in cells.items()]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cells_that_are_no_simplices_are_split_so_that_neighbours_fit(tmp_path, seed):
+    """Any order of the nodes: no volume is lost, and no facet inside has one cell alone."""
+    points, blocks = mixed(np.random.default_rng(seed))
+    meshio.Mesh(points, blocks).write(tmp_path / "body.vtu")
+    body = read_body(tmp_path / "body.vtu", 3)
+    edges = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
+    assert np.linalg.det(edges).sum() / 6 == pytest.approx(27.0, rel=1e-14)
+    facets = np.sort(np.concatenate([np.delete(body.cells, i, axis=1) for i in range(4)]), axis=1)
+    distinct, count = np.unique(facets, axis=0, return_counts=True)
+    places = body.points[distinct[count == 1]]
+    outside = (np.ptp(places, axis=1) < 1e-12) & np.isin(places[:, 0], (0.0, 3.0))
+    assert outside.any(axis=1).all()
+    assert "9 cells 'hexahedron' are split into tetras" in body.notes
+
+
+def test_quads_of_a_plane_body_are_split_and_those_beside_a_solid_are_parts_of_it(tmp_path):
+    flat = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    meshio.Mesh(flat, [("quad", np.array([[0, 1, 2, 3]]))]).write(tmp_path / "flat.vtu")
+    assert len(read_body(tmp_path / "flat.vtu", 2).cells) == 2
+    mesh = box_mesh((1, 1, 1), (0.0,) * 3, (1.0,) * 3)
+    low = np.flatnonzero(mesh.points[:, 2] == 0.0)[[0, 1, 3, 2]]
+    blocks = [("tetra", mesh.cells), ("quad", low[None])]
+    ids = {"id": [np.zeros(len(mesh.cells), int), np.ones(1, int)]}
+    meshio.Mesh(mesh.points, blocks, cell_data=ids).write(tmp_path / "solid.vtu")
+    group = read_body(tmp_path / "solid.vtu", 3).group("id=1")
+    assert group.parts[3].shape == (2, 3, 3)
+
+
+def test_elements_of_second_order_are_taken_by_their_corners_and_it_is_said(tmp_path):
+    mesh = box_mesh((2, 1, 1), (0.0,) * 3, (1.0,) * 3)
+    points, number, ten = list(mesh.points), {}, []
+    for cell in mesh.cells:
+        row = list(cell)
+        for a, b in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)):
+            edge = tuple(sorted((cell[a], cell[b])))
+            if edge not in number:
+                number[edge] = len(points)
+                points.append(0.5 * (mesh.points[edge[0]] + mesh.points[edge[1]]))
+            row.append(number[edge])
+        ten.append(row)
+    meshio.Mesh(np.array(points), [("tetra10", np.array(ten))]).write(tmp_path / "ten.vtu")
+    body = read_body(tmp_path / "ten.vtu", 3)
+    assert (len(body.points), len(body.cells)) == (len(mesh.points), len(mesh.cells))
+    assert body.notes[0] == f"{len(mesh.cells)} cells 'tetra10' are taken by their corners"
+
+
+def test_a_scale_acts_before_anything_else_and_a_weld_joins_what_is_apart(tmp_path):
+    points, cells, hard, ends, turn = block(3)
+    left = points[cells].mean(axis=1)[:, 0] < 0.5
+    apart = np.vstack([points, points + 1e-8])  # two halves exported one after the other
+    two = np.where(left[:, None], cells, cells + len(points))
+    ends = [ends[0], ends[1] + len(points)]
+    file, names = write(tmp_path, "medit", 1000.0 * apart @ turn, two, hard, ends)
+    scene = case(tmp_path, file, turn, *names, geometry="scale = 1e-3\nweld = 1e-6")
+    value = expected(points, cells, hard, [ends[0], ends[1] - len(points)], turn)
+    assert len(read_mesh(scene)[0]) == len(points)
+    assert measured(scene) == pytest.approx(value, rel=1e-6)  # nodes are 1e-8 elsewhere
+    torn = case(tmp_path, file, turn, *names, geometry="scale = 1e-3")
+    with pytest.raises(InputError, match="is not held"):
+        measured(torn)
+    with pytest.raises(InputError, match=r"weld: 0\.5 m joins corners of one cell"):
+        read_mesh(case(tmp_path, file, turn, *names, geometry="scale = 1e-3\nweld = 0.5"))
+
+
+def test_the_vtu_of_fenicsx_is_read(tmp_path):
+    """Version 2.2, with the Lagrange cells of VTK."""
+    points = "0 0 0 1 0 0 0 1 0 0 0 1"
+    (tmp_path / "dx.vtu").write_text(
+        '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="2.2">\n'
+        '<UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1"><Points>'
+        f'<DataArray type="Float64" NumberOfComponents="3" format="ascii">{points}</DataArray>'
+        '</Points><Cells><DataArray type="Int32" Name="connectivity" format="ascii">0 1 2 3'
+        '</DataArray><DataArray type="Int32" Name="offsets" format="ascii">4</DataArray>'
+        '<DataArray type="Int8" Name="types" format="ascii">71</DataArray></Cells></Piece>'
+        "</UnstructuredGrid></VTKFile>\n"
+    )
+    assert read_body(tmp_path / "dx.vtu", 3).cells.shape == (1, 4)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("version", ["1", "4.1 with a part in no group"])
+def test_what_meshio_does_not_read_gmsh_does(tmp_path, version):
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
+    if version == "1":
+        lines = ["$NOD", "5", *(f"{i + 1} {x} {y} {z}" for i, (x, y, z) in enumerate(points))]
+        lines += ["$ENDNOD", "$ELM", "2", "1 4 7 1 4 1 2 3 4", "2 4 8 2 4 2 3 4 5", "$ENDELM", ""]
+        (tmp_path / "body.msh").write_text("\n".join(lines))
+        groups = {"7": [0], "8": [1]}
+    else:
+        parts = [(3, np.array([[0, 1, 2, 3]]), [1]), (3, np.array([[1, 2, 3, 4]]), [])]
+        text = msh41(np.array(points, float), parts, {"fat": (1, 3)})
+        (tmp_path / "body.msh").write_text(text)
+        groups = {"fat": [0]}
+    body = read_body(tmp_path / "body.msh", 3)
+    assert len(body.cells) == 2
+    assert {name: group.cells.tolist() for name, group in body.groups.items()} == groups
