@@ -44,7 +44,7 @@ def scene(folder, around, across):
         exact={"solution": "circular_cut", "parameters": parameters},
         quantities=[{"kind": "opening", "name": "gap", "at": 0.3}],
     )
-    found._file = folder / "case.toml"
+    found.came_from(folder / "case.toml", "ring")
     return found
 
 

@@ -145,7 +145,7 @@ def _read(
     notes: list[str] = []
     k = 2 if membrane else d
     _refuse_kinds(raw, k, where)
-    points = _coordinates(raw, d, where) * scale
+    points = _coordinates(raw, d, scale, where)
     blocks = [_simplices(kind, cells) for kind, cells in raw.blocks]
     for _, given in raw.blocks:
         if given.size and not (given.min() >= 0 and given.max() < len(points)):
@@ -189,9 +189,9 @@ def _refuse_kinds(raw: RawMesh, k: int, where: str) -> None:
         raise InputError(f"has {found}; expected {expected}{hint}", where)
 
 
-def _coordinates(raw: RawMesh, d: int, where: str) -> Array:
-    """Return the coordinates (n, d) of a body, in the unit of the file."""
-    points = np.asarray(raw.points, dtype=float)
+def _coordinates(raw: RawMesh, d: int, scale: float, where: str) -> Array:
+    """Return the coordinates (n, d) of a body, m."""
+    points = scale * np.asarray(raw.points, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (d, 3) or not len(points):
         raise InputError(f"has points of shape {points.shape}; expected {d} coordinates", where)
     if d == 2 and points.shape[1] == 3:
@@ -199,7 +199,7 @@ def _coordinates(raw: RawMesh, d: int, where: str) -> Array:
         own = own[(own >= 0) & (own < len(points))]
         *sides, height = np.ptp(points[own], axis=0)
         if height > _PLANE * max(sides):
-            text = f"not plane: its z coordinates differ by {height:.3g}"
+            text = f"not plane: its z coordinates differ by {height:.3g} m"
             raise InputError(f"{text}; expected a body in a plane of constant z", where)
     return np.ascontiguousarray(points[:, :d])
 
