@@ -11,6 +11,7 @@ from shutil import copyfile
 
 import gmsh
 import numpy as np
+from numpy.typing import NDArray
 
 # by dimension and number of corners, as meshio calls them
 _KINDS = {
@@ -39,7 +40,9 @@ def _write(out: str) -> None:
         raise SystemExit("it has no nodes")
     number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     number[tags.astype(np.int64)] = np.arange(len(tags))
-    blocks, kinds, groups = {}, [], []
+    blocks: dict[str, NDArray[np.int64]] = {}
+    kinds: list[str] = []
+    groups: list[tuple[str, str]] = []
     for dimension, entity in gmsh.model.getEntities():
         names = [
             gmsh.model.getPhysicalName(dimension, int(tag)) or str(tag)
