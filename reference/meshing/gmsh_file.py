@@ -8,10 +8,10 @@ import sys
 import tempfile
 from pathlib import Path
 from shutil import copyfile
+from typing import Any
 
 import gmsh
 import numpy as np
-from numpy.typing import NDArray
 
 # by dimension and number of corners, as meshio calls them
 _KINDS = {
@@ -40,7 +40,7 @@ def _write(out: str) -> None:
         raise SystemExit("it has no nodes")
     number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     number[tags.astype(np.int64)] = np.arange(len(tags))
-    blocks: dict[str, NDArray[np.int64]] = {}
+    blocks: dict[str, Any] = {}
     kinds: list[str] = []
     groups: list[tuple[str, str]] = []
     for dimension, entity in gmsh.model.getEntities():
