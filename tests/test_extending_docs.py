@@ -1,52 +1,14 @@
 """The pages on extending and on regression are run: every file, every command, in order."""
 
-import os
 import re
-import shlex
-import subprocess
-import sys
 import tomllib
 from importlib.util import find_spec
-from pathlib import Path
-from unittest.mock import patch
 
 import pytest
-from command_line import run_here
+from doc_pages import DOCS, blocks, commands, run_line
 
-ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
 pytest_plugins = ["pytester"]
 needs_skfem = pytest.mark.skipif(find_spec("skfem") is None, reason="needs scikit-fem")
-
-
-def blocks(page, language):
-    text = (DOCS / page).read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
-
-
-def commands(page):
-    return [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
-
-
-def run(line, folder):
-    """Run a command line, of `verify` in this process unless it is to find a package there."""
-    first, *words = shlex.split(line)
-    paths = os.pathsep.join([str(folder), str(ROOT), os.environ.get("PYTHONPATH", "")])
-    if first == "verify" and not list(folder.glob("*.dist-info")):
-        with patch.object(sys, "path", [str(folder), *sys.path]):
-            done = run_here(words, folder, {"PYTHONPATH": paths})
-        for name in {file.stem for file in folder.glob("*.py")}:
-            sys.modules.pop(name, None)
-        return done
-    call = {"verify": [sys.executable, "-m", "verify"], "python": [sys.executable]}[first]
-    return subprocess.run(
-        [*call, *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
 
 
 @pytest.fixture
@@ -69,7 +31,7 @@ def test_the_page_shows_the_example_files_as_they_are():
 def test_every_command_on_extending_succeeds_in_order(examples):
     said = {}
     for line in commands("guide/your-solver.md"):
-        done = run(line, examples)
+        done = run_line(line, examples)
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         said[line.split()[1]] = done.stdout
     # the example solver keeps what it does not refuse, and its metric is round-off
@@ -119,23 +81,23 @@ within = 0.1
 
 def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(examples):
     (examples / "bending.toml").write_text(OWN_FIELD)
-    unknown = run("verify check bending.toml", examples)
+    unknown = run_line("verify check bending.toml", examples)
     assert unknown.returncode == 2
     assert "stretched_plate" in unknown.stderr
     register(examples, blocks("guide/your-solver.md", "toml")[-1])
-    assert "stretched_plate" in run("verify list --exact", examples).stdout
+    assert "stretched_plate" in run_line("verify list --exact", examples).stdout
     # quadratic in x and y: P1 errs with order 1 in the energy norm
-    done = run("verify run bending.toml --solver xfem --out run --repetitions 1", examples)
+    done = run_line("verify run bending.toml --solver xfem --out run --repetitions 1", examples)
     assert done.returncode == 0, done.stdout + done.stderr
     (examples / "bending.toml").write_text(OWN_FIELD.replace("stress_gradient", "slope"))
-    wrong = run("verify check bending.toml", examples)
+    wrong = run_line("verify check bending.toml", examples)
     assert wrong.returncode == 2
     assert "stretched_plate" in wrong.stderr
 
 
 def test_every_command_on_regression_succeeds_in_order(tmp_path):
     for line in commands("guide/regression.md"):
-        done = run(line, tmp_path)
+        done = run_line(line, tmp_path)
         # what is undecided about speed depends on the machine: the page says so
         allowed = (0, 5) if "--strict" in line else (0, 1) if " check " in line else (0,)
         assert done.returncode in allowed, f"{line}\n{done.stdout}\n{done.stderr}"

@@ -3,31 +3,14 @@
 import re
 import shlex
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
-from command_line import run_here
+from doc_pages import DOCS, blocks, commands, run_line
 
 from verify.cli import build_parser
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = ["guide/write-a-case.md", "guide/cli.md"]
 ELSEWHERE = {"verify doctor"}  # what it finds is held in tests/install
-
-
-def blocks(page: str, language: str) -> list[str]:
-    text = (DOCS / page).read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
-
-
-def run(line: str, folder: Path) -> CompletedProcess[str]:
-    command, _, target = line.partition(" > ")
-    words = shlex.split(command)
-    assert words[0] == "verify", line
-    done = run_here(words[1:], folder)
-    if target:
-        (folder / target.strip()).write_text(done.stdout, encoding="utf-8")
-    return done
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -36,10 +19,10 @@ def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
     # a reference four digits better than the 20 % that are asked, in a tenth of the time of eight
     case = case.replace("[48, 16], ", "") + "[reference]\nsize = 0.01\n"
     (tmp_path / "my_case.toml").write_text(case, encoding="utf-8")
-    lines = [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
+    lines = commands(page)
     assert len(lines) >= 3
     for line in [line for line in lines if line not in ELSEWHERE]:
-        done = run(line, tmp_path)
+        done = run_line(line, tmp_path)
         # cli.md runs the example without its reference: its verdicts stay undecided, code 0
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 

@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
+from doc_pages import blocks
 
 from verify.cli import main
 from verify.errors import InputError
@@ -178,8 +179,7 @@ def test_a_mesh_file_is_looked_at_by_verify_check(tmp_path, capsys):
     assert "supports[0].where" in capsys.readouterr().err
 
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "write-a-case.md"
-BLOCKS = re.findall(r"^```toml\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.M | re.S)
+BLOCKS = blocks("guide/write-a-case.md", "toml")
 TITLES = [re.search(r'^title = "(.*)"', text, re.M) for text in BLOCKS]
 # a block without a title is a part of a case
 CASES = {title[1]: text for title, text in zip(TITLES, BLOCKS, strict=True) if title}

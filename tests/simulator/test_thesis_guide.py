@@ -1,31 +1,25 @@
 """The guide to the thesis' scenes is run: its commands, and its Python."""
 
-import re
 import shlex
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
+from doc_pages import blocks, commands
 
 from verify.cli import main
 from verify.scene import Skin
 from verify.simulator.skin_mesh import skin_mesh
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "simulator.md"
-
-
-def blocks(language: str) -> list[str]:
-    text = PAGE.read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+PAGE = "guide/simulator.md"
 
 
 @pytest.mark.graphics
 def test_every_command_of_the_guide_succeeds(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
-    assert len(lines) == 3
-    for line in lines:
+    assert len(commands(PAGE)) == 3
+    for line in commands(PAGE):
         assert main(shlex.split(line)[1:]) == 0, line
 
 
@@ -40,7 +34,7 @@ def test_the_recipe_for_real_anatomy_crops_a_surface_that_is_meshed(tmp_path, mo
     points = np.concatenate([front, front * [1.0, 1.0, -1.0]])
     both = np.concatenate([quads, quads[:, ::-1] + len(front)])
     meshio.Mesh(points, [("quad", both)]).write("body.obj")
-    (recipe,) = (block for block in blocks("python") if "body.obj" in block)
+    (recipe,) = (block for block in blocks(PAGE, "python") if "body.obj" in block)
     exec(recipe, {})
     skin = skin_mesh(Skin(kind="skin", file=Path("skin.stl"), thickness=2e-3), tmp_path)
     surface = skin.points[: len(skin.points) // 2]

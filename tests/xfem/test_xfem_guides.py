@@ -3,23 +3,20 @@
 import doctest
 import re
 from importlib import import_module
-from pathlib import Path
 from pkgutil import iter_modules
 
 import meshio
 import numpy as np
 import pytest
+from doc_pages import DOCS, blocks
 
 import verify.xfem as xfem
-
-DOCS = Path(__file__).parents[2] / "docs"
 
 
 def printed_by(page, capsys):
     """What the examples of a page print; they share their names, in order."""
-    text = (DOCS / page).read_text(encoding="utf-8")
     names = {}
-    for example in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+    for example in blocks(page, "python"):
         exec(compile(example, page, "exec"), names)
     return capsys.readouterr().out.splitlines()
 

@@ -138,14 +138,15 @@ def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict
 
 def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
     """Note the critical explicit step of the undeformed body with all cuts open, or why not."""
-    from verify.judge.system_numbers import critical_step
-    from verify.system import checked_system
-
     system = getattr(solver, "system", None)
     if system is None or not (scene.analysis.kind == "dynamic" or "slivers" in scene.tags):
         return {}
     if unknowns > _LARGE:
         return {CRITICAL_STEP: f"not computed for more than {_LARGE} unknowns"}
+    # only now: a fresh process takes longer to import them than many a solve takes
+    from verify.judge.system_numbers import critical_step
+    from verify.system import checked_system
+
     try:
         own = checked_system(system(scene, job["level"], **job["parameters"]))
         return {CRITICAL_STEP: f"{critical_step(own):.4g} s"}
