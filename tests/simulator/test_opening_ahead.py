@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from verify.compare.released import driving_force
 from verify.simulator import Hold, Session, Stage
 from verify.simulator import session as played
 from verify.xfem.body import RayleighDamping
@@ -190,14 +189,17 @@ def test_the_driving_force_of_a_stretched_strip_is_its_energy_release_rate() -> 
     path = ToolPath.of_tip([[-0.05, 0.17], [1.3, 0.21]], [settled, settled + 1.35 / speed])
     session = Session(
         stage_with(mesh, [path], holds=holds, time_step=0.02, duration=path.times[-1],
-                   damping=RayleighDamping(4.0, 0.0))
+                   damping=RayleighDamping(4.0, 0.0), toughness=[20.0])
     )  # fmt: skip
     records = session.run()
+    assert session.stage.smoothing == pytest.approx(0.5 * height, rel=0.1)
     advance = np.array([record.advance[0] for record in records])
-    work = np.array([record.cut_work[0] for record in records])
-    found = driving_force(advance, work, 0.2)
+    found, resistance = session.blade_forces(0)
     lame = young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))  # λ + 2μ
     expected = 0.5 * lame * stretch**2 * height
     between = (advance > 0.6) & (advance < 0.9)  # a height away from both ends
     np.testing.assert_allclose(found[between], expected, rtol=0.1)
     assert np.isnan(found[advance == 0.0][:-1]).all()
+    # the blade enters 50 mm from its start; the mesh is in the plane: its width is that of the way
+    np.testing.assert_allclose((resistance + found)[between], 20.0, rtol=0.02)
+    assert records[-1].area[0] == pytest.approx(np.hypot(1.3, 1.3 * 0.04 / 1.35), rel=0.05)

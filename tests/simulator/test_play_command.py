@@ -39,6 +39,14 @@ def test_an_animation_is_drawn_without_a_display(tmp_path, monkeypatch, capfd) -
     rows = list(csv.DictReader(table.open(encoding="utf-8")))
     assert len(rows) == summary["steps"]
     assert int(rows[-1]["split"]) == summary["split"] > 50
+    across = summary["cuts"][0]
+    assert across["name"] == "across"
+    assert float(rows[-1]["cut_work_across"]) == across["cut_work"] > 0.0
+    # forces times advances, at 2 m/s in steps of 5 ms, sum up to the work but for ends
+    forces = [float(row["driving_force_across"] or 0.0) for row in rows]
+    assert max(forces) == across["largest_driving_force"]
+    assert 0.01 * sum(forces) == pytest.approx(across["cut_work"], rel=0.3)
+    assert {row["resistance_across"] for row in rows} == {""}  # it has no toughness
 
 
 def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played_again(

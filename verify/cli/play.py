@@ -11,10 +11,13 @@ from verify.cli.signatures import Arg, Case, positive
 from verify.cli.streams import print_json
 from verify.errors import InputError, UnsupportedSceneError
 
+_FORCES = ("driving_force", "resistance")  # on blades, as Session.blade_forces gives them
+
 if TYPE_CHECKING:
     from verify.scene import Scene
     from verify.simulator import Stage, StepRecord
     from verify.simulator.animation import Frame
+    from verify.xfem.arrays import Floats
 
 
 def play(
@@ -107,6 +110,7 @@ def _played(
         if out is not None and (record.step % every == 0 or session.finished):
             frames.append(Frame(record.time, session.picture(), session.blades(), session.hooks()))
     taken, quality = session.records, quality_of(session)
+    blades = {cut.name: session.blade_forces(k) for k, cut in enumerate(scene.cuts)}
     step = Spread.of(record.total_seconds for record in taken)
     cutting = Spread.of(record.total_seconds for record in taken if record.newly_split)
     if out is not None:
@@ -114,7 +118,7 @@ def _played(
             _draw(frames, stage, scene, out, zoom)
     if records is not None:
         with asked_place(records):
-            write_whole(records, _table(taken))
+            write_whole(records, _table(taken, blades))
     return {
         "case": scene.name,
         "steps": len(taken),
@@ -135,6 +139,16 @@ def _played(
         "inverted_facets": quality.inverted_facets,
         "stray_facets": quality.stray_facets,
         "largest_stretch": quality.largest_stretch,
+        "cuts": [
+            {
+                "name": name,
+                "cut_work": float(taken[-1].cut_work[k]),
+                "largest_driving_force": _largest(blades[name][0]),
+                "largest_resistance": _largest(blades[name][1]),
+                "smoothed_over": stage.smoothing,
+            }
+            for k, name in enumerate(blades)
+        ],
         "out": str(out) if out else None,
     }
 
@@ -159,21 +173,29 @@ def _draw(frames: "list[Frame]", stage: "Stage", scene: "Scene", out: Path, zoom
     (write_film if out.suffix == ".mp4" else write_animation)(frames, view, out, rate)
 
 
-def _table(records: "list[StepRecord]") -> str:
-    """Return what every step cost and did as CSV."""
+def _largest(forces: "Floats") -> float | None:
+    known = forces[forces == forces]  # not NaN
+    return float(known.max()) if len(known) else None
+
+
+def _table(records: "list[StepRecord]", blades: "dict[str, tuple[Floats, Floats]]") -> str:
+    """Return what every step cost and did as CSV, with the forces on each blade."""
     from verify.simulator import PHASES
 
     text = io.StringIO()
     table = csv.writer(text)
     table.writerow(
         ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
-         "potential", "work", "dissipated", "contacts"]
+         "potential", "work", "dissipated", "contacts",
+         *(f"{what}_{name}" for name in blades for what in ("cut_work", *_FORCES))]
     )  # fmt: skip
-    for r in records:
+    for row, r in enumerate(records):
         delay = r.delay.mean() if len(r.delay) else ""
         table.writerow(
             [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic, r.strain,
-             r.potential, r.work, r.dissipated, r.contacts]
+             r.potential, r.work, r.dissipated, r.contacts,
+             *(value for k, forces in enumerate(blades.values())
+               for value in (r.cut_work[k], *("" if x[row] != x[row] else x[row] for x in forces)))]
         )  # fmt: skip
     return text.getvalue()
 
@@ -188,5 +210,11 @@ def _words(summary: dict[str, Any]) -> str:
         f"volume off by {summary['volume_error']:.0e}, {summary['loose_edges']} loose edges, "
         f"{summary['inverted_elements']} elements and {summary['inverted_facets']} facets inside "
         f"out, {summary['stray_facets']} facets astray",
+    ]
+    lines += [
+        f"blade of {cut['name']}: took {cut['cut_work']:.3g} J, driving force at most "
+        f"{cut['largest_driving_force']:.3g} N over {1e3 * cut['smoothed_over']:.3g} mm of its way"
+        for cut in summary["cuts"]
+        if cut["largest_driving_force"]
     ]
     return "\n".join([*lines, *([f"drawn: {summary['out']}"] if summary["out"] else [])])

@@ -131,7 +131,7 @@ class SweptShares:
         times = passed_at(points.reshape(-1, points.shape[2])).reshape(points.shape[:2])[:, parts]
         begin, end = times.min(axis=2), times.max(axis=2)
         shape = (inside[parts].mean(axis=1) @ cut.shape) / len(parts)
-        weight = shape * _measures(cut.points)[:, None, None]
+        weight = shape * measures(cut.points)[:, None, None]
         nodes = np.broadcast_to(cut.node[:, None], weight.shape)
         held = weight > 0.0
         count = int(cut.node.max(initial=-1)) + 1
@@ -207,7 +207,7 @@ def _divided(corners: int, n: int) -> tuple[Array, Numbers]:
     return np.concatenate([1.0 - at.sum(axis=1, keepdims=True), at], axis=1), parts
 
 
-def _measures(points: Array) -> Array:
+def measures(points: Array) -> Array:
     """Lengths or areas (q,) of simplices (q, k, d)."""
     edges = points[:, 1:] - points[:, :1]
     gram = np.linalg.det(edges @ edges.swapaxes(1, 2)).clip(0.0)

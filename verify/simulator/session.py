@@ -13,6 +13,7 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
+from verify.compare.released import driving_force
 from verify.simulator.openings import KnownWays
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.stage import Grips, Stage, gripped, held_facets
@@ -29,6 +30,7 @@ from verify.xfem.release import TieForces, hold_released
 
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")
+_LATEST = 1000  # steps: the advance over which a force is smoothed is in them
 LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}  # touch, and sight
 
 
@@ -67,8 +69,9 @@ class StepRecord:
         By damping and by the scheme since the start, J; likewise.
     cut_work : (strokes,) float array
         Work that the forces have taken which held what each stroke has cut, since the start, J.
-    advance : (strokes,) float array
-        How far the blade of each stroke has come, m.
+    advance, area : (strokes,) float array
+        How far the blade of each stroke has come, m, and what it has swept in the body, m² (in
+        the plane m; NaN of strokes whose way is not known).
     contacts : int
         Facets of the collision surface that the tool touches.
     """
@@ -87,6 +90,7 @@ class StepRecord:
     dissipated: float
     cut_work: Floats
     advance: Floats
+    area: Floats
     contacts: int
 
     @property
@@ -196,6 +200,36 @@ class Session:
     def time(self) -> float:
         """Time of the scene, s."""
         return self.state.time
+
+    def blade_forces(self, stroke: int, trailing: bool = False) -> tuple[Floats, Floats]:
+        """Driving force of a blade after each step, and resistance against it, in newtons.
+
+        The driving force is what is taken of the body's energy per advance: positive pulls the
+        blade on. The resistance is toughness times width, less the driving force. In the plane
+        both are per metre of thickness; they are smoothed over `Stage.smoothing`.
+
+        Parameters
+        ----------
+        stroke : int
+        trailing : bool
+            Whether only the last step is asked for, over the advance before it.
+
+        Returns
+        -------
+        driving, resistance : (steps,) or (1,) float array
+            NaN while the blade rests; the resistance also where there is no toughness.
+        """
+        taken, length = self.records[-_LATEST if trailing else 0 :], self.stage.smoothing
+        way, work, area = np.array(
+            [(r.advance[stroke], r.cut_work[stroke], r.area[stroke]) for r in taken]
+        ).T
+        tough = self.stage.toughness[stroke] if stroke < len(self.stage.toughness) else None
+        left = (np.nan if tough is None else tough) * area - work
+        if not trailing:
+            return driving_force(way, work, length), driving_force(way, left, length)
+        last = way >= way[-1] - length
+        found = [driving_force(way[last], x[last], 2.0 * length)[-1:] for x in (work, left)]
+        return found[0], found[1]
 
     @property
     def finished(self) -> bool:
@@ -385,6 +419,7 @@ class Session:
         state, body = self.state, self.body
         kinetic = 0.5 * float(np.sum(state.velocity * body.mass.apply(state.velocity)))
         assert body.weight is not None
+        known = self._ways.areas(state.time) if self._ways is not None else np.empty(0)
         work, lost = self._spent_so_far() if self._account else (np.nan, np.nan)
         return StepRecord(
             step=len(self.records) + 1,
@@ -401,6 +436,7 @@ class Session:
             dissipated=float(lost),
             cut_work=self.cut_work.copy(),
             advance=np.array([max(path.travel_at(state.time), 0.0) for path in self._paths]),
+            area=np.append(known, np.full(len(self.cut_work) - len(known), np.nan)),
             contacts=contacts,
         )
 

@@ -5,6 +5,7 @@ What of a case file can be played, or why it cannot, is said by `stage_of`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,8 @@ class Stage:
     opening : str
         ``"swept"``: elements open ahead of a blade of `strokes`, held by forces that fade;
         ``"late"``: when it has crossed them through.
+    toughness : list of float or None
+        Of the tissue along each stroke, J/m²; of a membrane times the thickness.
     """
 
     mesh: SimplexMesh
@@ -139,6 +142,12 @@ class Stage:
     tool_radius: float = 0.0
     tool_force: float = 0.0
     opening: str = "swept"
+    toughness: list[float | None] = field(default_factory=list)
+
+    @cached_property
+    def smoothing(self) -> float:
+        """Advance over which forces on blades are smoothed, m: two mean edges of the mesh."""
+        return 2.0 * float(np.linalg.norm(self.mesh.edge_vectors, axis=2).mean())
 
     @property
     def steps(self) -> int:
@@ -303,6 +312,7 @@ def stage_of(scene: Scene, level: int = 0) -> Stage:
             tool_radius=replay.tool_radius if replay else 0.0,
             tool_force=replay.tool_force if replay else 0.0,
             opening=analysis.opening,
+            toughness=[c.toughness and c.toughness * thickness for c in scene.cuts],
         )
     except XfemError as error:
         raise InputError(str(error), where) from None

@@ -223,10 +223,20 @@ class PlayWindow:
         records = self.session.records
         cost = f", step {1e3 * sum(records[-1].seconds.values()):.1f} ms" if records else ""
         self.plotter.add_text(
-            f"{frame.time:.2f} s{cost}\nleft: cut, right: turn, wheel: nearer",
+            f"{frame.time:.2f} s{cost}{self._force()}\nleft: cut, right: turn, wheel: nearer",
             font_size=9, color="black", render=False,
         )  # fmt: skip
         self.plotter.reset_camera_clipping_range()
+
+    def _force(self) -> str:
+        """Say what drives the blades that are under way."""
+        session, said = self.session, ""
+        for stroke, path in enumerate(session.stage.strokes):
+            if session.records and path.times[0] < session.time <= path.times[-1]:
+                driving, resistance = (float(x[0]) for x in session.blade_forces(stroke, True))
+                against = f", resistance {resistance:.3g} N" if np.isfinite(resistance) else ""
+                said += f"\ndriving force {driving:.3g} N{against}"
+        return said
 
     def _take_the_mouse(self) -> None:
         """Give the left button to the scalpel, and turning, which it does usually, to the right.
