@@ -14,10 +14,14 @@ pytestmark = needs_fenicsx
 SLANTED = polyline("slanted", [0.21, -0.1], [0.83, 1.1])
 PATH = {"kind": "tool_path", "name": "path", "points": [[-0.1, 0.33], [0.71, 0.62]]}
 JERK = {"kind": "traction", "where": "top", "traction": [3.0, 1.0]}
+COARSE = {"size": 0.4, "degree": 1}
 # a pressure wave takes 0.11 s across an element of the reference on level 0
 SCENES = {
     "outputs closer than its step": {"outputs": 18},
     "a step longer than the gap": {"outputs": 12, "time_step": 0.077},
+    "a step of its own": {
+        "outputs": 3, "time_step": 0.2, "reference": {**COARSE, "time_step": 0.03},
+    },
     "a gap of no whole number of steps": {"outputs": 4, "time_step": 0.0371},
     "cuts that open between outputs": {
         "cuts": [{**MIDDLE, "opens_at": 0.0713}, {**SLANTED, "opens_at": 0.3001}],
@@ -36,8 +40,8 @@ SCENES = {
 def test_every_level_of_the_reference_halves_every_step_of_the_one_before(
     name, kinematics, monkeypatch
 ):
-    coarse = {"size": 0.4, "degree": 1}
-    scene = moving(kinematics=kinematics, reference=coarse, **{"time_step": None} | SCENES[name])
+    asked = {"reference": COARSE, "time_step": None} | SCENES[name]
+    scene = moving(kinematics=kinematics, **asked)
     taken = []
 
     def step(stepper, state):
@@ -52,6 +56,8 @@ def test_every_level_of_the_reference_halves_every_step_of_the_one_before(
         taken.clear()
         solved(scene, "reference", level)
         begun.append(np.array([*taken, scene.analysis.duration]))
+    largest = scene.reference.time_step or scene.analysis.time_step or 1.0
+    assert np.diff(begun[0]).max() <= largest * (1 + 1e-9)
     for coarse, fine in pairwise(begun):
         middles = 0.5 * (coarse[1:] + coarse[:-1])
         expected = np.sort(np.concatenate([coarse, middles]))

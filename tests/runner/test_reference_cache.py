@@ -4,14 +4,18 @@ import json
 import os
 import shutil
 import zipfile
+from dataclasses import replace
 
 import pytest
 
 from verify.errors import InputError
 from verify.result import Status
 from verify.runner import references
+from verify.runner.directory import RunDirectory
 from verify.runner.job import Job
+from verify.runner.plan import plan_case
 from verify.runner.references import ReferenceBundle, ReferenceCache, write_bundle
+from verify.runner.selection import Options
 from verify.scene import load_scene
 from verify.solution import read_solution, write_solution
 
@@ -179,3 +183,24 @@ def test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed(verify):
     assert verify("cache", "clear", "square", **here).stdout == "3 references removed\n"
     nothing = verify("cache", "clear", "square", **here)
     assert (nothing.returncode, "nothing is kept for square" in nothing.stderr) == (2, True)
+
+
+def test_the_bundle_beside_a_case_judges_until_the_case_changes(scene, kept, tmp_path):
+    assert references.bundle_of_case(scene) is None
+    beside = tmp_path / "references" / "square.zip"
+    beside.parent.mkdir()
+    write_bundle(beside, [scene], kept)
+    bundle = references.bundle_of_case(scene)
+    assert bundle is not None
+    assert bundle.levels(scene) == LEVELS
+    directory = RunDirectory(tmp_path / "run")
+    options = Options(solvers=("uncut",), cache=kept.root)
+    plan = plan_case(scene, options, {}, directory)
+    assert plan.bundle is not None
+    assert plan.job_of("reference", 2).key == bundle.key(scene, 2)
+    assert plan_case(scene, replace(options, cache=None), {}, directory).bundle is None  # solved
+    scene.file.write_text(scene.file.read_text().replace("young = 1.0", "young = 2.0"))
+    assert references.bundle_of_case(load_scene(scene.file)) is None
+    beside.write_text("no bundle")
+    with pytest.raises(InputError, match="not a bundle"):
+        references.bundle_of_case(scene)

@@ -16,7 +16,7 @@ from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.job import Job, stored_record
 from verify.runner.loading import Loaded
-from verify.runner.references import REFERENCE, ReferenceBundle
+from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
 from verify.runner.selection import Options
 from verify.scene import Scene
 from verify.scene.strict import nearest
@@ -54,6 +54,8 @@ class CasePlan:
         Those that wait for a solver that does not refuse.
     awaited : dict of str to int
         How many levels are expected to follow level 0, by solver.
+    bundle : ReferenceBundle or None
+        That the reference is taken from: of the run, or beside the case.
     """
 
     scene: Scene
@@ -67,6 +69,7 @@ class CasePlan:
     other_scenes: dict[str, Scene] = field(default_factory=dict)
     held: list[Job] = field(default_factory=list)
     awaited: dict[str, int] = field(default_factory=dict)
+    bundle: ReferenceBundle | None = None
 
     @property
     def count(self) -> int:
@@ -144,33 +147,33 @@ def plan_case(
 ) -> CasePlan:
     """Lay out the solves of `scene` that are known before any has run."""
     physics, solvers = physics_digest(scene), solvers_of(scene, options)
+    kept = bundle or (bundle_of_case(scene) if options.cache else None)
     found = {name: loaded.get(name, Loaded()) for name in solvers}
 
     def job_of(name: str, level: int) -> Job:
         parameters = parameters_of(name, options.parameters)
         code = [code_of_solver(name), found[name].source]
         given = [physics, name, level, options.repetitions, parameters, code]
-        from_bundle = bundle is not None and name == REFERENCE
         return Job(
             case=scene.name,
             solver=name,
             level=level,
             repetitions=options.repetitions,
-            key=bundle.key(scene, level) if bundle and from_bundle else digest_of(given),
+            key=kept.key(scene, level) if kept and name == REFERENCE else digest_of(given),
             folder=directory.solve_folder(scene.name, name, level),
             parameters=parameters,
         )
 
-    plan = CasePlan(scene, solvers, job_of)
+    plan = CasePlan(scene, solvers, job_of, bundle=kept)
     for name in plan.solvers:
         job = job_of(name, 0)
-        if error := found[name].error:
+        if (error := found[name].error) and not (kept and name == REFERENCE):
             plan.refused.append((job, job.blank(Status.FAILED, error)))
             continue
         plan.jobs.append(job)
         expected = scene.reference.levels if name == REFERENCE else scene.mesh.count
         plan.awaited[name] = expected - 1
-    if bundle is None and not scene.judged_by_exact:
+    if kept is None and not scene.judged_by_exact:
         plan.most_levels = scene.reference.max_levels or 0
     if options.judged and bundle is None and scene.adequacy.models:
         folder = directory.case_folder(scene.name)

@@ -50,6 +50,7 @@ from verify.scene import Scene
 from verify.whole_files import asked_place, whole_file, write_whole
 
 REFERENCE = "reference"
+BESIDE = "references"  # folder beside a case in which its own bundle lies
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"
 _HOUR = 3600.0
@@ -377,6 +378,10 @@ class ReferenceBundle:
             )
         return len(own)
 
+    def holds(self, scene: Scene) -> bool:
+        """Whether a reference of the physics of a scene is in it."""
+        return bool(self._of(scene))
+
     def key(self, scene: Scene, level: int) -> str:
         """Return what identifies the solve that `take` gives."""
         return digest_of([physics_digest(scene), level, self.digest])
@@ -406,6 +411,23 @@ class ReferenceBundle:
         physics = physics_digest(scene)
         own = {entry.level: entry for entry in self._entries if entry.physics == physics}
         return [own[level] for level in sorted(own)]
+
+
+def bundle_of_case(scene: Scene) -> ReferenceBundle | None:
+    """Return the bundle that comes with a case, ``references/<its name>.zip`` beside its file.
+
+    None if there is none, or if the case has changed since: then its reference is solved.
+
+    Raises
+    ------
+    InputError
+        If there is a file that is not a bundle.
+    """
+    if scene.file is None or scene.judged_by_exact:
+        return None
+    path = scene.file.parent / BESIDE / f"{scene.file.stem}.zip"
+    bundle = ReferenceBundle(path) if path.is_file() else None
+    return bundle if bundle is not None and bundle.holds(scene) else None
 
 
 @contextmanager

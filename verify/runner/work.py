@@ -194,12 +194,14 @@ class Work:
 
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""
-        scene = self.plans[job.case].scene_of(job)
-        if job.solver != REFERENCE or self.references is None:
+        plan = self.plans[job.case]
+        scene, kept = plan.scene_of(job), self.references if job.model else plan.bundle
+        kept = kept or self.references
+        if job.solver != REFERENCE or kept is None:
             return None
-        record = self.references.take(scene, job)
+        record = kept.take(scene, job)
         if record is not None and not job.level:
-            write_whole(job.folder / LEVELS, str(self.references.levels(scene)))
+            write_whole(job.folder / LEVELS, str(kept.levels(scene)))
         return record
 
     def _ended(self, job: Job, solve: Running, ending: Ending) -> None:

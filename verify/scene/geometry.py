@@ -323,6 +323,11 @@ class ReferenceLevels(Strict):
         "a tenth of every error that it judges (default: `levels`)",
     )
     degree: Literal[1, 2] = Field(default=2, description="polynomial order")
+    time_step: Positive | None = Field(
+        default=None,
+        description="dynamic: largest step of the coarsest level, s, which every level halves "
+        "(default: that of the analysis)",
+    )
 
     rules: ClassVar[Rules] = (
         ("", lambda r: r.max_levels is not None and r.max_levels < r.levels

@@ -139,7 +139,7 @@ class ReferenceSolver:
     have a pressure of their own from Poisson's ratio 0.45 on, so that they do not lock.
 
     A motion is integrated by generalised-α, at finite rotation by the energy–momentum scheme, with
-    the scene's time step on level 0, or what outputs, openings and jumps leave of it; every level
+    the time step of the scene's reference or analysis on level 0, or what outputs, openings and jumps leave of it; every level
     halves each step with the elements, so that what the levels say of their error is said of both.
 
     A reference is timed once, whatever `repetitions` says: it judges and does not compete.
@@ -171,7 +171,8 @@ class ReferenceSolver:
         radius = _RADIUS_OF_JUMPS if behind or factors else _RADIUS
 
         def marching(level: int, size: float) -> Marching:
-            step = scene.analysis.time_step or natural_step(scene, size * 2**level)
+            asked = scene.reference.time_step or scene.analysis.time_step
+            step = asked or natural_step(scene, size * 2**level)
             return Marching(scheme, step, radius, delay, level, opening or scene.analysis.opening)
 
         degree = scene.reference.degree
