@@ -139,8 +139,9 @@ class ReferenceSolver:
     have a pressure of their own from Poisson's ratio 0.45 on, so that they do not lock.
 
     A motion is integrated by generalised-α, at finite rotation by the energy–momentum scheme, with
-    the time step of the scene's reference or analysis on level 0, or what outputs, openings and jumps leave of it; every level
-    halves each step with the elements, so that what the levels say of their error is said of both.
+    the time step of the scene's reference or analysis on level 0, or what outputs, openings and
+    jumps leave of it; every level halves each step with the elements, so that what the levels say
+    of their error is said of both.
 
     A reference is timed once, whatever `repetitions` says: it judges and does not compete.
     """
