@@ -42,6 +42,7 @@ _DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3,
     "wedge": 3, "pyramid": 3,
 }  # fmt: skip
+_FEW = 20
 _MOST_VALUES = 200  # of a cell array that tells groups apart
 
 
@@ -106,7 +107,14 @@ def _of_meshio(mesh: Any) -> RawMesh:
                     raw.add(str(name), block, np.asarray(chosen, dtype=np.int64))
     names = {(int(v[0]), int(v[1])): k for k, v in (mesh.field_data or {}).items() if len(v) == 2}
     for key, arrays in (mesh.cell_data or {}).items():
-        if key not in _NO_TAGS:
+        if key in _NO_TAGS or key.startswith("vtk"):
+            continue
+        if key == "cell_tags" and getattr(mesh, "cell_tags", None):  # MED: names of families
+            for block, ids in enumerate(arrays):
+                for family, called in mesh.cell_tags.items():
+                    for name in called:
+                        raw.add(name, block, np.flatnonzero(np.asarray(ids) == family))
+        else:
             _add_values(raw, key, arrays, names)
     for name, chosen in (mesh.point_sets or {}).items():
         raw.nodes[str(name)] = np.asarray(chosen, dtype=np.int64)
@@ -119,9 +127,10 @@ def _add_values(raw: RawMesh, key: str, arrays: Any, names: dict[tuple[int, int]
     values = [one[:, 0] if one.ndim == 2 and one.shape[1] == 1 else one for one in values]
     if any(one.ndim != 1 or not np.issubdtype(one.dtype, np.integer) for one in values):
         return
-    distinct = np.unique(np.concatenate([*values, np.zeros(0, dtype=int)]))
-    if len(distinct) > _MOST_VALUES:
-        return
+    every = np.concatenate([*values, np.zeros(0, dtype=int)])
+    distinct = np.unique(every)
+    if len(distinct) > _MOST_VALUES or (len(every) > _FEW and len(distinct) == len(every)):
+        return  # numbers of cells
     for block, ids in enumerate(values):
         dimension = dimension_of(raw.blocks[block][0]) or 0
         for value in np.unique(ids):

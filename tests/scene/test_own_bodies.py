@@ -397,3 +397,86 @@ def test_what_meshio_does_not_read_gmsh_does(tmp_path, version):
     body = read_body(tmp_path / "body.msh", 3)
     assert len(body.cells) == 2
     assert {name: group.cells.tolist() for name, group in body.groups.items()} == groups
+
+
+def test_numbers_of_cells_are_no_groups(tmp_path):
+    mesh = box_mesh((2, 2, 2), (0.0,) * 3, (1.0,) * 3)
+    count = len(mesh.cells)
+    data = {"id": [np.arange(count)], "vtkGhostType": [np.zeros(count, int)],
+            "part": [np.arange(count) % 2], "stress": [np.linspace(0.0, 1.0, count)]}  # fmt: skip
+    meshio.Mesh(mesh.points, [("tetra", mesh.cells)], cell_data=data).write(tmp_path / "body.vtu")
+    body = read_body(tmp_path / "body.vtu", 3)
+    assert list(body.groups) == ["part=0", "part=1"]
+    assert body.group("part=1").cells.tolist() == list(range(1, count, 2))
+
+
+def test_coordinates_in_millimetres_are_warned_of(tmp_path, capsys):
+    points, cells, hard, ends, _ = block(0)
+    file, names = write(tmp_path, "medit", 1000.0 * points, cells, hard, ends)
+    case(tmp_path, file, None, *names)
+    text = (tmp_path / "case.toml").read_text()
+    (tmp_path / "case.toml").write_text(text.split("[[cuts]]")[0])
+    out, err = said_by_check(tmp_path, capsys)
+    stretch = 1000.0 * np.sqrt(1.0 + 4.0 + 9.81**2) * 1000.0 / 2e4
+    assert f"would stretch by ρgL/2E = {stretch:.2g} of its length L = 1e+03 m" in err
+    assert f"a shear wave crosses the body in {1000.0 * np.sqrt(1000.0 * 2.6 / 1e4):.3g} s" in out
+    text = text.replace("[mesh]", "scale = 1e-3\n[mesh]")
+    (tmp_path / "case.toml").write_text(text.split("[[cuts]]")[0])
+    assert "ρgL/2E" not in said_by_check(tmp_path, capsys)[1]
+
+
+def test_a_closed_surface_says_that_it_has_no_rim(tmp_path, capsys):
+    points, cells, _, _, _ = block(0, 2)
+    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(4)]), axis=1)
+    facets, count = np.unique(facets, axis=0, return_counts=True)
+    meshio.Mesh(points, [("triangle", facets[count == 1])]).write(tmp_path / "body.vtu")
+    text = CASE.format(file="body.vtu", hard="z < 0.5", held="x < 0.1", held_too="x > 0.9",
+                       geometry='cells = "surface"', cut="[]")  # fmt: skip
+    text = text.replace("density", "thickness = 1e-3\ndensity")
+    text = text.replace("[[supports]]", '[analysis]\nkinematics = "corotational"\n[[supports]]', 1)
+    (tmp_path / "case.toml").write_text(text.split("[[cuts]]")[0])
+    err, _ = said_by_check(tmp_path, capsys, code=2)
+    assert "supports[0]: the surface is closed and has no rim to act on" in err
+
+
+def _mutations(form, text):
+    """Bad forms of a good file of text: cut off, with wrong numbers, or of nothing."""
+    lines = text.splitlines()
+    middle = len(lines) // 2
+    yield "".join(text[: len(text) // 3])
+    yield "\n".join(lines[:middle])
+    yield "\n".join([*lines[:middle], "x y z", *lines[middle + 1 :]])
+    yield ""
+    if form == "medit":
+        yield text.replace("Tetrahedra\n", "Tetrahedra\n99999999999\n")
+        yield text.replace("Dimension 3", "Dimension 7")
+    if form == "xdmf":
+        yield text.replace("Tetrahedron", "Blob")
+        yield text.replace('Dimensions="', 'Dimensions="9', 1)
+        yield text.replace('Format="XML"', 'Format="HDF"', 1)
+        yield text.replace(">0 ", ">-7 ", 1)
+    if form == "abaqus":
+        yield text.replace("C3D4", "C3D99")
+        yield text.replace("\n1, ", "\n1, nan, ", 1)
+        yield text.replace("*ELEMENT", "*ELEMENTS")
+
+
+@pytest.mark.parametrize("form", ["medit", "xdmf", "abaqus"])
+def test_a_spoilt_file_gives_one_line(tmp_path, capsys, monkeypatch, form):
+    """gmsh is left out: what it prints is its own, and a process for each takes a second."""
+    monkeypatch.setattr("verify.read_mesh.find_spec", lambda _: None)
+    points, cells, hard, ends, _ = block(0, 2)
+    file, names = write(tmp_path, form, points, cells, hard, ends)
+    case(tmp_path, file, None, *names)
+    good = (tmp_path / file).read_text()
+    refused = 0
+    for number, text in enumerate(_mutations(form, good)):
+        (tmp_path / file).write_text(text + " " * number)  # of another size: read anew
+        assert main(["check", str(tmp_path / "case.toml")]) == 2, number
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1, err
+        assert err.startswith("verify: error: "), err
+        assert file in err or "case.toml" in err, err
+        refused += 1
+    assert refused >= 6
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["case.toml", file])

@@ -253,7 +253,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
-    from verify.runner.mesh_faults import body_notes, mesh_warning, unused_groups
+    from verify.runner.mesh_faults import body_notes, mesh_warning, unit_warning, unused_groups
     from verify.scene import load_scenes
 
     try:
@@ -270,7 +270,9 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         "error": None,
         "body": body_text(scenes[0]),
         "notes": body_notes(scenes[0]),
-        "warnings": [*filter(None, [mesh_warning(scenes[0]), unused_groups(scenes[0])])],
+        "warnings": [
+            *filter(None, (say(scenes[0]) for say in (mesh_warning, unit_warning, unused_groups)))
+        ],
         "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
     }
 

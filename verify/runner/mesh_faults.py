@@ -12,7 +12,7 @@ from verify.errors import InputError
 from verify.geometry.nearest import feet
 from verify.geometry.spatial import measures
 from verify.result import Notice, NoticeKind
-from verify.scene import MeshFile, Scene, read_mesh
+from verify.scene import Gravity, MeshFile, Scene, read_mesh
 from verify.scene.geometry import GROUP
 
 Array = NDArray[np.float64]
@@ -92,7 +92,32 @@ def body_notes(scene: Scene) -> list[str]:
         box = " × ".join(f"[{low:.3g}, {high:.3g}]" for low, high in ends)
         unused = "" if name in used else " (unused)"
         said.append(f"{GROUP}{name}: {', '.join(words)}, in {box} m{unused}")
-    return said
+    return [*said, *filter(None, [wave_time(scene)])]
+
+
+def unit_warning(scene: Scene) -> str:
+    """Warn of a body of a mesh file that would hang longer than twice its size, or say ""."""
+    if not isinstance(scene.geometry, MeshFile) or scene.material.density is None:
+        return ""
+    pulls = [np.linalg.norm(one.acceleration) for one in scene.loads if isinstance(one, Gravity)]
+    size, material = scene.geometry.body().size, scene.material
+    stretch = sum(pulls) * (material.density or 0.0) * size / (2.0 * material.young)
+    if stretch <= 1.0:
+        return ""
+    return (
+        f"hung up, the body would stretch by ρgL/2E = {stretch:.2g} of its length L = {size:.3g} m;"
+        " is the file in metres? [geometry] scale = 1e-3 reads millimetres"
+    )
+
+
+def wave_time(scene: Scene) -> str:
+    """Say how long a shear wave takes through the body of a mesh file, its slowest natural time."""
+    material = scene.material
+    if not isinstance(scene.geometry, MeshFile) or material.density is None:
+        return ""
+    shear = material.young / (2.0 * (1.0 + material.poisson))
+    time = scene.geometry.body().size * np.sqrt(material.density / shear)
+    return f"a shear wave crosses the body in {time:.3g} s"
 
 
 def unused_groups(scene: Scene) -> str:
@@ -113,9 +138,13 @@ def _used_groups(scene: Scene) -> set[str]:
 
 
 def mesh_notices(scene: Scene) -> list[Notice]:
-    """Return the warning of a mesh file, to stand beside the verdicts of its case."""
-    said = mesh_warning(scene)
-    return [Notice(NoticeKind.WARNING, "mesh file", None, said)] if said else []
+    """Return the warnings of a mesh file and what was done to it, for the record of a case."""
+    said = filter(None, [mesh_warning(scene), unit_warning(scene)])
+    notices = [Notice(NoticeKind.WARNING, "mesh file", None, text) for text in said]
+    if isinstance(scene.geometry, MeshFile):
+        notes = [f"of the mesh file, {note}" for note in scene.geometry.body().notes]
+        notices += [Notice(NoticeKind.ADEQUACY, "mesh file", None, note) for note in notes]
+    return notices
 
 
 def _at(point: Array) -> str:

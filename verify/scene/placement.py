@@ -113,6 +113,14 @@ def part_without_mesh(scene: SceneTables, points: Array, cells: Ints) -> str | N
     rest = [[j for j in range(corners) if j != k] for k in range(corners)]
     facets = np.sort(cells[:, rest].reshape(-1, corners - 1), axis=1)
     distinct, count = np.unique(facets, axis=0, return_counts=True)
+    if not (count == 1).any():
+        acting = [f"supports[{i}]" for i in range(len(scene.supports))]
+        acting += [f"loads[{i}]" for i, one in enumerate(scene.loads) if isinstance(one, Traction)]
+        if acting:
+            return (
+                f"{acting[0]}: the surface is closed and has no rim to act on; leave the triangles "
+                "of a part out of the file, or let the body move freely in a dynamic analysis"
+            )
     return _without_facets(scene, points[distinct[count == 1]], "")
 
 
