@@ -23,6 +23,7 @@ from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import load_scene
 from verify.solvers import find_solver, motion_of_scene
 from verify.solvers.xfem_system import SCHEMES
+from verify.xfem.body import MotionState
 from verify.xfem.explicit import acceleration_of
 
 METHODS = ("xfem", "virtual_node", "subdivision", "snapping")
@@ -40,16 +41,17 @@ def releases(monkeypatch):
     found = []
     genuine = motion_of_scene.hold_released
 
-    def released(old, state, new, inherited, source, fading):
-        genuine(old, state, new, inherited, source, fading)
+    def released(old, state, acceleration, new, source, fading):
+        holds = genuine(old, state, acceleration, new, source, fading)
+        inherited = MotionState(state.displacement[source], state.velocity[source], state.time)
         before, held = acceleration_of(old, state)[source], acceleration_of(new, inherited)
         tie, new.tie = new.tie, None
         at_once = acceleration_of(new, inherited)
         new.tie = tie
         # nothing in the support of a node that is swept within one step holds it
-        holds = [] if tie is None else tie.holds
         if all((hold.factor(state.time) > 0.0).all() for hold in holds[-1:]):
             found.append([new.mass.apply(one) for one in (before, held, at_once)])
+        return holds
 
     monkeypatch.setattr(motion_of_scene, "hold_released", released)
     return found
@@ -120,7 +122,7 @@ def test_no_acceleration_jumps_at_an_opening(tmp_path, releases, body, mass):
         assert np.abs(held - before).max() < 1e-11 * scale
     assert max(np.abs(c - b).max() / np.abs(b).max() for b, _, c in releases) > 0.01
     energy = max(np.abs(found.ledger[name]).max() for name in ("kinetic", "strain"))
-    assert np.ptp(found.ledger["total"]) <= 1e-10 * energy
+    assert np.ptp(found.ledger["total"]) <= 1e-12 * energy
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -131,7 +133,7 @@ def test_what_is_let_go_keeps_its_momenta_but_for_the_couple_of_the_forces(tmp_p
     motion = MOTION.replace("[analysis]", '[analysis]\nkinematics = "corotational"')
     text += motion + SPUN % (spin, velocity) + paths
     ledger = solve(tmp_path, method, text, scheme="energy_momentum").ledger
-    assert np.ptp(ledger["total"]) <= 1e-10 * ledger["kinetic"].max()
+    assert np.ptp(ledger["total"]) <= 1e-12 * ledger["kinetic"].max()
     assert ledger["cut_work"][-1] != 0.0
     assert np.abs(ledger["work_of_loads"]).max() <= 1e-12 * ledger["kinetic"].max()
     axes = "xyz" if body == "solid" else "xy"
@@ -158,7 +160,7 @@ def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, scheme):
     text = UNSTRUCTURED + motion + pulled + KINKED.replace("[-0.05, 0.1,", "[0.0, 0.1,")
     found = solve(tmp_path, "xfem", text, scheme=scheme)
     ledger = found.ledger
-    assert np.ptp(ledger["total"]) <= 1e-10 * ledger["strain"].max()
+    assert np.ptp(ledger["total"]) <= 1e-12 * ledger["strain"].max()
     if scheme != "forward_euler":
         assert ledger["cut_work"][-1] > 1e-3 * ledger["strain"][0]
     scene = load_scene(tmp_path / "swept.toml")
@@ -167,12 +169,31 @@ def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, scheme):
     assert "cut_work" not in late.ledger
 
 
-def test_slivers_that_are_kept_close_and_those_that_are_merged_are_refused(tmp_path):
-    text = PLANE + MOTION + INCLINED + CROSSING + weight_text() + support_text("top", [0, 0])
-    ledger = solve(tmp_path, "xfem", text, slivers="keep").ledger
-    assert np.ptp(ledger["total"]) <= 1e-10 * ledger["kinetic"].max()
-    with pytest.raises(InputError, match=r"slivers = 'merge'.*expected slivers = 'keep'"):
-        solve(tmp_path, "xfem", text, slivers="merge")
+@pytest.mark.parametrize("slivers", ["keep", "merge", "drop", "penalise"])
+def test_every_sliver_policy_is_held_too_and_keeps_the_momentum(tmp_path, slivers):
+    """A free plate that spins, cut by two blades: what a policy projects is in the account.
+
+    Forces that hold what is parted add up to nothing, also where slivers follow other cells or are
+    penalised. Their couple is in the account.
+    """
+    text, paths, spin, velocity = BODIES["plane, curved, unstructured, crossed"]
+    motion = MOTION.replace("[analysis]", '[analysis]\nkinematics = "corotational"')
+    text += motion.replace("0.02", "0.005") + SPUN % (spin, velocity) + paths
+    found = solve(tmp_path, "xfem", text, slivers=slivers, scheme="energy_momentum")
+    ledger = found.ledger
+    assert found.notes["a tool path opens"].endswith("fade with what it has swept")
+    assert np.ptp(ledger["total"]) <= 1e-12 * ledger["kinetic"].max()
+    assert ledger["cut_work"].any()
+    size = np.abs([ledger[f"linear_momentum_{axis}"] for axis in "xy"]).max()
+    for axis in "xy":
+        assert np.ptp(ledger[f"linear_momentum_{axis}"]) <= 1e-11 * size
+    turned = ledger["angular_momentum_z"] - ledger["cut_angular_impulse_z"]
+    if slivers in ("keep", "drop"):
+        assert np.ptp(turned) <= 1e-10 * np.abs(turned).max()
+
+
+def test_cells_that_are_removed_are_late(tmp_path):
+    text = PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0])
     with pytest.raises(InputError, match="removed behind the blade; expected opening = 'late'"):
         solve(tmp_path, "removal", text)
 
@@ -205,7 +226,7 @@ def test_what_merging_projects_away_has_an_entry_of_its_own(tmp_path):
     energy = ledger["kinetic"].max()
     assert np.abs(ledger["projection"]).max() > 1e-9 * energy
     assert np.abs(ledger["algorithmic"]).max() < 1e-10 * energy
-    assert np.ptp(ledger["total"]) <= 1e-10 * energy
+    assert np.ptp(ledger["total"]) <= 1e-12 * energy
 
 
 CASES = Path(__file__).parents[2] / "cases/cutting"

@@ -327,7 +327,8 @@ class Session:
             with self._timed("assembly"):
                 source = np.append(np.arange(increment.nodes_before), increment.source)
                 fading = self._ways.fading(self.phantom.node_parent, self.stage.time_step)
-                hold_released(body, before, self.body, state, source, fading)
+                acceleration = acceleration_at_corners(body, before)
+                hold_released(body, before, acceleration, self.body, source, fading)
         self._begin_account()
 
     def _begin_account(self) -> None:

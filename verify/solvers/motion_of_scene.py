@@ -28,7 +28,7 @@ from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.release import hold_released
+from verify.xfem.release import TieForces, acceleration_at_corners, hold_released
 
 _Floats = NDArray[np.float64]
 _STAGE = {
@@ -265,9 +265,16 @@ class CutMotion:
         old, further = self.body.force.phantom, self._made(self._entered)
         state = self.opening.inherited(old, self.state, further)
         new = further.force.phantom
-        if (fade := self.opening.fading(new)) is not None:
-            source = self.opening.source(old, new)
-            hold_released(self.body, self.state, further, state, source, fade)
+        if (fade := self.opening.fading(new.corners)) is not None:
+            holds = hold_released(
+                self._at_corners(self.body),
+                self._state_at_corners(),
+                acceleration_at_corners(self.body, self.state),
+                self._at_corners(further),
+                self.opening.source(old, new),
+                fade,
+            )
+            further.tie = TieForces(new, holds) if holds else None
         self._leave()
         self._account.open(self.body, self.state, further, state)
         self._take(further, state)
@@ -300,6 +307,21 @@ class CutMotion:
             phantom = self.opening.at(time, passed)
         with self.record.timed("loading"):
             return body_in_motion(self.scene, *self.opening.inertia(phantom), self.exact)
+
+    def _at_corners(self, body: DynamicBody) -> DynamicBody:
+        """Return a body with unknowns at all corners; itself where no cells are aggregated."""
+        phantom = body.force.phantom
+        if phantom.aggregation is None:
+            return body
+        made = body_in_motion(self.scene, *self.opening.inertia(phantom.corners), self.exact)
+        if isinstance(body.tie, TieForces):
+            made.tie = TieForces(phantom.corners, body.tie.holds)
+        return made
+
+    def _state_at_corners(self) -> MotionState:
+        phantom, state = self.body.force.phantom, self.state
+        fields = phantom.extend(state.displacement), phantom.extend(state.velocity)
+        return MotionState(*fields, state.time)
 
     def _take(self, body: DynamicBody, state: MotionState) -> None:
         """Go on with a body and its state."""

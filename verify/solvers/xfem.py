@@ -65,23 +65,6 @@ class _Parameters:
         check_steps(self.load_steps, self.step_factor)
         self.marching()  # it checks its own
 
-    def rule(self, scene: Scene) -> str:
-        """Return the rule by which blades open a scene; late where slivers are merged or dropped.
-
-        Raises
-        ------
-        InputError
-            If it is asked for and does not go with the policy for slivers.
-        """
-        if self.slivers not in ("merge", "drop"):
-            return self.opening or scene.analysis.opening
-        if self.opening == "swept":
-            raise InputError(
-                f"opening = 'swept' with slivers = '{self.slivers}', whose unknowns are not those "
-                "of before parted; expected slivers = 'keep' or 'penalise'"
-            )
-        return "late"
-
     def cutting(self) -> Cutting:
         """Return those of a body that is cut on its way."""
         return Cutting(self.tip, self.slivers, self.mass, _KERNELS[self.kernels])
@@ -229,7 +212,7 @@ def _run(
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
         timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline, given.rule(scene))
+        openings = openings_of(scene, size, timeline, given.opening or scene.analysis.opening)
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
         motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)

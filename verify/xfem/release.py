@@ -6,6 +6,10 @@ that no acceleration jumps; Σ r_i = 0, as the old node was in balance. The forc
 factor from 1 to 0 and takes the energy that the cut sets free (Menouillard & Belytschko, Int. J.
 Numer. Meth. Engng 81, 2010, for nodes of a mesh). Its couple δ × r turns a body; that is accounted
 for. Released at once (a factor of 0) the energy is left as waves of the length of an element.
+
+Of aggregated cells all this is so of the corners, u = C û, and Cᵀr acts on the dof nodes. The forces
+by which slivers follow their roots, and those of a penalty, act on all parts of a node together.
+They are no part of r: what another space makes of them is not the cut's, and not held.
 """
 
 from collections.abc import Callable
@@ -15,7 +19,6 @@ import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import DynamicBody, FreeMass, MotionState
-from verify.xfem.errors import XfemError
 from verify.xfem.phantom import PhantomMesh
 
 
@@ -26,7 +29,7 @@ class Hold:
     Attributes
     ----------
     nodes : (k,) int array
-        Dof nodes.
+        Corners: dof nodes where no cells are aggregated.
     forces : (k, d) float array
         At the release, in newtons.
     factor : callable
@@ -84,20 +87,20 @@ class TieForces:
 
     Attributes
     ----------
-    shape : tuple of int
-        (N, d).
+    phantom : PhantomMesh
+        Whose dof nodes they act on.
     holds : tuple of Hold
     """
 
-    shape: tuple[int, int]
+    phantom: PhantomMesh
     holds: tuple[Hold, ...]
 
     def __call__(self, time: float) -> Floats:
         """Sum the forces at a time."""
-        total = np.zeros(self.shape)
+        total = np.zeros((self.phantom.corners.node_count, self.phantom.mesh.space))
         for hold in self.holds:
             total[hold.nodes] += hold.factor(time)[:, None] * hold.forces
-        return total
+        return self.phantom.restrict(total)
 
     def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
         """Work (cuts,) in J that the forces of each cut take, as they are at a time.
@@ -111,65 +114,72 @@ class TieForces:
         cuts : int
             Number of cuts.
         """
-        taken = np.zeros(cuts)
+        taken, change = np.zeros(cuts), self.phantom.extend(change)
         for hold in self.holds:
             done = (change[hold.nodes] * hold.forces).sum(axis=1)
             taken -= np.bincount(hold.cut, hold.factor(time) * done, cuts)
         return taken
 
 
+def acceleration_at_corners(body: DynamicBody, state: MotionState) -> Floats:
+    """Return the acceleration (N_corners, d) of a body at its corners, zero where held."""
+    found = FreeMass(body).solve(-_resisting(body, state))
+    return body.force.phantom.extend(found)
+
+
 def hold_released(
     old: DynamicBody,
     state: MotionState,
+    acceleration: Floats,
     new: DynamicBody,
-    inherited: MotionState,
     source: Ints,
     fading: Callable[[Ints, float], Callable[[float], Floats]],
-) -> None:
-    """Give a body that is cut further the forces that hold what has been released.
+) -> tuple[Hold, ...]:
+    """Find the forces that hold what has been released from a body that is cut further.
 
     Parameters
     ----------
     old : DynamicBody
+        Of unknowns at all corners; its tie forces are handed on.
     state : MotionState
         Of it.
+    acceleration : (N_old, d) float array
+        `acceleration_at_corners` of it.
     new : DynamicBody
-        Its tie forces are set.
-    inherited : MotionState
-        Of it.
+        Of unknowns at all corners. Its tie forces are set.
     source : (N,) int array
-        Old dof node of each new one.
+        Old corner of each new one.
     fading : callable
-        Given some new dof nodes and the time, makes the factors of the forces that hold them.
+        Given some new corners and the time, makes the factors of the forces that hold them.
 
-    Raises
-    ------
-    XfemError
-        If cells are aggregated: their space does not contain the old one.
+    Returns
+    -------
+    tuple of Hold
+        All that still hold the new body.
     """
-    if old.force.phantom.aggregation is not None or new.force.phantom.aggregation is not None:
-        raise XfemError("release of what is aggregated; expected cells with unknowns of their own")
-    time, holds = state.time, old.tie.holds if isinstance(old.tie, TieForces) else ()
-    kept = [hold.handed_on(source, new.mass.weights, time) for hold in holds]
+    time, weights = state.time, new.mass.weights
+    holds = old.tie.holds if isinstance(old.tie, TieForces) else ()
+    kept = [hold.handed_on(source, weights, time) for hold in holds]
     carried = tuple(hold for hold in kept if hold is not None)
-    new.tie = TieForces(new.shape, carried) if carried else None
+    new.tie = TieForces(new.force.phantom, carried) if carried else None
     nodes = np.flatnonzero(np.bincount(source, minlength=old.shape[0])[source] > 1)
     if not len(nodes):
-        return
-    acceleration = FreeMass(old).solve(-_resisting(old, state))
+        return carried
+    inherited = MotionState(state.displacement[source], state.velocity[source], time)
     forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
     _balance(forces, nodes, source, new.fixed | old.fixed[source], new.mass.weights)
     forces[new.fixed] = 0.0
     cut = _parting_cuts(new.force.phantom, nodes, source[nodes])
     hold = Hold(nodes, forces[nodes], fading(nodes, time), cut)
-    new.tie = TieForces(new.shape, (*carried, hold))
+    new.tie = TieForces(new.force.phantom, (*carried, hold))
+    return new.tie.holds
 
 
 def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> None:
     """Spread in proportion to masses what the forces (N, d) on parts of one node sum up to.
 
-    That is round-off, but where loads are shared out anew, as those of hooks are. What supports
-    hold has a sum.
+    That is round-off, but where loads are shared out anew, as those of hooks are, and where slivers
+    follow others or are penalised. What supports hold has a sum.
     """
     number = np.unique(source[nodes], return_inverse=True)[1]
     share = weights[nodes] / np.bincount(number, weights[nodes])[number]
