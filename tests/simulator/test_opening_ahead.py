@@ -89,10 +89,10 @@ def test_accelerations_do_not_jump_at_an_opening_and_momentum_stays(kind, monkey
     thrown(session)
     openings, jumps, scale, hold = [], [], [], played.hold_released
 
-    def watched(old, before, new, after, source, fading) -> None:
+    def watched(old, before, given, new, source, fading) -> None:
         was = acceleration(old, before)
-        hold(old, before, new, after, source, fading)
-        now = acceleration(new, after)
+        hold(old, before, given, new, source, fading)
+        now = acceleration(new, session.state)
         openings.append(np.count_nonzero(np.bincount(source) > 1))
         jumps.append(np.abs(now - was[source]).max())
         scale.append(np.abs(was).max())

@@ -8,7 +8,6 @@ import scenes
 from case_texts import support_text, weight_text
 from tool_path_scenes import (
     BODIES,
-    CROSSING,
     INCLINED,
     KINKED,
     MOTION,

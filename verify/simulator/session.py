@@ -26,7 +26,7 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.release import TieForces, hold_released
+from verify.xfem.release import TieForces, acceleration_at_corners, hold_released
 
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from reference.exact import exact_of
 from verify.accelerated import FAST
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, errors_of_scene

@@ -7,9 +7,9 @@ factor from 1 to 0 and takes the energy that the cut sets free (Menouillard & Be
 Numer. Meth. Engng 81, 2010, for nodes of a mesh). Its couple δ × r turns a body; that is accounted
 for. Released at once (a factor of 0) the energy is left as waves of the length of an element.
 
-Of aggregated cells all this is so of the corners, u = C û, and Cᵀr acts on the dof nodes. The forces
-by which slivers follow their roots, and those of a penalty, act on all parts of a node together.
-They are no part of r: what another space makes of them is not the cut's, and not held.
+Of aggregated cells all this is so of the corners, u = C û, and Cᵀr acts on the dof nodes. Forces by
+which slivers follow their roots, and those of a penalty, act on all parts of a node together. They
+are no part of r: what another space makes of them is not the cut's, and not held.
 """
 
 from collections.abc import Callable
