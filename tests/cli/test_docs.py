@@ -2,12 +2,16 @@
 
 import re
 import shlex
+import shutil
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from doc_pages import DOCS, blocks, commands, run_line
+from doc_pages import DOCS, ROOT, blocks, commands, run_line
 
 from verify.cli import build_parser
+from verify.foreign import foreign_solver, state_of
 
 PAGES = ["guide/write-a-case.md", "guide/cli.md"]
 ELSEWHERE = {"verify doctor"}  # what it finds is held in tests/install
@@ -27,6 +31,178 @@ def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
 
+def code_in(text: str) -> list[str]:
+    return re.findall(r"^```[^\n]*\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def commands_of(page: Path) -> Iterator[tuple[str, bool]]:
+    """Commands of the project on a page, and whether they stand in a block of shell commands."""
+    text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+    own = r"(?:verify|make|python|\.ci/\w+)"
+    if page.suffix == ".yml":
+        for line in re.findall(r"^ +run: (verify .*)$", text, flags=re.MULTILINE):
+            yield line, False
+        return
+    for language, block in re.findall(r"^```([^\n]*)\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        for line in re.findall(rf"^(?:[!$] ?)?({own}(?: .*)?)$", block, flags=re.MULTILINE):
+            yield " ".join(re.sub(r"\s# .*", "", line).split()), language in SHELL
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    for line in re.findall(r"`((?:verify |make |\.ci/)\w[^`]*)`", prose):
+        yield " ".join(line.split()), False
+
+
+def all_commands() -> Iterator[tuple[str, str, bool]]:
+    """Page, command, and whether it stands in a block of shell commands."""
+    pages = [*(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "action.yml")),
+             *sorted(DOCS.rglob("*.md"))]  # fmt: skip
+    for page in pages:
+        for command, in_block in commands_of(page):
+            yield page.relative_to(ROOT).as_posix(), command, in_block
+
+
+SHELL = ("sh", "console")
+# every command in the blocks of these pages is run, one after the other, by this test
+BY_PAGE = {
+    "docs/guide/write-a-case.md": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "docs/guide/cli.md": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "docs/guide/your-solver.md":
+        "tests/test_extending_docs.py::test_every_command_on_extending_succeeds_in_order",
+    "docs/guide/regression.md":
+        "tests/test_extending_docs.py::test_every_command_on_regression_succeeds_in_order",
+    "docs/guide/simulator.md":
+        "tests/simulator/test_thesis_guide.py::test_every_command_of_the_guide_succeeds",
+    "docs/guide/tutorial.md": "tests/cli/test_tutorial.py"
+        "::test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails",
+}  # fmt: skip
+# by their first words; what is no case of the docs is run with another one
+BY_TEST = {
+    "verify list": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "verify schema": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "verify run --quick --solver my_solver":
+        "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
+    "verify check my_": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "verify run my_": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "verify run -k not quick --out sweep --cluster":
+        "tests/runner/test_cluster.py::test_a_killed_worker_loses_nothing",
+    "verify run -k quick --solver xfem --solver removal":
+        "tests/runner/test_cluster.py::test_a_killed_worker_loses_nothing",
+    "verify cache export":
+        "tests/runner/test_reference_cache.py::test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed",
+    "verify run statics/tissue_strip --solver xfem --references":
+        "tests/runner/test_reference_cache.py::test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed",
+    "verify baseline check": "tests/test_extending_docs.py"
+        "::test_every_command_on_regression_succeeds_in_order",
+    "verify solvers install": "tests/foreign/test_installing.py"
+        "::test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed",
+    "verify solvers remove": "tests/foreign/test_installing.py"
+        "::test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed",
+    "verify solvers list": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
+    "verify conform ngsxfem":
+        "tests/foreign/test_live.py::test_an_installed_solver_keeps_what_it_does_not_refuse",
+    "verify run statics/f3_inclined --solver xfem --solver ngsxfem":
+        "tests/foreign/test_live.py::test_an_installed_solver_passes_the_patch_test",
+    "verify export statics/f1_patch --out mine": "tests/foreign/test_programs.py"
+        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
+    "python mine/example.py": "tests/foreign/test_programs.py"
+        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
+    "verify import statics/f1_patch mine": "tests/foreign/test_programs.py"
+        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
+    "verify doctor": "tests/install/test_setup.py::test_all_that_a_full_run_needs_works_here",
+    ".ci/setup": "tests/install/test_setup.py"
+        "::test_setup_installs_the_hashed_lock_and_then_the_project",
+    "make test": "tests/install/test_setup.py::test_no_claim_about_time_decides_make_test",
+    "make bench": "tests/install/test_setup.py::test_no_claim_about_time_decides_make_test",
+    "make": "tests/cli/test_docs.py::test_make_knows_its_targets",
+    ".ci/": "tests/cli/test_docs.py::test_scripts_are_there_and_compile",
+    "verify play": "tests/simulator/test_thesis_guide.py::test_every_command_of_the_guide_succeeds",
+    "verify conform virtual_node": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
+    "verify conform snapping": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
+    "verify study": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
+    "verify run dynamics/freed_half": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
+}  # fmt: skip
+# written by `make results` beside what came of it
+RESULTS = "docs/results/"
+# of the form of a command: a word in capitals or three dots stand for something
+FORM = re.compile(r"\b[A-Z]{3,}\b|…|\$\{\{| --help$")
+
+
+def runner_of(page: str, command: str, in_block: bool) -> str:
+    """The test that runs a command; empty if nobody does."""
+    if page.startswith(RESULTS) or FORM.search(command):
+        return "tests/cli/test_docs.py::test_every_command_in_the_docs_parses"
+    if re.match(r"verify [a-z]+( [a-z]+| --\w+)?$", command) and not in_block:
+        return "tests/cli/test_docs.py::test_every_command_in_the_docs_parses"
+    plain = command.replace('"', "")
+    name = max((start for start in BY_TEST if plain.startswith(start)), key=len, default="")
+    if in_block and page in BY_PAGE:
+        return BY_PAGE[page]
+    return BY_TEST.get(name, "")
+
+
+def test_every_command_in_the_docs_is_run_by_a_test() -> None:
+    found = {one: runner_of(*one) for one in all_commands()}
+    assert len(found) > 100
+    assert [one[:2] for one, test in found.items() if not test] == []
+    for test in sorted({*found.values(), *BY_PAGE.values(), *BY_TEST.values()}):
+        file, _, name = test.partition("::")
+        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), test
+    used = [command.replace('"', "") for _, command, _ in found]
+    assert [start for start in BY_TEST if not any(c.startswith(start) for c in used)] == []
+
+
+def test_a_command_that_nobody_runs_is_noticed() -> None:
+    assert not runner_of("README.md", "verify run statics/f1_patch --out somewhere", True)
+    assert not runner_of("docs/guide/cli.md", "verify list --exact --json", False)
+
+
+def test_make_knows_its_targets() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    asked = {command.split()[1] for _, command, _ in all_commands() if command.startswith("make ")}
+    for target in asked:
+        assert re.search(rf"^{target}:.*## ", makefile, flags=re.MULTILINE), target
+
+
+def test_scripts_are_there_and_compile() -> None:
+    asked = {command.split()[0] for _, command, _ in all_commands() if command.startswith(".ci/")}
+    for name in asked:
+        (file,) = ROOT.glob(f"{name}*")
+        text = file.read_text(encoding="utf-8")
+        if text.startswith("#!/usr/bin/env python"):
+            compile(text, name, "exec")
+
+
+@pytest.mark.parametrize("command", [
+    "verify conform virtual_node --check cut-patch --check free-piece",
+    "verify conform snapping_subdivision --set threshold=0.3 --check cut-patch",
+])  # fmt: skip
+def test_a_command_of_seconds_succeeds(command: str, tmp_path: Path) -> None:
+    assert command in [line for _, line, _ in all_commands()]
+    done = run_line(command, tmp_path)
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+
+
+def long_commands() -> list[str]:
+    """Studies and runs that only this file runs, as they stand in the docs."""
+    own = "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds"
+    every = {one[1]: runner_of(*one) for one in all_commands()}
+    return [line for line, test in every.items() if test == own]
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("command", long_commands())
+def test_a_command_of_minutes_succeeds(command: str, tmp_path: Path) -> None:
+    if "vbd" in command and not state_of(foreign_solver("vbd")).python:
+        pytest.skip("vbd is not installed")
+    if "my_solver" in command and find_spec("skfem") is None:
+        pytest.skip("scikit-fem is not installed")
+    shutil.copytree(DOCS / "examples", tmp_path / "docs/examples")
+    shutil.copy(DOCS / "examples/skfem_solver.py", tmp_path / "my_solver.py")
+    done = run_line(command, tmp_path)
+    # the thesis' mass fails what it fails, as the page says
+    allowed = (1,) if "xfem.mass=thesis" in command else (0,)
+    assert done.returncode in allowed, f"{done.stdout}\n{done.stderr}"
+
+
 def test_every_command_in_the_docs_parses() -> None:
     pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *DOCS.rglob("*.py")]
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages).replace("\\\n", " ")
@@ -36,7 +212,3 @@ def test_every_command_in_the_docs_parses() -> None:
     for line in lines:
         words = shlex.split(re.split(r" [>|&] | &&", line)[0], comments=True)
         assert parser.parse_args(words[1:]).command, line
-
-
-def code_in(text: str) -> list[str]:
-    return re.findall(r"^```[^\n]*\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
