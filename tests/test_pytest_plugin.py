@@ -136,3 +136,4 @@ def test_a_bad_case_file_is_an_error_of_collection_in_one_line(pytester, session
     result = session("test_marked.py")
     assert result.ret != 0
     result.stdout.fnmatch_lines(["*no case 'statics/f1_pach'; did you mean 'statics/f1_patch'?*"])
+    result.stdout.no_fnmatch_line("*pytest_generate_tests*")  # one line, no traceback

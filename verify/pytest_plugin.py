@@ -255,11 +255,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     from verify.errors import InputError
 
-    source = _case_of(marker)
     try:
-        names = metafunc.config.stash[_RUNS].check_names(source)
-    except InputError as error:
-        raise pytest.UsageError(f"{metafunc.definition.nodeid}: {error}") from None
+        names = metafunc.config.stash[_RUNS].check_names(_case_of(marker))
+    except (InputError, pytest.UsageError) as error:  # a line, without the way that led here
+        said = f"{metafunc.definition.nodeid}: {error}"
+        raise pytest.Collector.CollectError(said) from None
     if "verify_check" not in metafunc.fixturenames:
         metafunc.fixturenames.append("verify_check")
     metafunc.parametrize("verify_check", names, indirect=True)

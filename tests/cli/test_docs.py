@@ -152,7 +152,7 @@ def test_every_command_in_the_docs_is_run_by_a_test() -> None:
 
 def test_a_command_that_nobody_runs_is_noticed() -> None:
     assert not runner_of("README.md", "verify run statics/f1_patch --out somewhere", True)
-    assert not runner_of("docs/guide/cli.md", "verify list --exact --json", False)
+    assert not runner_of("docs/guide/cli.md", "verify paraview patch --level 1", False)
 
 
 def test_make_knows_its_targets() -> None:
@@ -165,8 +165,9 @@ def test_make_knows_its_targets() -> None:
 def test_scripts_are_there_and_compile() -> None:
     asked = {command.split()[0] for _, command, _ in all_commands() if command.startswith(".ci/")}
     for name in asked:
-        (file,) = ROOT.glob(f"{name}*")
-        text = file.read_text(encoding="utf-8")
+        file = ROOT / name
+        assert file.exists(), name
+        text = file.read_text(encoding="utf-8") if file.is_file() else ""
         if text.startswith("#!/usr/bin/env python"):
             compile(text, name, "exec")
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from verify.json_files import read_json, write_json
 from verify.result import Status
 from verify.result_files import read_result
-from verify.runner.solve import solve_job
+from verify.runner.solve import main, solve_job
 from verify.scene import load_scene, scene_content
 
 # reasons, as they begin
@@ -86,6 +87,20 @@ def test_a_link_in_its_folder_is_not_written_through(tmp_path, scene, monkeypatc
     assert kept.read_text() == "mine"
     assert (folder / "solution.json").stat().st_size > 100
     assert not list(folder.glob("outcome*"))
+
+
+@pytest.mark.parametrize("name", ["Guest", "Talking"])
+def test_its_outcome_is_not_written_through_a_link(name, tmp_path, scene, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    folder, kept = tmp_path / "solve", tmp_path / "kept.json"
+    folder.mkdir()
+    kept.write_text("mine")
+    (folder / "outcome.json").symlink_to(kept)
+    job = {"scene": scene_content(scene), "solver": f"guests:{name}", "level": 0}
+    write_json({**job, "repetitions": 1, "parameters": {}}, folder / "job.json")
+    main(folder / "job.json")
+    assert kept.read_text() == "mine"
+    assert read_json(folder / "outcome.json")["status"] in ("solved", "refused")
 
 
 def test_a_refusal_of_any_length_is_a_sentence(scene, tmp_path):

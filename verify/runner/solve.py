@@ -44,6 +44,7 @@ def main(job_file: Path) -> None:
     if comm is not None:
         outcome.setdefault("notes", {})["ranks"] = str(comm.size)
     if first:
+        _without_links(folder)
         write_json({"peak_memory": peak_memory(), **outcome}, folder / "outcome.json")
     if comm is not None and outcome["status"] != Status.SOLVED:
         give_up(comm, outcome, folder / "outcome.json")
@@ -77,6 +78,12 @@ def solve_job(
         return {"status": Status.FAILED, "reason": words_of(error, _LONGEST)}
 
 
+def _without_links(folder: Path) -> None:
+    """Remove the links that a solver has planted: what they lead to is not ours to write."""
+    for planted in [path for path in folder.iterdir() if path.is_symlink()]:
+        planted.unlink()
+
+
 def _leave_traceback() -> None:
     """Leave the traceback in the log, if the solver has left the log open."""
     with contextlib.suppress(Exception):
@@ -97,6 +104,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     if refusal := checked_refusal(solver.refuses(scene)):
         raise UnsupportedSceneError(refusal)
     if store and job.get("tell_levels"):
+        _without_links(folder)
         write_whole(folder / LEVELS, str(checked_levels(solver.levels(scene))))
     with compile_times() as compiled:
         solution = handed_over(
@@ -106,8 +114,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         text = f"a solution in {solution.dimension}D; expected {scene.dimension}D, as the case is"
         raise InputError(text)
     if store:
-        for planted in [path for path in folder.iterdir() if path.is_symlink()]:
-            planted.unlink()  # of the solver: what it leads to is not ours to write
+        _without_links(folder)
         write_solution(solution, folder / "solution")
     return {
         "status": Status.SOLVED,
