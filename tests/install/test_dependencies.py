@@ -65,7 +65,7 @@ def imported(*folders):
 @pytest.mark.parametrize(
     ("folder", "groups", "besides"),
     [
-        ("verify", [None], {"pytest", "distributed"}),
+        ("verify", [None], {"pytest", "distributed", "h5py"}),
         ("reference", [None, "gmsh", "fenicsx"], set()),
         # pytest's own protocol has no public name; conftest.py repeats it
         ("tests", [None, "gmsh", "fenicsx", "test", "dev"], {"_pytest"}),
