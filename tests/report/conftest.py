@@ -2,7 +2,7 @@ import pytest
 from synthetic_run import make_run
 from synthetic_studies import make_studies
 
-from verify.report import render
+from verify.report.rendering import render
 
 
 def pytest_configure(config):

@@ -1,9 +1,13 @@
 """The four answers of a run, against numbers chosen beforehand: ratios, medians, times, slivers."""
 
+import math
+import random
+from statistics import median
+
 import pytest
 
 from verify.records import ReferenceRecord
-from verify.report.answers import answers, energy_curve, sliver_curves
+from verify.report.answers import Ratio, _over_cases, answers, energy_curve, sliver_curves
 from verify.report.error_plots import answer_panels
 from verify.report.plots import Palette
 from verify.result import CRITICAL_STEP, CaseResult, Metric, SolveRecord, Status
@@ -70,6 +74,18 @@ def test_time_is_compared_at_an_equal_error_between_levels_by_a_power_law():
     assert (
         "no other solver reaches an equal error" in answers([case("a", *slow, *better)])[3].sentence
     )
+
+
+def test_the_interval_of_times_holds_the_median_of_other_cases_of_the_same_kind():
+    """Ratios are drawn about 1: nine in ten intervals hold it, though no repetition tells."""
+    draw, held = random.Random(3), 0
+    for _ in range(200):
+        values = [math.exp(draw.gauss(0.0, 0.3)) for _ in range(9)]
+        own = _over_cases({str(k): Ratio(v, v, v) for k, v in enumerate(values)})
+        low, high = (median(getattr(r, end) for r in own.values()) for end in ("low", "high"))
+        assert low <= median(values) <= high
+        held += low <= 1.0 <= high
+    assert 0.9 * 200 <= held < 200
 
 
 def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():

@@ -8,8 +8,8 @@ import pytest
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
-from verify.report import error_plots, load_run, plots, render
-from verify.report.bodies import Body, deformed_body
+from verify.report import error_plots, plots
+from verify.report.bodies import Body, deformed_bodies
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
 from verify.report.error_plots import error_panel, error_range
@@ -17,6 +17,8 @@ from verify.report.pictures import case_pictures, plane_tips, scale_top
 from verify.report.plots import Palette, drawing
 from verify.report.problem import cut_lines
 from verify.report.profiles import opening_figures
+from verify.report.rendering import render
+from verify.report.run_directory import load_run
 from verify.result import (
     Metric,
     Notice,
@@ -257,7 +259,7 @@ def test_reference_and_solvers_are_in_one_figure_with_the_band(openings_drawn):
 
 
 def body_with(values):
-    body = deformed_body(cut_square(8), 0.0)
+    body = deformed_bodies(cut_square(8), 0.0)[0]
     return replace(body, values=np.resize(values, len(body.points)))
 
 
@@ -274,7 +276,7 @@ def lengths(body: Body) -> float:
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_outline_is_the_boundary_with_both_faces_of_the_cut(order):
-    body = deformed_body(cut_square(8, order), 0.0)
+    body = deformed_bodies(cut_square(8, order), 0.0)[0]
     assert lengths(body) == pytest.approx(4 + 2 * np.hypot(1, 1 / 3), rel=1e-12)
 
 

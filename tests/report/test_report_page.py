@@ -15,8 +15,8 @@ from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
 from verify.cli.run_text import verdict_lines
-from verify.report import load_run, render
-from verify.report.run_directory import COLUMNS
+from verify.report.rendering import render
+from verify.report.run_directory import COLUMNS, load_run
 from verify.result import SolveRecord, Status, Verdict
 from verify.result_files import read_result, write_result
 
@@ -105,8 +105,9 @@ def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_besid
     write_result(result, file)
     said = "reference: 0.49 of the error"
     page = render(root).read_text(encoding="utf-8")
-    assert page.count(said) == 2  # beside the check, and beside the verdict of the case
-    assert render(root, "markdown").read_text(encoding="utf-8").count(said) == 2
+    # on the first screen, beside the verdict of the case with its check as a tip, beside the check
+    assert page.count(said) == 4
+    assert render(root, "markdown").read_text(encoding="utf-8").count(said) == 3
     junit = ElementTree.parse(root / "junit.xml").getroot()
     assert [one.text for one in junit.findall(".//testcase/system-out")] == [said]
     rows = csv.DictReader(io.StringIO((root / "results.csv").read_text()))

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from verify.errors import RunStoppedError
-from verify.report import render, rendering
+from verify.report import rendering
+from verify.report.rendering import render
 from verify.runner import Options, drawing, run_cases
 from verify.scene import load_scene
 

@@ -118,7 +118,7 @@ def import_(
     from verify.cli.run_text import verdict_lines
     from verify.exchange import read_answers
     from verify.exchange.comparison import compare_answers
-    from verify.report import render
+    from verify.report.rendering import render
     from verify.runner import Options, exit_code
     from verify.runner.checking import check_solver_name
     from verify.scene import load_scene

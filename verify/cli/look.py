@@ -309,7 +309,7 @@ def report(
       verify report out --format markdown
     """
     from verify.cli.progress import said_to_wait
-    from verify.report import render
+    from verify.report.rendering import render
     from verify.report.study_page import render_study, studies_in
 
     if (directory / "run.json").is_file():

@@ -175,9 +175,7 @@ def run(
         return code
     for line in verdict_lines(summary.results):
         print_line(line)
-    from verify.report.answers import (
-        answers,
-    )  # it loads the figures, which solves need not wait for
+    from verify.report.answers import answers
 
     for one in answers(summary.results):
         print_line(f"{one.question}: {one.sentence}")
@@ -284,11 +282,11 @@ def _drawings(beside: bool) -> Iterator[Path | None]:
 
 def _load_report() -> None:
     with contextlib.suppress(Exception):  # it is said when the report is to be written
-        import_module("verify.report").load()
+        import_module("verify.report.rendering").load()
 
 
 def _rendered(directory: Path, drawings: Path | None) -> str:
-    from verify.report import render
+    from verify.report.rendering import render
 
     return str(render(directory, drawings=drawings))
 

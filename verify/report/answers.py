@@ -21,6 +21,7 @@ BASELINE = "conforming"
 _REFERENCE = "reference"
 _ERROR = "displacement_l2"
 _NAMED = 3  # solvers in a sentence
+_BEYOND = 0.1  # probability that a median lies outside its interval
 _PARAMETER = "epsilon"  # of a family of slivers, in elements
 
 
@@ -120,16 +121,20 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
         parts.append(f"{solver_title(name)}: {', '.join(said)}")
     least = min(x for c in curves for x, _ in c.places)
     families = len({c.family for c in curves})
-    where = f"{families} famil{'y' if families == 1 else 'ies'} down to ε = {number(least, 1)}"
-    return Answer("Slivers", f"{'; '.join(parts)} that at the largest ε, in {where}.")
+    where = f"{families} famil{'y' if families == 1 else 'ies'}"
+    said = (
+        f"As slivers shrink to ε = {number(least, 1)} of an element ({where}), beside the largest ε"
+    )
+    return Answer("Slivers", f"{said}: {'; '.join(parts)}.")
 
 
 def cost(results: Sequence[CaseResult]) -> Answer:
     """Answer what accuracy costs: the time at equal error, meshing included."""
     found = dict(_ratios(results, _time_ratio))
     if found:
+        found = {name: _over_cases(own) for name, own in found.items()}
         said = _compared(found, "takes", "time of {} for an equal error, meshing included")
-        return Answer("Cost", said, _example(results, found))
+        return Answer("Cost", f"{said} {_of_times(results)}", _example(results, found))
     timed = [
         (result.case, curve)
         for result in results
@@ -143,6 +148,27 @@ def cost(results: Sequence[CaseResult]) -> Answer:
     said = f"{curve.label}: {number(last.value, 2)} in {number(_seconds(last), 2)} s"
     missing = "no other solver reaches an equal error in the same case, to compare the time with"
     return Answer("Cost", f"{said} ({case}); {missing}.", case)
+
+
+def _over_cases(own: Mapping[str, Ratio]) -> dict[str, Ratio]:
+    """Widen the ends of each ratio so that those of the median hold the spread over cases too.
+
+    Repetitions in one run share its load. Cases are measured at other moments: between the k-th
+    and the k-th last of them the median lies with 90 %, whatever the distribution (sign test).
+    """
+    values, n = sorted(_values(own)), len(own)
+    tails = [2 * sum(math.comb(n, i) for i in range(k)) / 2**n for k in range(1, n // 2 + 1)]
+    k = max(sum(tail <= _BEYOND for tail in tails), 1)
+    low, high = values[k - 1], values[n - k]
+    return {case: Ratio(r.value, min(r.low, low), max(r.high, high)) for case, r in own.items()}
+
+
+def _of_times(results: Sequence[CaseResult]) -> str:
+    """Say what the interval of times holds."""
+    contended = any(s.notes.get("timing", "").startswith("contended")
+                    for r in results for s in r.solves)  # fmt: skip
+    beside = ", whose solves ran side by side" if contended else ""
+    return f"The interval is that over cases and repetitions of one run{beside}."
 
 
 def compared_curves(result: CaseResult) -> list[Curve]:

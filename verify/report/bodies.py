@@ -1,7 +1,7 @@
 """Bodies of stored fields and views of them, the same for every renderer."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -69,13 +69,18 @@ def read_stored(root: Path, path: str) -> Solution:
         raise InputError(f"the solution cannot be read ({error.strerror})", path) from None
 
 
-def deformed_body(solution: Solution, scale: float, step: int = -1) -> Body:
-    """Return the body displaced by `scale` times its displacement at a time, coloured by |u|."""
-    displacement = solution.displacement[step]
-    points = solution.points + scale * displacement
+def deformed_bodies(solution: Solution, scale: float, steps: Sequence[int] = (-1,)) -> list[Body]:
+    """Return the body displaced by `scale` times its displacement at times, coloured by |u|."""
     cells = _straight(solution.cells, solution.cell_type)
-    values = np.linalg.norm(displacement, axis=1)
-    return _body(points, cells, values, solution.cells, solution.points)
+    still = _body(solution.points, cells, np.zeros(len(solution.points)), solution.cells)
+    return [
+        replace(
+            still,
+            points=_in_space(solution.points + scale * solution.displacement[step]),
+            values=np.linalg.norm(solution.displacement[step], axis=1),
+        )
+        for step in steps
+    ]
 
 
 def error_body(path: Path) -> Body:
@@ -142,35 +147,40 @@ def _body(
     cells: NDArray[np.int64],
     values: NDArray[np.float64],
     elements: NDArray[np.int64],
-    material: NDArray[np.float64] | None = None,
 ) -> Body:
-    flat = points.shape[1] == 2
-    drawn, still = (
-        np.column_stack([places, np.zeros(len(places))]) if flat else places
-        for places in (points, points if material is None else material)
-    )
+    flat, drawn = points.shape[1] == 2, _in_space(points)
     if cells.shape[1] == 3:
         triangles, inner = cells, _all_edges(elements[:, :3])
         edges = _single(cells, _SIDES) if flat else _creases(drawn, triangles, oriented=False)
     else:
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
         edges, inner = _creases(drawn, triangles), _all_edges(triangles)
-    return Body(drawn, triangles, edges, values, inner, still)
+    return Body(drawn, triangles, edges, values, inner, drawn)
+
+
+def _in_space(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    flat = points.shape[1] == 2
+    return np.column_stack([points, np.zeros(len(points))]) if flat else points
+
+
+def _keys(found: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return one number for each row of nodes, the same for rows of the same nodes."""
+    shape = (int(found.max(initial=0)) + 1,) * found.shape[1]
+    return np.asarray(np.ravel_multi_index(tuple(np.sort(found, axis=1).T), shape))
 
 
 def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDArray[np.int64]:
     """Return the faces that belong to one cell only, as the cell orients them."""
     found = np.concatenate([cells[:, list(face)] for face in faces])
-    _, first, count = np.unique(
-        np.sort(found, axis=1), axis=0, return_index=True, return_counts=True
-    )
+    _, first, count = np.unique(_keys(found), return_index=True, return_counts=True)
     single: NDArray[np.int64] = found[np.sort(first[count == 1])]
     return single
 
 
 def _all_edges(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     found = np.concatenate([triangles[:, list(side)] for side in _SIDES])
-    edges: NDArray[np.int64] = np.unique(np.sort(found, axis=1), axis=0)
+    _, first = np.unique(_keys(found), return_index=True)
+    edges: NDArray[np.int64] = np.sort(found[first], axis=1)
     return edges
 
 
@@ -186,10 +196,10 @@ def _creases(
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     edges = np.concatenate([triangles[:, [i, j]] for i, j in _SIDES])
     owner = np.tile(np.arange(len(triangles)), 3)
-    unique, first, inverse, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    _, first, inverse, count = np.unique(
+        _keys(edges), return_index=True, return_inverse=True, return_counts=True
     )
-    inverse, turned = inverse.reshape(-1), normals[owner]
+    unique, turned = np.sort(edges[first], axis=1), normals[owner]
     if not oriented:
         alike = np.einsum("ij,ij->i", turned, turned[first][inverse])
         turned = np.where(alike[:, None] < 0.0, -turned, turned)

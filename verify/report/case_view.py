@@ -64,7 +64,6 @@ class CaseView:
     sketch: Drawing | None = None
     pictures: CasePictures = field(default_factory=CasePictures)
     rows: list[PictureRow] = field(default_factory=list)
-    turnable: bool = False
     metrics: list[str] = field(default_factory=list)
     convergence: list[Figure] = field(default_factory=list)
     convergence_notes: list[str] = field(default_factory=list)
@@ -116,19 +115,23 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
     view.reference = reference_facts(result.reference)
-    view.reference_tables = reference_tables(result.reference)
+    view.reference_tables = reference_tables(
+        result.reference, {m.name: m.unit for s in result.solves for m in s.metrics}
+    )
 
 
 def show_pictures(view: CaseView) -> None:
     """Take the rows of pictures from those of the case, in place of what is there."""
-    view.rows, view.turnable, pictures = [], False, view.pictures
+    view.rows, pictures = [], view.pictures
+    frames = [picture for body in pictures.film for picture in body]
     for kind, group, bar in (("deformed", pictures.deformed, "displacement |u|"),
+                             ("film", frames, "displacement |u|"),
                              ("error", pictures.error, "error"),
                              ("tip", pictures.tip, "error")):  # fmt: skip
         if group and group[0].image:
             view.rows.append(PictureRow(kind, group, colour_bar(group[0].view, bar)))
-            turned = [bool(picture.turned) for picture in group]  # packed here, each of them
-            view.turnable |= any(turned)
+            for picture in group:  # packed here, each of them
+                _ = picture.turned
 
 
 def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:

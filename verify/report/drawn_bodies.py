@@ -10,12 +10,12 @@ import math
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps, rc_context
+from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import Collection, PolyCollection, TriMesh
+from matplotlib.colors import Normalize, to_hex
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 from PIL import Image
@@ -23,7 +23,6 @@ from PIL import Image
 from verify.report.blocks import Drawing
 from verify.report.bodies import Body, View
 from verify.report.notation import RAISED
-from verify.report.plots import drawing
 
 _DPI = 100
 _OUTLINE, _ELEMENTS = (0.1, 0.1, 0.1, 1.0), (0.0, 0.0, 0.0, 0.25)
@@ -32,28 +31,38 @@ _FACETS = 12_000  # up to which those of solids are split
 
 def draw(body: Body, view: View) -> bytes:
     """Return a picture of `body` as WebP."""
-    figure = Figure(figsize=(view.size[0] / _DPI, view.size[1] / _DPI), dpi=_DPI)
+    (width, height), (x0, x1, y0, y1) = view.size, view.window
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    places = view.projected(body.points)
-    if np.ptp(body.points[:, 2]) == 0 and len(body.values) == len(body.points):
-        mesh = Triangulation(places[:, 0], places[:, 1], body.triangles)
-        axes.tripcolor(mesh, body.values, shading="gouraud", cmap=view.colours,
-                       vmin=view.limits[0], vmax=view.limits[1])  # fmt: skip
-        for edges, width, colour in ((body.drawn_elements, 0.5, _ELEMENTS),
-                                     (body.edges, 1.6, _OUTLINE)):  # fmt: skip
-            segments = list(places[edges][:, :, :2])
-            axes.add_collection(LineCollection(segments, linewidths=width, colors=[colour]))
-    else:
-        axes.add_collection(_painted(body, view, places))
-    axes.set_xlim(view.window[0], view.window[1])
-    axes.set_ylim(view.window[2], view.window[3])
+    onto = Affine2D().translate(-x0, -y0).scale(width / (x1 - x0), height / (y1 - y0))
+    for layer in _layers(body, view):  # axes would take longer than the body
+        layer.set_transform(onto)
+        figure.add_artist(layer)
     canvas.draw()
     made = io.BytesIO()
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    image.save(made, "WEBP", quality=84, method=4)
+    image.save(made, "WEBP", quality=84, method=3)
     return made.getvalue()
+
+
+def _layers(body: Body, view: View) -> list[Collection]:
+    """Return what is drawn of a body, the lowest first."""
+    places = view.projected(body.points)
+    if np.ptp(body.points[:, 2]) != 0 or len(body.values) != len(body.points):
+        return [_painted(body, view, places)]
+    low, high = view.limits
+    mesh = TriMesh(Triangulation(places[:, 0], places[:, 1], body.triangles),
+                   array=body.values, cmap=view.colours, norm=Normalize(low, high))  # fmt: skip
+    lines = ((body.drawn_elements, 0.5, _ELEMENTS), (body.edges, 1.6, _OUTLINE))
+    return [
+        mesh,
+        *(_lined(places[edges][:, :, :2], width, colour) for edges, width, colour in lines),
+    ]
+
+
+def _lined(ends: Any, width: float, colour: Any) -> Collection:
+    """Return lines; as polygons they are made at once, as lines one by one."""
+    return PolyCollection(ends, facecolors="none", linewidths=width, edgecolors=[colour])
 
 
 def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollection:
@@ -70,15 +79,16 @@ def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollect
     low, high = view.limits
     shades = (facets[:, :, 3].mean(axis=1) - low) / ((high - low) or 1.0)
     lift = 0.005 * (view.window[1] - view.window[0])  # lines lie on the facets beside them
-    kinds = [(facets, colormaps[view.colours](shades), 0.4, 0.0)]
-    kinds += [(e, np.tile(colour, (len(e), 1)), width, lift) for e, colour, width in lines]
-    shapes = [shape for corners, *_ in kinds for shape in corners[:, :, :2]]
-    depth = np.concatenate([corners[:, :, 2].mean(axis=1) + up for corners, _, _, up in kinds])
+    kinds = [(facets, colormaps[view.colours](shades), 0.4, facets[:, :, 2].mean(axis=1))]
+    kinds += [(ends[:, [0, 1, 1]], np.tile(colour, (len(ends), 1)), width,
+               ends[:, :, 2].mean(axis=1) + lift) for ends, colour, width in lines]  # fmt: skip
+    shapes: Any = np.concatenate([corners[:, :, :2] for corners, *_ in kinds])
+    depth = np.concatenate([deep for *_, deep in kinds])
     colours = np.concatenate([colour for _, colour, _, _ in kinds])
     widths = np.concatenate([np.full(len(corners), width) for corners, _, width, _ in kinds])
     order = np.argsort(depth, kind="stable")
     return PolyCollection(
-        [shapes[n] for n in order],
+        shapes[order],
         facecolors=colours[order],
         edgecolors=colours[order],
         linewidths=widths[order],
@@ -108,24 +118,32 @@ def colour_bar(view: View, title: str) -> Drawing:
     power = math.floor(math.log10(high)) if drawable else 0
     power = 0 if -3 <= power < 4 else power
     top = high / 10.0**power if drawable else 1.0
-    with rc_context({"font.size": 9}):
-        figure = Figure(figsize=(4.2, 0.55))
-        FigureCanvasSVG(figure)
-        axes = figure.add_axes((0.06, 0.42, 0.88, 0.2))
-        axes.imshow(np.linspace(0, 1, 64)[None], aspect="auto", cmap=view.colours,
-                    extent=(0.0, top, 0.0, 1.0), interpolation="nearest")  # fmt: skip
-        if view.beyond:  # an arrow of the last colour
-            tip = [(1.0, 0.0), (1.04, 0.5), (1.0, 1.0)]
-            axes.add_patch(Polygon(tip, transform=axes.transAxes, clip_on=False,
-                                   color=colormaps[view.colours](1.0)))  # fmt: skip
-        axes.set_yticks([])
-        axes.set_xticks(_ticks(top) if drawable else [], [f"{v:.4g}" for v in _ticks(top)]
-                        if drawable else [])  # fmt: skip
-        unit = f"10{str(power).translate(RAISED)} m" if power else "m"
-        axes.set_title(f"{title} ({unit})", fontsize=9, pad=3)
-        beyond = " and above" if view.beyond else ""
-        words = f"Colours: {title} from 0 to {high:.3g} m{beyond}"
-        return drawing(figure, words, "colour-bar")
+    shades = [to_hex(colour) for colour in colormaps[view.colours](np.linspace(0, 1, 17))]
+    stops = "".join(f'<stop offset="{k / 16:g}" stop-color="{c}"/>' for k, c in enumerate(shades))
+    left, wide = 16.0, 248.0
+    end = left + wide
+    parts = [
+        f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>',
+        f'<rect x="{left}" y="18" width="{wide}" height="10" fill="url(#scale)"/>',
+        _text(left + wide / 2, 12, f"{title}, {_unit(power)}"),
+    ]
+    if view.beyond:  # an arrow of the last colour
+        parts.append(f'<path d="M{end} 18L{end + 10} 23L{end} 28z" fill="{shades[-1]}"/>')
+    for value in _ticks(top) if drawable else []:
+        at = left + wide * value / top
+        parts.append(f'<path d="M{at:.2f} 28v3" stroke="#1b1b1b" stroke-width="0.8"/>')
+        parts.append(_text(at, 42, f"{value:.4g}"))
+    beyond = " and above" if view.beyond else ""
+    words = f"Colours: {title} from 0 to {high:.3g} m{beyond}"
+    return Drawing("".join(parts), (280.0, 46.0), words, "colour-bar")
+
+
+def _text(x: float, y: float, words: str) -> str:
+    return f'<text x="{x:.2f}" y="{y:g}" text-anchor="middle" font-size="10.5">{words}</text>'
+
+
+def _unit(power: int) -> str:
+    return f"10{str(power).translate(RAISED)} m" if power else "m"
 
 
 def _ticks(high: float) -> list[float]:
@@ -184,10 +202,10 @@ def packed(body: Body, view: View) -> dict[str, str]:
     cut = 3 * len(triangles)
     return {
         "data-head": json.dumps(head),
-        "data-vertices": _text(np.round(vertices).astype("<u2")),
-        "data-triangles": _text(index[:cut].astype("<u4")),
-        "data-edges": _text(index[cut:].astype("<u4")),
-        "data-colours": _text(np.round(255 * colours).astype(np.uint8)),
+        "data-vertices": _packed(np.round(vertices).astype("<u2")),
+        "data-triangles": _packed(index[:cut].astype("<u4")),
+        "data-edges": _packed(index[cut:].astype("<u4")),
+        "data-colours": _packed(np.round(255 * colours).astype(np.uint8)),
     }
 
 
@@ -202,5 +220,5 @@ def _cut_faces(body: Body) -> NDArray[np.bool_]:
     return found
 
 
-def _text(numbers: NDArray[Any]) -> str:
+def _packed(numbers: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(numbers).tobytes()).decode("ascii")

@@ -38,13 +38,15 @@ _METRICS = {
 }
 _ERRORS = set(_METRICS) - {"strain_energy"}
 # not drawn and not in tables unless the case judges them; they are in the exported files
-SECONDARY = _ERRORS - {"displacement_l2", "energy_norm", "jump_l2"}
+NORMS = ("displacement_l2", "energy_norm", "jump_l2")
+SECONDARY = _ERRORS - set(NORMS)
 _SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
 ROUND_OFF = 1e-11  # relative errors below are round-off, as the rates of a result have it
 _MISSING = "–"
 # Control characters (not allowed in XML, invisible in HTML), and marks that turn the
 # direction of the text around them
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
+_FLOAT = re.compile(r"(?<![\w.=])(\d+(?:\.\d+)?)e[+-]?\d+\b")
 RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
@@ -92,7 +94,9 @@ def number(value: Any, digits: int = 4) -> str:
     if not math.isfinite(value):
         return "not finite"
     mantissa, power = _decimal(value, digits)
-    return mantissa if power is None else f"{mantissa}×10{str(power).translate(RAISED)}"
+    if power is None:
+        return mantissa
+    return f"{'' if mantissa == '1' else f'{mantissa}×'}10{str(power).translate(RAISED)}"
 
 
 def signed(value: float, form: str = ".2f") -> str:
@@ -106,13 +110,30 @@ def number_text(value: float | None, digits: int = 3) -> str:
     return _MISSING if value is None else f"{value:.{digits}g}"
 
 
+def digits_beside(value: float, half: float, most: int = 4) -> int:
+    """Return how many significant digits of `value` its half-width leaves: to the second of it."""
+    if not (half > 0 and math.isfinite(half)) or value == 0 or not math.isfinite(value):
+        return most
+    apart = math.floor(math.log10(abs(value))) - math.floor(math.log10(half))
+    return min(max(apart + 2, 1), most)
+
+
+def scientific(text: str) -> str:
+    """Return `text` with its numbers like ``6.8e-14`` written as `number` writes them."""
+    return _FLOAT.sub(_rewritten, text)
+
+
+def _rewritten(found: re.Match[str]) -> str:
+    return number(float(found[0]), len(found[1].replace(".", "")))
+
+
 def with_interval(value: float | None, low: float | None, high: float | None) -> str:
     """Return an observed value and the interval in which the true one lies."""
     if value is None:
         return _MISSING
     if low is None or high is None or low == high or not all(map(math.isfinite, (low, high))):
         return number(value)
-    digits = 4
+    digits = digits_beside(value, (high - low) / 2.0)
     while digits < _MOST_DIGITS and _decimal(low, digits) == _decimal(high, digits):
         digits += 1
     if digits == _MOST_DIGITS:  # nobody compares more: the width says it
@@ -120,12 +141,12 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
 
 
-def error_text(value: float, uncertainty: float, digits: int = 4) -> str:
+def error_text(value: float, uncertainty: float) -> str:
     """Return an error ± its uncertainty; one that is not above it, as what it is below."""
     if uncertainty <= 0 or not math.isfinite(value):
-        return number(value, digits)
+        return number(value)
     if abs(value) > uncertainty or not math.isfinite(uncertainty):
-        return f"{number(value, digits)} ± {number(uncertainty, 2)}"
+        return f"{number(value, digits_beside(value, uncertainty))} ± {number(uncertainty, 2)}"
     most = abs(value) + uncertainty
     step = 10.0 ** (math.floor(math.log10(most)) - 1)
     return f"not resolved (< {number(math.ceil(most / step * (1 - 1e-9)) * step, 2)})"

@@ -170,9 +170,9 @@ def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
     rows = []
     for entry, case in zip(run.entries, cases, strict=True):
         marks = [Cell(case.title, case.name, link=case.anchor), Cell("", verdict=str(case.verdict))]
-        if case.warnings:
-            n = len(case.warnings)
-            marks[1] = Cell("", f"⚠ {n} warning{'s' * (n > 1)}", verdict=str(case.verdict))
+        n = len(case.warnings)
+        said = [f"⚠ {n} warning{'s' * (n > 1)}"] if n else []
+        marks[1] = Cell("", "; ".join(said), verdict=str(case.verdict))
         marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
         rows.append(marks)
     kind = "matrix many" if len(names) > MANY else "matrix"
@@ -186,10 +186,13 @@ def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
         bad = [v for v in own if str(v.verdict) == verdict]
         known = verdict == "FAIL" and all(v.known for v in bad)
         share = f"{len(bad)} of {len(own)}" if verdict != "PASS" and len(own) > 1 else ""
-        return Cell("", "known finding" if known else share, verdict=verdict)
+        said = "known finding" if known else share
+        unsure = max((v.reference_share or 0.0, v.badge) for v in own)[1]
+        return Cell("", "; ".join(filter(None, (said, unsure))), verdict=verdict)
     solves = entry.result.solves if entry.result else entry.unjudged
     ends = Counter(str(s.status) for s in solves if solver_title(s.solver) == name)
-    return Cell(", ".join(ends) if ends else "–")
+    words = ["compared, not judged" if name == str(Status.SOLVED) else name for name in ends]
+    return Cell(", ".join(words) if words else "–")
 
 
 def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[AnswerView]:

@@ -202,7 +202,8 @@ def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:
         every = [value for own in steps.values() for value in own if 0.0 < value <= most]
         if one["items"] < 2 or not every:
             continue
-        ends = log_range(every)
+        low, high = log_range(every)
+        ends = 1.0 if min(every) >= 1.0 else low, high  # of ratios to the best
         with panel(one["quantity"], 5.6, 3.0) as (figure, axes):
             for solver, own in steps.items():
                 label, shares = (

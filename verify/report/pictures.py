@@ -17,7 +17,7 @@ from verify.report.bodies import (
     Body,
     View,
     common_view,
-    deformed_body,
+    deformed_bodies,
     error_body,
     read_stored,
     zoomed,
@@ -32,9 +32,8 @@ from verify.solution import Solution
 _OF_BODIES, _OF_ERRORS = "cividis", "YlOrBr"  # colours
 _MOST = 4  # bodies side by side
 _MOST_MAPS = 8  # of errors of a case
-_FILMED = 3  # bodies whose output times are shown
 _FRAMES = 6  # of a film
-_FRAME_PIXELS = 110_000
+_FRAME_PIXELS = 160_000
 _STILL = 1e-200  # of the body's diagonal: displacements below are none
 _WILD = 1e3  # times the smallest displacement beside it: what moves farther is not drawn
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
@@ -75,9 +74,9 @@ class Picture:
 class CasePictures:
     """The pictures of a case and what has to be said about them.
 
-    `deformed` share view, colours and `scale` (displacements are drawn that much enlarged), as do
-    the frames of `film`: for each of some bodies its output times. `tip` are the errors around the
-    tip that `tip_at` names.
+    `deformed` share view, colours and `scale` (displacements are drawn that much enlarged). Bodies
+    that move have frames of a `film` instead, for each its output times. `tip` are the errors
+    around the tip that `tip_at` names.
     """
 
     deformed: list[Picture] = field(default_factory=list)
@@ -120,7 +119,6 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         pictures.notes.append("No pictures side by side: the solutions differ in dimension.")
     elif shown:
         _deformed(pictures, shown)
-        _film(pictures, shown)
     elif not pictures.notes:
         pictures.notes.append("No pictures: no solution is stored.")
     _add_error_maps(pictures, root, entry.result)
@@ -163,31 +161,32 @@ def _without_wild(
 
 
 def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
+    """Show the bodies at the end or, where they move, at the same output times."""
     everything = np.concatenate([solution.points for _, solution in shown])
     diagonal = float(np.linalg.norm(np.ptp(everything, axis=0)))
     largest = max(float(np.abs(solution.displacement[-1]).max()) for _, solution in shown)
     moves = largest > _STILL * diagonal
     pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if moves else 1.0
-    bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
+    times = shown[0][1].times
+    if len(times) > 1:
+        apart = [solve for solve, own in shown if not np.array_equal(own.times, times)]
+        pictures.notes += [f"Not shown in motion, at other times: {_named(s)}." for s in apart]
+        _film(pictures, [one for one in shown if one[0] not in apart])
+        return
+    bodies = [deformed_bodies(solution, pictures.scale)[0] for _, solution in shown]
     view = common_view(bodies, _OF_BODIES)
-    for (solve, solution), body in zip(shown, bodies, strict=True):
-        title = _named(solve)
-        when = "" if len(solution.times) == 1 else f" at t = {solution.times[-1]:.4g} s"
+    for (solve, _), body in zip(shown, bodies, strict=True):
         description = (
-            f"Deformed body, {title}{when}; displacements drawn {pictures.scale:g} times, "
+            f"Deformed body, {_named(solve)}; displacements drawn {pictures.scale:g} times, "
             f"largest displacement {number_text(float(body.values.max()))} m."
         )
-        pictures.deformed.append(Picture(title + when, description, body, view))
+        pictures.deformed.append(Picture(_named(solve), description, body, view))
 
 
 def _film(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
-    """Show some bodies at the same output times, from the first to the last."""
     times = shown[0][1].times
-    shown = [one for one in shown if np.array_equal(one[1].times, times)][:_FILMED]
-    if len(times) < 2:
-        return
     steps = np.unique(np.linspace(0, len(times) - 1, _FRAMES).round().astype(int))
-    bodies = [[deformed_body(own, pictures.scale, step) for step in steps] for _, own in shown]
+    bodies = [deformed_bodies(own, pictures.scale, steps.tolist()) for _, own in shown]
     every = [body for own in bodies for body in own]
     view = common_view(every, _OF_BODIES, pixels=_FRAME_PIXELS)
     for (solve, _), own in zip(shown, bodies, strict=True):
@@ -213,7 +212,7 @@ def _add_error_maps(pictures: CasePictures, root: Path, result: CaseResult) -> N
         pictures.notes.append("No picture of the error: no error field is stored for this case.")
         return
     largest = {solver: float(body.values.max()) for solver, body in bodies.items()}
-    moved = max((float(one.body.values.max()) for one in pictures.deformed), default=0.0)
+    moved = max((float(one.body.values.max()) for one in pictures.all), default=0.0)
     for solver in [name for name, most in largest.items() if most <= ROUND_OFF * moved]:
         most = number(largest[solver], 2)
         said = f"Error of {solver_title(solver)}: at most {most} m, which is round-off."

@@ -220,6 +220,7 @@ def _tick(value: float, as_power: bool) -> str:
 
 
 _TOTAL, _PART = "#4d4d4d", "#0067a5"
+_MARKED = 15  # places of a curve up to which each has its marker
 _DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
 
 
@@ -380,7 +381,9 @@ def profile_panel(
             axes.axvline(mark, color="#8f8f8f", linewidth=0.8, linestyle=(0, (4, 2)))
         for k, (name, curve) in enumerate(curves):
             style = _PARTS[k % len(_PARTS)] if palette is None else palette[name]
-            axes.plot(along, _gaps(curve), color=style.colour, linestyle=style.dashes, label=name)
+            few = style.marked if len(along) <= _MARKED and palette is not None else {}
+            axes.plot(along, _gaps(curve), label=name, linestyle=style.dashes,
+                      **{"color": style.colour, **few})  # fmt: skip
         legend(axes)
         ends = "; ".join(f"{name}: {curve[0]:.4g} to {curve[-1]:.4g}" for name, curve in curves)
         cuts = f" A cut opens at {', '.join(f'{m:.3g} s' for m in marks)}." if marks else ""

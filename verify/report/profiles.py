@@ -1,14 +1,23 @@
 """Curves of a case over time and along its cuts: errors, balances, opening profiles."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Figure, Table
 from verify.report.notation import error_text, metric_title, number, solver_title
 from verify.report.plots import Palette, profile_panel
-from verify.result import CaseResult, OpeningCurve, OpeningProfile, SolveRecord, Status, finest_of
+from verify.result import (
+    REFERENCE,
+    CaseResult,
+    OpeningCurve,
+    OpeningProfile,
+    SolveRecord,
+    Status,
+    finest_of,
+)
 
 BALANCE_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
@@ -29,8 +38,10 @@ _WORDS = {
     "projection": "energy lost where a state is projected",
 }
 Curve = tuple[str, list[float], list[float]]  # solver, times, values
+Band = tuple[list[float], list[float], list[float]]  # times, lower edge, upper edge
 
 _MOMENTA = (("linear_momentum", "N s"), ("angular_momentum", "N m s"))
+_OF_MOMENTA = ("linear_momentum_drift", "angular_momentum_drift")
 
 
 @dataclass(frozen=True)
@@ -54,8 +65,8 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
     cuts = _cuts(result.scene)
     unit = "J/m" if any("linear_momentum_z" not in s.account for s in moving) else "J"
     hidden = _hidden(moving)
-    panels = [panel for title, curves in _over_time(moving, hidden, unit)
-              for panel in _panels(title, curves, cuts, palette)]  # fmt: skip
+    panels = [panel for title, curves, band in _over_time(result, moving, hidden, unit)
+              for panel in _panels(title, curves, band, cuts, palette)]  # fmt: skip
     if not panels:
         return None
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
@@ -83,33 +94,62 @@ def _hidden(solves: Sequence[SolveRecord]) -> dict[str, list[str]]:
 
 
 def _over_time(
-    solves: Sequence[SolveRecord], hidden: dict[str, list[str]], unit: str
-) -> Iterator[tuple[str, list[Curve]]]:
-    """Yield the title of each panel and its curves: errors, energies, their total, momenta."""
+    result: CaseResult, solves: Sequence[SolveRecord], hidden: dict[str, list[str]], unit: str
+) -> Iterator[tuple[str, list[Curve], Band | None]]:
+    """Yield title, curves and band of each panel: errors, energies, their total, momenta."""
     for name, below in hidden.items():
-        yield metric_title(name), [(s.solver, s.series["time"], s.series[name]) for s in solves
-                                   if name in s.series and s.solver not in below]  # fmt: skip
+        shown = [s for s in solves if name in s.series and s.solver not in below]
+        halves = [m.uncertainty for s in shown if (m := s.metric(f"{name}_max")) is not None]
+        times = shown[0].series["time"] if shown else []
+        band = (times, [0.0] * len(times), [max(halves)] * len(times)) if halves else None
+        yield (
+            metric_title(name),
+            [(s.solver, s.series["time"], s.series[name]) for s in shown],
+            band,
+        )
+    levels = [s for s in result.solves if s.solver == REFERENCE and s.status is Status.SOLVED]
+    levels = sorted(levels, key=lambda s: s.level)[-2:]
+
+    def panel(title: str, of: Callable[[SolveRecord], list[float]]) -> Any:
+        curves = [(s.solver, s.account["time"], own) for s in solves if (own := of(s))]
+        return title, curves, _between([(s.account["time"], of(s)) for s in levels if of(s)])
+
     parts = [name for name in _WORDS if any(any(s.account.get(name, [])) for s in solves)]
     for name in parts[:_SHOWN]:
-        yield f"{_WORDS[name]}, {unit}", [(s.solver, s.account["time"], s.account[name])
-                                          for s in solves if name in s.account]  # fmt: skip
-    totals = [(s, s.account["total"]) for s in solves if "total" in s.account]
-    yield (
-        f"change of the total energy, {unit}",
-        [(s.solver, s.account["time"], [v - total[0] for v in total]) for s, total in totals],
-    )
-    yield from _blade_forces(solves, unit.replace("J", "N"))
+        yield panel(f"{_WORDS[name]}, {unit}", partial(_part, name))
+    yield panel(f"change of the total energy, {unit}", _change)
+    for title, name in _blade_forces(solves):
+        yield panel(f"{title}, {unit.replace('J', 'N')}", partial(_part, name))
     for name, unit_ in _MOMENTA:
-        curves = []
-        for s in solves:
-            if rows := [row for key, row in s.account.items() if key.startswith(name)]:
-                size = [math.hypot(*at) for at in zip(*rows, strict=True)]
-                curves.append((s.solver, s.account["time"], size))
-        yield f"magnitude of the {name.replace('_', ' ')}, {unit_}", curves
+        yield panel(f"magnitude of the {name.replace('_', ' ')}, {unit_}", partial(_size, name))
 
 
-def _blade_forces(solves: Sequence[SolveRecord], unit: str) -> Iterator[tuple[str, list[Curve]]]:
-    """Yield the forces on each blade: what drives it, and what is left of the toughness."""
+def _part(name: str, solve: SolveRecord) -> list[float]:
+    return list(solve.account.get(name, []))
+
+
+def _change(solve: SolveRecord) -> list[float]:
+    total = solve.account.get("total", [])
+    return [value - total[0] for value in total]
+
+
+def _size(name: str, solve: SolveRecord) -> list[float]:
+    rows = [row for key, row in solve.account.items() if key.startswith(name)]
+    return [math.hypot(*at) for at in zip(*rows, strict=True)]
+
+
+def _between(levels: Sequence[tuple[list[float], list[float]]]) -> Band | None:
+    """Return the last level ± its difference from the one before, at the same times."""
+    if len(levels) < 2 or levels[0][0] != levels[1][0]:
+        return None
+    (_, coarse), (times, fine) = levels
+    halves = [abs(a - b) for a, b in zip(coarse, fine, strict=True)]
+    low, high = ([v + s * w for v, w in zip(fine, halves, strict=True)] for s in (-1, 1))
+    return times, low, high
+
+
+def _blade_forces(solves: Sequence[SolveRecord]) -> Iterator[tuple[str, str]]:
+    """Yield title and name of the forces on each blade: what drives it, what is left of the toughness."""
     names = dict.fromkeys(name for s in solves for name in s.account)
     for prefix, words in (
         ("driving_force_", "driving force of the blade"),
@@ -117,13 +157,11 @@ def _blade_forces(solves: Sequence[SolveRecord], unit: str) -> Iterator[tuple[st
     ):
         for name in names:
             if name.startswith(prefix):
-                title = f"{words} of {name.removeprefix(prefix)}, over two outputs, {unit}"
-                yield title, [(s.solver, s.account["time"], s.account[name])
-                              for s in solves if name in s.account]  # fmt: skip
+                yield f"{words} of {name.removeprefix(prefix)}, over two outputs", name
 
 
 def _panels(
-    title: str, curves: Sequence[Curve], cuts: list[float], palette: Palette
+    title: str, curves: Sequence[Curve], band: Band | None, cuts: list[float], palette: Palette
 ) -> Iterator[Drawing]:
     """Draw one curve per solver, those with common times together."""
     groups: dict[tuple[float, ...], list[tuple[str, list[float]]]] = {}
@@ -131,15 +169,20 @@ def _panels(
         groups.setdefault(tuple(time), []).append((solver_title(solver), values))
     for times, own in groups.items():
         inside = [cut for cut in cuts if times[0] < cut <= times[-1]]
-        yield profile_panel(title, times, own, palette, inside)
+        edges = band[1:] if band and tuple(band[0]) == times else None
+        yield profile_panel(title, times, own, palette, inside, band=edges)
 
 
 def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | None:
     """Return the drifts of energy and momenta, and what the case says about them."""
-    names = [n for n in BALANCE_METRICS if any(s.metric(n) for s in solves)]
+    judged = {(v.solver, v.metric): v for v in result.verdicts if v.metric in BALANCE_METRICS}
+    free = not (result.scene.get("loads") or result.scene.get("supports"))
+    asked = {metric for _, metric in judged}
+    # what loads and supports change is no drift
+    names = [n for n in BALANCE_METRICS if any(s.metric(n) for s in solves)
+             and (n in asked or free or n not in _OF_MOMENTA)]  # fmt: skip
     if not names:
         return None
-    judged = {(v.solver, v.metric): v for v in result.verdicts if v.metric in BALANCE_METRICS}
     rows = []
     for solve in solves:
         row: list[str | Cell] = [solver_title(solve.solver), str(solve.level)]
@@ -193,7 +236,6 @@ def _cell(solve: SolveRecord, name: str) -> Cell | None:
     return Cell(f"{round(100 * part.value / whole.value) + 0:d} %")
 
 
-_REFERENCE = "reference"
 _FAR = 20.0  # times the reference's largest jump, and longer than the cut: it would hide the others
 _NOTHING = 1e-12  # of the length of the line: jumps below are round-off
 
@@ -210,7 +252,7 @@ def _figures(profile: OpeningProfile, result: CaseResult, palette: Palette) -> I
     when = "" if profile.time is None else f", at {profile.time:.4g} s ({profile.why})"
     place = f"{profile.cut}{when}"
     length = profile.arc[-1] - profile.arc[0]
-    reference = next((c for c in curves if c.solver == _REFERENCE), None)
+    reference = next((c for c in curves if c.solver == REFERENCE), None)
     largest = max(map(_largest, curves))
     if largest <= _NOTHING * length:
         yield Figure([], f"{place}: the jump is zero along the whole cut, to round-off.")
@@ -254,7 +296,7 @@ def _panel(
 
 
 def _name(curve: OpeningCurve) -> str:
-    if curve.solver == _REFERENCE:
+    if curve.solver == REFERENCE:
         return "exact" if curve.level is None else "reference"
     return solver_title(curve.solver)
 

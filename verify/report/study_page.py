@@ -10,7 +10,7 @@ from verify.json_files import read_json
 from verify.printable import shown
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.forms import as_html, as_markdown, print_page
-from verify.report.notation import error_title, is_error, metric_title, number, solver_title
+from verify.report.notation import NORMS, error_title, is_error, metric_title, number, solver_title
 from verify.report.overview import origin_facts
 from verify.report.plots import Bar, Palette, Series, bars, loglog, profile_panel, scatter
 from verify.whole_files import write_whole
@@ -57,9 +57,6 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
     page = directory / f"{kind}.html"
     write_whole(page, as_html("study.j2", **view))
     return print_page(page) if form == "pdf" else page
-
-
-_NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 
 
 def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
@@ -148,7 +145,7 @@ def _scatters(trials: Sequence[Mapping[str, Any]]) -> list[tuple[int, Drawing | 
     for degree in sorted({t["degree"] for t in counted}):
         own = [t for t in counted if t["degree"] == degree]
         shown = [t for t in own if t["stated"] > 0.0 and t["true"] > 0.0]
-        marks = [(t["family"], t["true"], t["stated"], t["quantity"] in _NORMS) for t in shown]
+        marks = [(t["family"], t["true"], t["stated"], t["quantity"] in NORMS) for t in shown]
         missed = sum(not t["covered"] for t in shown)
         title = f"{f'P{degree}' if degree else 'series'}: stated uncertainty, relative"
         said = f"{title}, over the true error: {len(shown)} marks, {missed} not covered."

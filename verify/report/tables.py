@@ -1,6 +1,6 @@
 """The tables of a case: checks, orders, numbers, times, reference, regularisations, failures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
@@ -8,12 +8,16 @@ from verify.records import ReferenceRecord, Regularisation
 from verify.report.blocks import Cell, Table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (
+    NORMS,
+    ROUND_OFF,
     bytes_text,
+    digits_beside,
     error_text,
     error_title,
     is_error,
     metric_title,
     number,
+    scientific,
     seconds_text,
     solver_title,
     spread_text,
@@ -22,6 +26,7 @@ from verify.report.notation import (
 from verify.result import (
     CRITICAL_STEP,
     CUT,
+    REFERENCE,
     CaseResult,
     Metric,
     NoticeKind,
@@ -29,6 +34,7 @@ from verify.result import (
     Status,
     Verdict,
     VerdictRecord,
+    finest_of,
 )
 
 MANY = 4  # solvers beyond which they stand side by side
@@ -39,6 +45,7 @@ def case_tables(result: CaseResult) -> dict[str, Table | None]:
     """Return the tables of a case by their names in the template; None where there is no row."""
     return {
         "checks": _checks_table(result),
+        "errors": _errors_table(result),
         "reasons": _reasons_table(result),
         "numbers": _numbers_table(result),
         "times": _times_table(result),
@@ -56,26 +63,44 @@ def check_text(record: VerdictRecord, named: bool = True) -> str:
     )
 
 
-def check_row(record: VerdictRecord) -> list[Any]:
-    """Return the row of one check."""
-    observed = _observed(record)
-    if record.check == "value":  # as many digits as the limit has beside it
-        observed = number(record.observed, 10)
+def check_row(record: VerdictRecord, unit: str = "") -> list[Any]:
+    """Return the row of one check; a value is in `unit`."""
+    observed, limit = _observed(record), record.limit
+    if record.check == "value" and record.observed is not None:
+        unit = f" {unit}" if unit not in ("", "1") else ""
+        observed = number(record.observed, _digits_to_judge(record)) + unit
+        limit = limit.replace(" ±", f"{unit} ±", 1)
     known = f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
     return [
         check_text(record),
         observed,
-        record.limit,
-        Cell(record.badge, known, verdict=str(record.verdict)),
+        scientific(limit),
+        Cell(record.badge, scientific(known), verdict=str(record.verdict)),
     ]
+
+
+def _digits_to_judge(record: VerdictRecord) -> int:
+    """Return the digits of a value that tell whether it is the one that its limit asks for."""
+    try:
+        wanted, tolerance = (float(word) for word in record.limit.split()[:3:2])
+    except ValueError:
+        return 4
+    off = abs((record.observed or 0.0) - wanted)
+    return max(digits_beside(wanted, max(off, abs(wanted) * tolerance), 10), 4)
 
 
 def _observed(record: VerdictRecord) -> str:
     """Return an observed value with its interval; an error that may be 0, as what it is below."""
     value, low, high = record.observed, record.low, record.high
+    if record.check == "error" and record.verdict is Verdict.PASS and (value or 0.0) < ROUND_OFF:
+        return f"round-off ({number(value, 2)})" if value else number(value)
     if record.check in ("error", "ratio") and low == 0.0 and value is not None and high is not None:
         return error_text(value, high - value)
     return with_interval(value, low, high)
+
+
+def _units(result: CaseResult) -> dict[str, str]:
+    return {m.name: m.unit for solve in result.solves for m in solve.metrics}
 
 
 def _checks_table(result: CaseResult) -> Table | None:
@@ -83,18 +108,18 @@ def _checks_table(result: CaseResult) -> Table | None:
     if not result.verdicts:
         return None
     solvers = list(dict.fromkeys(record.solver for record in result.verdicts))
+    units = _units(result)
     if len(solvers) <= MANY:
         head = ["check", "observed [interval]", "limit", "verdict"]
-        rows = [check_row(record) for record in result.verdicts]
+        rows = [check_row(record, units.get(record.metric, "")) for record in result.verdicts]
         return Table("Verdicts", head, rows, "verdicts")
     checks: dict[tuple[str, str], dict[str | None, Cell]] = {}
     for record in result.verdicts:
-        observed = _observed(record)
+        _, observed, limit, cell = check_row(record, units.get(record.metric, ""))
         shown = number(record.observed, 2) if "[" in observed else observed
         badge = f"{record.badge}; " if record.badge else ""
-        cell = Cell(note=f"{badge}{shown}", tip=f"{observed}: {record.reason}",
-                    verdict=str(record.verdict))  # fmt: skip
-        checks.setdefault((check_text(record, named=False), record.limit), {})[record.solver] = cell
+        cell = Cell(note=f"{badge}{shown}", tip=f"{observed}: {cell.note}", verdict=cell.verdict)
+        checks.setdefault((check_text(record, named=False), limit), {})[record.solver] = cell
     across = [[Cell(what, limit), *(own.get(solver, "–") for solver in solvers)]
               for (what, limit), own in checks.items()]  # fmt: skip
     names = [solver_title(solver or "nobody") for solver in solvers]
@@ -104,9 +129,38 @@ def _checks_table(result: CaseResult) -> Table | None:
 def _reasons_table(result: CaseResult) -> Table | None:
     """Return, for many solvers, why checks did not pass."""
     few = len({record.solver for record in result.verdicts}) <= MANY
-    rows = [check_row(r) for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
+    bad = [r for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
+    rows = [check_row(r, _units(result).get(r.metric, "")) for r in bad]
     head = ["check", "observed [interval]", "limit", "verdict"]
     return Table("Not passed", head, rows, "verdicts") if rows else None
+
+
+def _errors_table(result: CaseResult) -> Table | None:
+    """Return the errors of every solver on its finest level, side by side."""
+    solved = (s for s in result.solves if s.status is Status.SOLVED and s.solver != REFERENCE)
+    solves = list(finest_of(solved).values())
+    head = [
+        Cell(solver_title(s.solver), f"level {s.level}, h {number(s.size, 3)} m, "
+             f"{number(s.unknowns)} unknowns") for s in solves
+    ]  # fmt: skip
+    names = [n for n in metric_names(result) if n in NORMS or not is_error(n)]
+    rows = [[error_title(n), *(_error_of(s.metric(n)) for s in solves)] for n in names]
+    rows = [[cell or "–" for cell in row] for row in rows if any(row[1:])]
+    caption = "Errors on the finest level ± uncertainty"
+    return Table(caption, ["error", *head], rows, "errors", named=True) if rows else None
+
+
+def _error_of(metric: Metric | None) -> str:
+    """Return an error, or the relative error of a quantity that has a reference; else nothing."""
+    if metric is None or not (is_error(metric.name) or metric.reference):
+        return ""
+    value, half = metric.value, metric.uncertainty
+    if metric.reference:
+        value, low, high = metric.relative_distance()
+        half = max(value - low, high - value)
+    if value + half < ROUND_OFF:
+        return f"round-off ({number(value, 2)})" if value else number(value)
+    return error_text(value, half)
 
 
 def _numbers_table(result: CaseResult) -> Table | None:
@@ -115,7 +169,7 @@ def _numbers_table(result: CaseResult) -> Table | None:
     if not result.solves:
         return None
     titles = [Cell(metric_title(name), _common_reference(result, name)) for name in names]
-    head = ["solver", "level", "h (m)", "unknowns", *titles]
+    head = ["solver", "level", "h, m", "unknowns", *titles]
     rows: list[list[Any]] = [
         [*_named(solve), solve.size, solve.unknowns, *(_measured(solve, n, result) for n in names)]
         for solve in _ordered(result)
@@ -125,7 +179,7 @@ def _numbers_table(result: CaseResult) -> Table | None:
             whose = solver_title(notice.solver) if notice.solver else "every solver"
             said = f"{metric_title(notice.about)} is not available: {notice.text}"
             rows.append([whose, Cell("", said, span=len(head) - 1)])
-    return Table("Numbers: value ± uncertainty", head, rows)
+    return Table("Numbers: value ± uncertainty", head, rows, "numbers")
 
 
 def _times_table(result: CaseResult) -> Table | None:
@@ -213,75 +267,88 @@ def _in_elements(length: float, solve: SolveRecord) -> str:
 
 def reference_facts(reference: ReferenceRecord) -> list[tuple[str, str]]:
     """Return name and value of what the record of a reference says in single values."""
-    return [(_words(k), _value(v)) for k, v in _said(reference).items() if not isinstance(v, dict)]
+    near, overlap = reference.near or {}, reference.overlap or {}
+    suffices = {True: "yes", False: "no"}.get(bool(reference.suffices))
+    said = [
+        ("reference", reference.source or reference.kind),
+        ("why there is none", reference.reason),
+        ("suffices", f"{suffices}: {why}" if (why := reference.suffices_reason) else ""),
+        ("near a tip", f"within {number(near['radius'], 2)} m: {near.get('reason')}"
+         if near.get("radius") else ""),
+        ("material of the exact solution lies in other material",
+         f"by {number(overlap['depth'], 2)} m" if overlap.get("depth") else ""),
+        *((metric_title(name), why) for name, why in (reference.missing or {}).items()),
+    ]  # fmt: skip
+    return [(name, scientific(str(words))) for name, words in said if words]
 
 
-def reference_tables(reference: ReferenceRecord) -> list[Table]:
-    """Return the nested parts of the record of a reference as tables."""
+def reference_tables(reference: ReferenceRecord, units: Mapping[str, str]) -> list[Table]:
+    """Return the levels of a reference, what it knows of each metric, and the errors it judges."""
     return [
-        _levels_table(record) if key == "time_to_accuracy" else _nested(key, record)
-        for key, record in _said(reference).items()
-        if isinstance(record, dict)
+        table
+        for table in (
+            _levels_table(reference),
+            _known_table(reference.metrics or {}, units),
+            _judged_table(reference.judged_errors or {}),
+        )
+        if table.rows
     ]
 
 
-def _said(reference: ReferenceRecord) -> dict[str, Any]:
-    return {key: value for key, value in reference.said().items() if value not in ([], {}, "")}
-
-
-def _levels_table(levels: dict[str, dict[str, Any]]) -> Table:
+def _levels_table(reference: ReferenceRecord) -> Table:
     """Return what each level of a reference cost and bounds of its errors, levels side by side."""
-    costs = {"unknowns": number, "seconds": seconds_text}
-    names = dict.fromkeys(name for entry in levels.values() for name in entry)
-    rows = [
-        ["wall time" if name == "seconds" else name]
-        + [costs[name](entry.get(name)) for entry in levels.values()]
-        for name in names
-        if name in costs
-    ]
-    rows += [
-        [error_title(name), *(number(entry.get(name), 2) for entry in levels.values())]
-        for name in names
-        if name not in costs
-    ]
-    caption = "Reference: time to accuracy; of errors, bounds that the finest level gives"
-    return Table(caption, ["", *map(_words, levels)], rows)
+    levels = reference.time_to_accuracy or {}
+    rows: list[list[Any]] = []
+    sizes = [one.get("size") for one in reference.levels or []]
+    if levels and len(sizes) == len(levels):
+        rows.append(["h, m", *(number(size, 3) for size in sizes)])
+    for name in dict.fromkeys(name for entry in levels.values() for name in entry):
+        found = [entry.get(name) for entry in levels.values()]
+        if name in _COSTS:
+            rows.append([_COSTS[name][0], *map(_COSTS[name][1], found)])
+        elif name in NORMS or not is_error(name):
+            rows.append([error_title(name), *(number(value, 2) for value in found)])
+    caption = "Reference: levels, and bounds of their errors that the finest gives"
+    return Table(caption, ["", *(name.replace("_", " ") for name in levels)], rows)
 
 
-def _nested(key: str, record: dict[str, Any]) -> Table:
-    """Return a table with one row per entry, if the entries are records; else name and value."""
-    caption = f"Reference: {_words(key)}"
-    if all(isinstance(entry, dict) for entry in record.values()):
-        columns = list(dict.fromkeys(name for entry in record.values() for name in entry))
-        rows = [
-            [metric_title(name), *(_value(entry.get(column)) for column in columns)]
-            for name, entry in record.items()
-        ]
-        return Table(caption, ["", *map(_words, columns)], rows, "prose")
-    rows = [[_words(name), _value(value)] for name, value in record.items()]
-    return Table(caption, ["", "value"], rows)
+_COSTS: dict[str, tuple[str, Any]] = {
+    "unknowns": ("unknowns", number),
+    "seconds": ("wall time", seconds_text),
+}
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        return ", ".join(map(_value, value)) if value else "–"
-    if isinstance(value, dict):
-        return ", ".join(f"{_words(name)} {_value(entry)}" for name, entry in value.items())
-    if isinstance(value, float):
-        return number(value, _digits(value))
-    return number(value) if value is None or isinstance(value, int) else str(value)
+def _known_table(metrics: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> Table:
+    """Return the value of each quantity, and the uncertainty that an error has from it."""
+    rows = []
+    for name, own in metrics.items():
+        half, value = own.get("uncertainty"), own.get("extrapolated")
+        value = (own.get("values") or [None])[-1] if value is None else value
+        unit = "" if is_error(name) or units.get(name, "1") == "1" else f" {units[name]}"
+        digits = 4
+        if isinstance(half, float) and isinstance(value, float):
+            digits = digits_beside(value, half, 8)
+        rows.append([
+            metric_title(name),
+            "–" if is_error(name) else f"{number(value, digits)}{unit}",
+            "–" if half is None else f"{number(half, 2)}{unit}" if half else "none",
+            number(own.get("disagreement"), 2),
+            scientific(str(own.get("reason") or "–")),
+        ])  # fmt: skip
+    head = ["", "value", "uncertainty", "second estimate, off by uncertainties", "by"]
+    return Table("Reference: what it knows", head, rows, "prose")
 
 
-def _digits(value: float, most: int = 7) -> int:
-    """Return how many significant digits `value` needs, up to `most`."""
-    whole = float(f"{value:.{most}g}")
-    return next((n for n in range(2, most) if float(f"{value:.{n}g}") == whole), most)
-
-
-def _words(key: str) -> str:
-    return key.replace("_", " ")
+def _judged_table(errors: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Return the errors that a reference judges, those first of which it knows least."""
+    rows = []
+    for name, own in errors.items():
+        metric, _, whose = name.partition(" of ")
+        if own.get("ratio") is not None:
+            cells = (number(own.get(key), 2) for key in ("error", "uncertainty", "ratio"))
+            rows.append([f"{solver_title(whose)}: {metric_title(metric)}", *cells])
+    head = ["error judged", "size", "uncertainty", "ratio"]
+    return Table("Reference: its uncertainty over the errors that it judges", head, rows)
 
 
 def _ordered(result: CaseResult) -> list[SolveRecord]:
@@ -309,8 +376,8 @@ def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Cell:
         return Cell("–" if solve.status is Status.SOLVED else str(solve.status))
     unit = "" if metric.unit == "1" else f" {metric.unit}"
     if is_error(name):
-        return Cell(f"{error_text(metric.value, metric.uncertainty, 5)}{unit}")
-    value = number(metric.value, 5 if metric.reference is None else 8)
+        return Cell(f"{error_text(metric.value, metric.uncertainty)}{unit}")
+    value = number(metric.value, digits_beside(metric.value, metric.uncertainty, 8))
     plus = f" ± {number(metric.uncertainty, 2)}" if metric.uncertainty > 0 else ""
     own = ""
     if metric.reference is not None and len(_references(result, name)) > 1:
