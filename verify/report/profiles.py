@@ -149,7 +149,7 @@ def _between(levels: Sequence[tuple[list[float], list[float]]]) -> Band | None:
 
 
 def _blade_forces(solves: Sequence[SolveRecord]) -> Iterator[tuple[str, str]]:
-    """Yield title and name of the forces on each blade: what drives it, what is left of the toughness."""
+    """Yield title and name of the forces on each blade: driving it, and left of the toughness."""
     names = dict.fromkeys(name for s in solves for name in s.account)
     for prefix, words in (
         ("driving_force_", "driving force of the blade"),
