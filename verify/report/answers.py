@@ -122,10 +122,8 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
     least = min(x for c in curves for x, _ in c.places)
     families = len({c.family for c in curves})
     where = f"{families} famil{'y' if families == 1 else 'ies'}"
-    said = (
-        f"As slivers shrink to ε = {number(least, 1)} of an element ({where}), beside the largest ε"
-    )
-    return Answer("Slivers", f"{said}: {'; '.join(parts)}.")
+    beside = f"As slivers shrink to ε = {number(least, 1)} of an element ({where})"
+    return Answer("Slivers", f"{beside}, beside the largest ε: {'; '.join(parts)}.")
 
 
 def cost(results: Sequence[CaseResult]) -> Answer:
