@@ -17,7 +17,7 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.processes import die_with_parent
 from verify.result import Status
-from verify.runner.child import POLL_SECONDS, Child, telling_line
+from verify.runner.child import Child, telling_line, watch
 from verify.runner.solve import solve_job
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
@@ -116,18 +116,14 @@ def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: P
 
 def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Status]:
     """Wait for the end of a batch, and explain it as if it had been a death."""
-    ready, done, began = child.log.with_suffix(".ready"), -1, False
-    try:
-        while (ending := child.poll()) is None:
-            if not began and ready.exists():
-                began = True
-            count = sum((folder / "outcome.json").is_file() for folder in folders) if began else -1
-            if count > done:
-                done, child.timeout = count, time.monotonic() - child.start + timeout
-            time.sleep(POLL_SECONDS)
-    except BaseException:
-        child.kill()
-        raise
+    ready, done = child.log.with_suffix(".ready"), -1
+
+    def look() -> None:
+        nonlocal done
+        if ready.exists() and (count := _answered(folders)) > done:
+            done, child.timeout = count, time.monotonic() - child.start + timeout
+
+    ending = watch(child, look)
     if (refused := child.log.with_suffix(".refused")).exists():
         raise InputError(read_json(refused)["error"])
     if not ready.exists():
@@ -137,6 +133,10 @@ def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Stat
     code = ending.returncode
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
     return f"{telling_line(child.log)} ({how})", Status.FAILED
+
+
+def _answered(folders: list[Path]) -> int:
+    return sum((folder / "outcome.json").is_file() for folder in folders)
 
 
 def _outcome(folder: Path) -> Outcome:

@@ -8,7 +8,6 @@ of their own, and the comparison of the runner judges all of them together.
 import re
 from dataclasses import replace
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 from verify.errors import InputError
@@ -18,7 +17,7 @@ from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases
 from verify.runner.checking import check_scene
-from verify.runner.child import POLL_SECONDS
+from verify.runner.child import watch
 from verify.runner.comparing import Comparison
 from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.fingerprint import digest_of, file_digest
@@ -192,10 +191,4 @@ def _assess(
     comparison = Comparison(
         scene, key, (), solves, {}, folder, directory.root, origin, options.timeout, memory
     )
-    try:
-        while (result := comparison.poll()) is None:
-            sleep(POLL_SECONDS)
-    except BaseException:
-        comparison.kill()
-        raise
-    return result
+    return watch(comparison)

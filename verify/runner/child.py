@@ -21,12 +21,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import ModuleType
+from typing import Protocol
 from uuid import uuid4
 
 import numpy as np
@@ -159,6 +160,60 @@ class Child:
                     process.kill()
             if found <= self._root:
                 return
+
+
+class Watched[Found](Protocol):
+    """What is under way: a process, or something that waits for one."""
+
+    def poll(self) -> Found | None:
+        """Look once; return how it ended, or what it found."""
+        ...
+
+    def kill(self) -> None:
+        """End it."""
+        ...
+
+
+def watch_all[Found](
+    starts: Sequence[Callable[[], Watched[Found]]],
+    ended: Callable[[int, Found], None],
+    jobs: int = 1,
+    look: Callable[[], None] = lambda: None,
+) -> None:
+    """Start what waits, some at the same time, and look until all has ended.
+
+    Parameters
+    ----------
+    starts : sequence of callable
+    ended : callable
+        Told the place in `starts` and what was found of each.
+    jobs : int
+    look : callable
+        Called again and again. What it raises ends all that is under way, as a signal does.
+    """
+    running, waiting = dict[int, Watched[Found]](), list(enumerate(starts))
+    try:
+        while waiting or running:
+            look()
+            while waiting and len(running) < jobs:
+                number, start = waiting.pop(0)
+                running[number] = start()
+            for number, one in list(running.items()):
+                if (found := one.poll()) is not None:
+                    del running[number]
+                    ended(number, found)
+            if running:
+                time.sleep(POLL_SECONDS)
+    finally:
+        for one in running.values():
+            one.kill()
+
+
+def watch[Found](one: Watched[Found], look: Callable[[], None] = lambda: None) -> Found:
+    """Look at one until it has ended; return what was found."""
+    found: list[Found] = []
+    watch_all([lambda: one], lambda _, ending: found.append(ending), look=look)
+    return found[0]
 
 
 def _fresh(run: list[str], log: Path, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:

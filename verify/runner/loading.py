@@ -11,14 +11,14 @@ import tempfile
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.processes import die_with_parent
-from verify.runner.child import POLL_SECONDS, Child, telling_line
+from verify.runner.child import Child, Ending, telling_line, watch_all
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.selection import Options
 from verify.solvers.interface import is_built_in, module_of, parameters_of, solver_in
@@ -58,37 +58,34 @@ def load_solvers(
     waiting = [
         name for name in names if name in options.solvers or given[name] or not is_built_in(name)
     ]
-    found = dict.fromkeys(names, Loaded())
-    running: dict[str, Child] = {}
+    groups: dict[str, list[str]] = {}
+    for name in waiting:
+        groups.setdefault(solver_in(name), []).append(name)
+    found, order = dict.fromkeys(names, Loaded()), list(groups)
     with tempfile.TemporaryDirectory(prefix="verify-") as folder:
-        try:
-            while waiting or running:
-                check()
-                while waiting and len(running) < options.jobs:
-                    name = waiting.pop(0)
-                    place = Path(folder, str(len(waiting)))
-                    place.mkdir()
-                    running[name] = _started(name, given[name], place, options)
-                for name, child in list(running.items()):
-                    if child.poll() is not None:
-                        del running[name]
-                        found[name] = _answer(name, child.log, options)
-                sleep(POLL_SECONDS)
-        finally:
-            for child in running.values():
-                child.kill()
+        places = [Path(folder, str(number)) for number in range(len(order))]
+
+        def start(solver: str, place: Path) -> Child:
+            return _started(solver, {name: given[name] for name in groups[solver]}, place, options)
+
+        def ended(number: int, _ending: Ending) -> None:
+            for name in groups[order[number]]:
+                found[name] = _answer(name, places[number] / "log.txt", options)
+
+        starts = [partial(start, *one) for one in zip(order, places, strict=True)]
+        watch_all(starts, ended, options.jobs, check)
     return found
 
 
-def _started(name: str, parameters: Mapping[str, Any], place: Path, options: Options) -> Child:
+def _started(solver: str, parameters: Mapping[str, Any], place: Path, options: Options) -> Child:
+    place.mkdir()
     question = place / "question.json"
-    write_json({"solver": name, "parameters": dict(parameters)}, question)
+    write_json({"solver": solver, "parameters": parameters}, question)
     least, most = _SECONDS
     limit = min(most, max(least, options.timeout))
     memory = options.memory or 0.8 * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return Child(
-        "verify.runner.loading", question, place / "log.txt", limit, memory, own=is_built_in(name)
-    )
+    own = is_built_in(solver)
+    return Child("verify.runner.loading", question, place / "log.txt", limit, memory, own=own)
 
 
 def _answer(name: str, log: Path, options: Options) -> Loaded:
@@ -96,7 +93,7 @@ def _answer(name: str, log: Path, options: Options) -> Loaded:
         answer = read_json(log.with_name("answer.json"))
     except InputError:
         answer = {"error": f"could not be loaded: {telling_line(log)}"}
-    if bad := answer.get("bad_parameter"):
+    if bad := answer.pop("bad_parameters", {}).get(name):
         raise InputError(bad, "--solver" if " " in name else "--set")
     if "error" in answer and name in options.solvers:
         raise InputError(answer["error"], "--solver")
@@ -111,20 +108,24 @@ def main(question: Path) -> None:
     write_json(_loaded(asked["solver"], asked["parameters"]), question.with_name("answer.json"))
 
 
-def _loaded(name: str, parameters: Mapping[str, Any]) -> dict[str, str]:
+def _loaded(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Load a solver; check its parameters, by the names under which it is asked for."""
     from verify.solvers import check_parameters, find_solver
 
     if ":" in name:
         sys.path.append(os.getcwd())
     try:
-        solver = find_solver(solver_in(name))
+        solver = find_solver(name)
     except InputError as error:
         return {"error": str(error)}
-    try:
-        check_parameters(solver_in(name), solver, parameters)
-    except InputError as error:
-        return {"bad_parameter": str(error)}
-    return {"source": "" if module_of(name) else source_of(solver)}  # ours is known by its code
+    bad = {}
+    for asked, given in parameters.items():
+        try:
+            check_parameters(name, solver, given)
+        except InputError as error:
+            bad[asked] = str(error)
+    # ours is known by its code
+    return {"source": "" if module_of(name) else source_of(solver), "bad_parameters": bad}
 
 
 def source_of(solver: Any) -> str:

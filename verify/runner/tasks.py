@@ -11,10 +11,10 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from shutil import rmtree
-from time import sleep
 from typing import Any, get_type_hints
 
 from verify.errors import InputError
@@ -22,7 +22,7 @@ from verify.json_files import read_json, write_json
 from verify.printable import words_of
 from verify.processes import die_with_parent, start_server
 from verify.result_files import checked
-from verify.runner.child import POLL_SECONDS, Child, Ending, death
+from verify.runner.child import Child, Ending, death, watch_all
 from verify.runner.directory import emptied, folder_name
 from verify.runner.fingerprint import code_digest, code_of_solver, digest_of
 from verify.runner.loading import source_of
@@ -111,28 +111,20 @@ def made(
     limits : Limits, optional
     """
     limits, found = limits or Limits(), dict[int, Any]()
-    running: dict[int, tuple[Child, Path]] = {}
-    waiting = list(enumerate(tasks))
+    places = [folder / _folder_name(task) for task in tasks]
+    for number, (task, place) in enumerate(zip(tasks, places, strict=True)):
+        if (place / _FOUND).exists() and (known := _kept(task, place)) is not None:
+            found[number] = known
+    waiting = [number for number in range(len(tasks)) if number not in found]
+
+    def ended(place: int, ending: Ending) -> None:
+        number = waiting[place]
+        found[number] = _ended(tasks[number], places[number], ending, limits)
+        announce(f"{tasks[number].name}: {len(found)} of {len(tasks)} parts")
+
     start_server()
-    try:
-        while waiting or running:
-            while waiting and len(running) < limits.jobs:
-                number, task = waiting.pop(0)
-                place = folder / _folder_name(task)
-                if (place / _FOUND).exists() and (known := _kept(task, place)) is not None:
-                    found[number] = known
-                else:
-                    running[number] = _started(task, place, limits), place
-            for number, (child, place) in list(running.items()):
-                if (ending := child.poll()) is not None:
-                    del running[number]
-                    found[number] = _ended(tasks[number], place, ending, limits)
-                    announce(f"{tasks[number].name}: {len(found)} of {len(tasks)} parts")
-            if running:
-                sleep(POLL_SECONDS)
-    finally:
-        for child, _ in running.values():
-            child.kill()
+    starts = [partial(_started, tasks[number], places[number], limits) for number in waiting]
+    watch_all(starts, ended, limits.jobs)
     asked = {_folder_name(task) for task in tasks}
     for other in folder.glob("*/task.json"):
         if other.parent.name not in asked:
