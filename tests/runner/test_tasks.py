@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from verify.runner import tasks
+from verify.runner.child import watch_all
 from verify.runner.tasks import Failure, Limits, Task, all_made, made
 
 
@@ -76,6 +77,8 @@ def test_every_call_is_answered_in_order_and_made_once(tmp_path, guest, monkeypa
     again = made(products(log, (5, 2, 7)), tmp_path / "kept", limits=Limits(2))
     assert [one[0].value for one in again] == [15.0, 6.0, 21.0]
     assert sorted(asked(log)) == [0, 2, 5, 7]
+    kept = {path.name.split("-")[0] for path in (tmp_path / "kept").iterdir()}
+    assert len(kept) == 3  # what is no longer asked is gone
     monkeypatch.setattr(tasks, "code_digest", lambda *modules: "other code")
     made(products(log, (2,)), tmp_path / "kept")
     assert sorted(asked(log)) == [0, 2, 2, 5, 7]
@@ -105,6 +108,7 @@ from pathlib import Path
 import sys
 import test_tasks as t
 from verify.runner import tasks
+from verify.runner.child import watch_all
 tasks.code_digest = lambda *modules: "this code"
 tasks.code_of_solver = tasks.find_solver = lambda name: name
 folder = Path(sys.argv[1])
@@ -128,3 +132,37 @@ def test_what_was_killed_goes_on_with_what_is_missing(tmp_path, guest):
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     assert eval(again.stdout) == [0.1, 0.2, 0.1 * 3, 0.4]
     assert asked(log) == [1, 2, 3, 3, 4]
+
+
+class Waiting:
+    """Something under way that ends when it is looked at for the `count`th time."""
+
+    def __init__(self, count):
+        self.left, self.killed = count, False
+
+    def poll(self):
+        self.left -= 1
+        return None if self.left else "done"
+
+    def kill(self):
+        self.killed = True
+
+
+@pytest.mark.parametrize("stops", ["look", "ended"])
+def test_what_is_under_way_is_ended_when_the_watch_is_broken_off(stops):
+    every, looks = [Waiting(1), Waiting(9), Waiting(9)], []
+
+    def look():
+        looks.append(1)
+        if stops == "look" and len(looks) == 2:
+            raise KeyboardInterrupt
+
+    def ended(number, found):
+        assert (number, found) == (0, "done")
+        if stops == "ended":
+            raise OSError
+
+    with pytest.raises((KeyboardInterrupt, OSError)):
+        watch_all([lambda one=one: one for one in every], ended, 2, look)
+    assert [one.killed for one in every] == [False, True, False]
+    assert every[2].left == 9  # it had not begun
