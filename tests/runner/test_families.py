@@ -13,8 +13,8 @@ from verify.report.plots import Palette
 from verify.report.run_directory import load_run
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner import selection
-from verify.runner.families import Families
 from verify.runner.selection import select_cases
+from verify.runner.work import Families
 from verify.scene import load_scene, load_scenes, loading
 from verify.solvers import interface
 from verify.study.measured_scenes import variant_of

@@ -7,7 +7,7 @@ from case_texts import body_text, support_text, weight_text
 
 from verify.json_files import read_json
 from verify.result import Status
-from verify.runner.job import Job
+from verify.runner.directory import Job
 from verify.runner.plan import CasePlan
 from verify.scene import load_scene
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from verify.runner.job import Job
+from verify.runner.directory import Job
 from verify.runner.plan import CasePlan, begun_after
 from verify.runner.selection import Options
 from verify.scene import load_scene

@@ -11,8 +11,7 @@ import pytest
 from verify.errors import InputError
 from verify.result import Status
 from verify.runner import references
-from verify.runner.directory import RunDirectory
-from verify.runner.job import Job
+from verify.runner.directory import Job, RunDirectory
 from verify.runner.plan import plan_case
 from verify.runner.references import ReferenceBundle, ReferenceCache, write_bundle
 from verify.runner.selection import Options

@@ -19,9 +19,16 @@ from verify.runner import Options, Progress, run_cases
 from verify.runner.checking import check_scene
 from verify.runner.child import watch
 from verify.runner.comparing import Comparison
-from verify.runner.directory import RunDirectory, claimed, emptied, write_run
+from verify.runner.directory import (
+    Job,
+    RunDirectory,
+    claimed,
+    emptied,
+    solution_files,
+    store_record,
+    write_run,
+)
 from verify.runner.fingerprint import digest_of, file_digest
-from verify.runner.job import Job, solution_files, store_record
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, write_solution
 from verify.solvers import solver_names

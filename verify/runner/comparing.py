@@ -15,8 +15,7 @@ from verify.judge.checks import unjudged_result
 from verify.result import COMPARISON_FAILED, CaseResult
 from verify.result_files import read_result
 from verify.runner.child import Child, Ending, death
-from verify.runner.directory import JUDGING
-from verify.runner.job import load_record
+from verify.runner.directory import JUDGING, load_record
 from verify.scene import Scene
 
 LEAST_SECONDS = 60.0

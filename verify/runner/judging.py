@@ -34,8 +34,7 @@ from verify.result import (
     error_picture,
 )
 from verify.result_files import write_result
-from verify.runner.directory import JUDGING, folder_name
-from verify.runner.job import check_files, load_record
+from verify.runner.directory import JUDGING, check_files, folder_name, load_record
 from verify.runner.mesh_faults import mesh_notices
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution

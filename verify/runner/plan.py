@@ -12,9 +12,8 @@ from typing import Any
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.cost import case_cost
-from verify.runner.directory import RunDirectory
+from verify.runner.directory import Job, RunDirectory, stored_record
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
-from verify.runner.job import Job, stored_record
 from verify.runner.loading import Loaded
 from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
 from verify.runner.selection import Options

@@ -38,6 +38,7 @@ from verify.printable import one_line, shown, words_of
 from verify.provenance import provenance
 from verify.result import SolveRecord, Status
 from verify.result_files import checked
+from verify.runner.directory import Job, is_file_name, solution_files
 from verify.runner.fingerprint import (
     bytes_digest,
     code_of_solver,
@@ -45,7 +46,6 @@ from verify.runner.fingerprint import (
     file_digest,
     physics_digest,
 )
-from verify.runner.job import Job, is_file_name, solution_files
 from verify.scene import Scene
 from verify.whole_files import asked_place, whole_file, write_whole
 
