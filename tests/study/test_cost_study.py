@@ -1,6 +1,7 @@
 """Studies of cost: solvers of known cost, growing cuts; bars of the reference."""
 
 import math
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,13 @@ import pytest
 from scipy.stats import binom
 
 from reference.exact.moving_cracks import wave
+from verify.cli import main
+from verify.errors import RunStoppedError
 from verify.judge.cost import pareto_front, time_at, work_points
 from verify.records import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
+from verify.study import solving
 from verify.study.calibration.families import families, series_families
 from verify.study.calibration.motion_scenes import released, stretched
 from verify.study.calibration.study import Trial, binomial_tail, calibration_findings, trials
@@ -242,3 +246,18 @@ def test_bars_of_a_curved_cut_cover_what_its_facets_are_off():
     for name in ("displacement_l2", "energy_norm", "jump_l2"):
         (one,) = (t for t in found if t.quantity == name)
         assert one.true <= one.stated < 10 * one.true
+
+
+@pytest.mark.parametrize("words", [
+    ["cost", "statics/tissue_strip"], ["budget", "statics/tissue_strip"], ["thesis", "--quick"],
+    ["iterations", "dynamics/block_falls_apart", "--solver", "xfem", "--truth", "conforming",
+     "--names", "scheme", "mass"],
+])  # fmt: skip
+def test_ctrl_c_ends_a_study_in_one_line(words, tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise RunStoppedError(signal.SIGINT)
+
+    monkeypatch.setattr(solving, "run_cases", stopped)
+    assert main(["study", *words, "--out", str(tmp_path)]) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == "verify: error: interrupted by SIGINT; the same command resumes it"
