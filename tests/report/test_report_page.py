@@ -283,3 +283,12 @@ def test_a_case_without_solves_checks_or_levels_renders(root):
     text = said(root)
     assert "No check is stated for statics/f3_inclined" in text
     assert "No reference is recorded" in text
+
+
+def test_a_summary_leaves_the_pictures_of_the_markdown(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    text = render(root, "markdown").read_text(encoding="utf-8")
+    render(root, "summary")
+    named = re.findall(r"\]\((report-pictures/[^)]+)\)", text)
+    assert named
+    assert all((root / name).is_file() for name in named)

@@ -101,6 +101,9 @@ def _case_rows(
         yield _speed_row(name, key, speed, result, cpu)
 
 
+_MANY = 100.0  # of its value: beyond, a share says less than the change
+
+
 def changes_between(result: CaseResult, key: str, old: int, new: int) -> str:
     """Say what changed in the meaning of ``solver/level/metric`` of a case, or nothing."""
     place, _, metric = key.rpartition("/")
@@ -120,10 +123,10 @@ def own_row(case: str, key: str, quantity: Quantity, metric: Metric) -> Row:
     within = abs(change) <= allowed
     if within:
         text = ""
-    elif own.value:
+    elif abs(change) < _MANY * abs(own.value):
         text = f"changed by {change / abs(own.value):+.3g} (relative), allowed {own.tolerance:g}"
     else:
-        text = f"changed by {change:+.3g}, allowed {allowed:g}"
+        text = f"changed by {change:+.3g} from {own.value:.3g}, allowed {allowed:.3g}"
     verdict = Verdict.PASS if within else Verdict.FAIL
     return Row(case, key, "own", verdict, metric.value, own.value, text)
 

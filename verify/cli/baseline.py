@@ -142,6 +142,16 @@ def update(
     return code
 
 
+def _apart(*values: float | None) -> str:
+    """Write numbers with the digits that tell them apart, up to twelve."""
+    written: list[str] = []
+    for digits in (6, 9, 12):
+        written = ["–" if x is None else f"{x:.{digits}g}" for x in values]
+        if len(set(written)) > 1:
+            break
+    return " → ".join(written) if len(set(written)) > 1 else f"{written[0]}, unchanged"
+
+
 def diff(
     run: Annotated[Path, Arg("directory of a finished run", "OLD")],
     other: Annotated[Path, Arg("directory of a finished run", "NEW")],
@@ -168,9 +178,7 @@ def diff(
         print(line)
     for change in changes:
         verdicts = f"{change.old or '–'} → {change.new or '–'}"
-        numbers = " → ".join(
-            "–" if x is None else f"{x:.6g}" for x in (change.old_observed, change.new_observed)
-        )
+        numbers = _apart(change.old_observed, change.new_observed)
         print(f"{change.direction:<6} {change.case}: {change.check}: {verdicts} ({numbers})")
         print(f"       {change.reason}")
     counts = Counter(change.direction for change in changes)

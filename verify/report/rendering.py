@@ -127,7 +127,7 @@ def _summary(run: Run, directory: Path) -> Path:
     view = page_view(run, cases, palette, [], short=True)
     view["origin"] = [fact for fact in view["origin"] if fact[0] in _PUBLISHED]
     target = directory / "summary.md"
-    write_whole(target, as_markdown("report.j2", directory, **view))
+    write_whole(target, as_markdown("report.j2", directory, "summary-pictures", **view))
     write_whole(directory / "results.csv", csv_rows(run))
     return target
 
