@@ -302,3 +302,54 @@ def test_a_known_finding_fails_with_its_reason_and_passes_with_a_hint():
 def test_a_known_finding_that_names_no_check_of_the_case_is_refused(check, finding):
     with pytest.raises(ValueError, match=r"known_findings\[0\]: no check"):
         verdicts(check, [], known_findings=finding)
+
+
+def blades(solver, *levels, **more):
+    """Make solves of what forces at a cut took, by level; `more` metrics are of every level."""
+    names = {f"released_{name}": value for name, value in more.items()}
+    return [
+        SolveRecord("a test", solver, k, Status.SOLVED, metrics=[
+            Metric(name, value, "J/m²")
+            for name, value in ({"released_to_cut": taken} | names).items()
+        ])
+        for k, taken in enumerate(levels)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("records", "expected"),
+    [
+        (blades("xfem", 0.32, 0.34), Verdict.UNDECIDED),  # nobody knows what is released
+        ([*blades("xfem", 0.32, 0.34), *blades("reference", 0.3)], Verdict.UNDECIDED),
+        # the reference: 0.30 ± 0.02 at the cut, and 0.05 by its scheme
+        ([*blades("xfem", 0.32, 0.34), *blades("reference", 0.28, 0.3, to_scheme=0.05)],
+         Verdict.PASS),
+        ([*blades("xfem", 0.45, 0.44), *blades("reference", 0.28, 0.3, to_scheme=0.05)],
+         Verdict.FAIL),
+        ([*blades("xfem", 0.60, 0.44), *blades("reference", 0.28, 0.3, to_scheme=0.05)],
+         Verdict.PASS),  # 0.44 ± 0.16
+    ],
+)  # fmt: skip
+def test_forces_at_a_cut_take_no_more_than_the_blade_releases(records, expected):
+    (found,) = judge(scene([STRAIGHT]), records, ())
+    assert (found.check, found.metric, found.solver) == ("excess", "released_to_cut", "xfem")
+    assert found.verdict is expected
+
+
+@pytest.mark.parametrize(
+    ("levels", "expected"),
+    [
+        ((0.30, 0.33), Verdict.PASS),
+        ((0.37, 0.365), Verdict.PASS),  # 0.365 ± 0.005
+        ((0.38, 0.375), Verdict.FAIL),
+        ((0.35,), Verdict.PASS),
+        ((0.37,), Verdict.UNDECIDED),  # one level does not say how well that is known
+    ],
+)
+def test_an_exact_energy_release_rate_is_the_most_that_is_taken(levels, expected):
+    records = blades("xfem", *levels)
+    for record in records:
+        record.metrics.append(Metric("released", 0.36, "J/m²"))
+    (found,) = judge(scene([STRAIGHT]), records, ())
+    assert found.verdict is expected
+    assert judge(scene([STRAIGHT]), records, (), judge_only=("conforming",)) == []

@@ -7,7 +7,7 @@ check needs is missing, or its comparison failed.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 
 from verify.judge.checks import applied_checks, verdict_record
 from verify.judge.intervals import (
@@ -18,6 +18,7 @@ from verify.judge.intervals import (
 )
 from verify.judge.rates import ROUND_OFF
 from verify.result import (
+    REFERENCE,
     CaseResult,
     Metric,
     Rate,
@@ -34,6 +35,8 @@ Rows = Mapping[float, CaseResult]
 
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1
+# of the energy that a blade releases, what is found again in a reference
+_OF_REFERENCE = ("released_to_cut", "released_to_scheme", "released_to_short_waves")
 
 
 def judge(
@@ -60,7 +63,8 @@ def judge(
     Returns
     -------
     list of VerdictRecord
-        One per check and solver, in the order of the scene, then of the solvers in `records`.
+        One per check and solver, in the order of the scene, then of the solvers in `records`. Then
+        whether forces at a cut have taken more than a blade releases, of each solver that has such.
     """
     verdicts = []
     for applied in applied_checks(scene.acceptance, records, judge_only):
@@ -73,7 +77,59 @@ def judge(
             found = verdict_record(check, Verdict.ERROR, str(problem))
         found = found or verdict_record(check, Verdict.UNDECIDED, applied.not_judged)
         verdicts.append(_marked(scene, found))
-    return verdicts
+    return verdicts + _cut_works(records, judge_only)
+
+
+def _cut_works(records: Sequence[SolveRecord], judge_only: Sequence[str]) -> list[VerdictRecord]:
+    """Judge what the forces at released cuts took against the energy release rate.
+
+    What one element more or less makes is that of a level more or less. Without an exact rate it is
+    what the forces, the scheme and the shortest waves of the reference took together.
+    """
+    found = []
+    for solver in dict.fromkeys(record.solver for record in records):
+        taken = _taken(records, solver, ("released_to_cut",))
+        if taken is None or solver == REFERENCE or (judge_only and solver not in judge_only):
+            continue
+        finest = max((r for r in records if r.solver == solver), key=lambda r: r.level)
+        exact, most, source = finest.metric("released"), None, "the reference"
+        if exact is not None:
+            most, source = Interval(exact.value, exact.value, exact.value), "the exact field"
+        else:
+            most = _taken(records, REFERENCE, _OF_REFERENCE)
+        verdict, limit = Verdict.UNDECIDED, "at most what the blade releases"
+        text = "what the blade releases is not known: no exact rate, and no reference of two levels"
+        if most is not None:
+            limit = f"at most {most.high:.4g} J/m², by {source}"
+            text = "taken by the forces at the cut per area that the blade has swept"
+            alone = taken.half_width == inf
+            if taken.value <= most.high or not alone:
+                verdict = Verdict.FAIL if taken.low > most.high else Verdict.PASS
+            else:
+                text += "; one level does not say how well that is known"
+        low, high = (None, None) if taken.half_width == inf else (taken.low, taken.high)
+        found.append(
+            VerdictRecord(
+                "excess", solver, "released_to_cut", verdict, taken.value, low, high, limit, text
+            )
+        )
+    return found
+
+
+def _taken(records: Sequence[SolveRecord], solver: str, names: Sequence[str]) -> Interval | None:
+    """Sum the metrics of a solver that has the first, give or take what its last level changed."""
+    own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
+    values = [
+        sum(metric.value for name in names if (metric := record.metric(name)) is not None)
+        for record in own[-2:]
+        if record.metric(names[0]) is not None
+    ]
+    if not values or own[-1].metric(names[0]) is None:
+        return None
+    width = abs(values[-1] - values[0]) if len(values) > 1 else inf
+    if width == inf and solver == REFERENCE:
+        return None
+    return Interval(values[-1], values[-1] - width, values[-1] + width)
 
 
 def with_verdicts(

@@ -32,6 +32,7 @@ _METRICS = {
     "ledger_mismatch": "relative mismatch of the energy balance",
     "linear_momentum_drift": "relative change of the momentum",
     "angular_momentum_drift": "relative change of the angular momentum",
+    "released_to_cut": "energy taken at the cut, per area swept",
     "released_mismatch": "share of the energy released at the blade that is not found",
     "part_linear_momentum_drift": "relative drift of the momentum of free parts",
     "part_angular_momentum_drift": "relative drift of the spin of free parts",

@@ -38,7 +38,13 @@ from verify.result import (
 )
 
 MANY = 4  # solvers beyond which they stand side by side
-_CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": ""}
+_CHECKS = {
+    "rate": "order of the",
+    "error": "",
+    "ratio": "worst ratio of the",
+    "value": "",
+    "excess": "excess of the",
+}
 
 
 def case_tables(result: CaseResult) -> dict[str, Table | None]:
@@ -56,7 +62,7 @@ def case_tables(result: CaseResult) -> dict[str, Table | None]:
 
 def check_text(record: VerdictRecord, named: bool = True) -> str:
     """Return what a check looks at in words, after whom it judges if `named`."""
-    name = metric_title(record.metric) if record.check == "value" else error_title(record.metric)
+    name = (metric_title if record.check in ("value", "excess") else error_title)(record.metric)
     what = f"{_CHECKS.get(record.check, record.check)} {name}".strip()
     return (
         f"{solver_title(record.solver) if record.solver else 'nobody'}: {what}" if named else what
