@@ -5,7 +5,7 @@ import numpy as np
 
 
 def closed_curve(radius: np.ndarray, centre: tuple[float, float]) -> tuple[int, list[int]]:
-    """Closed spline through points at equal angles: the curve loop, and its curves."""
+    """Draw a closed spline through points at equal angles: the curve loop, and its curves."""
     angles = 2.0 * np.pi * np.arange(len(radius)) / len(radius)
     points = [
         gmsh.model.occ.addPoint(centre[0] + r * np.cos(a), centre[1] + r * np.sin(a), 0.0)
@@ -34,7 +34,7 @@ def written(name: str, surfaces: dict[str, int], curves: dict[str, list[int]], s
 
 
 def blob() -> None:
-    """An outline of varying curvature with a round inclusion off its centre."""
+    """Mesh an outline of varying curvature with a round inclusion off its centre."""
     angle = 2.0 * np.pi * np.arange(16) / 16
     outline, curves = closed_curve(30.0 + 4.0 * np.cos(2 * angle) + 2.0 * np.sin(3 * angle), (0, 0))
     nodule, _ = closed_curve(np.full(12, 9.0), (11.0, 5.0))
@@ -44,7 +44,7 @@ def blob() -> None:
 
 
 def sleeve() -> None:
-    """The section of a tube of two layers."""
+    """Mesh the section of a tube of two layers."""
     loops = [closed_curve(np.full(12, radius), (0.0, 0.0)) for radius in (12.0, 17.0, 21.0)]
     inner = gmsh.model.occ.addPlaneSurface([loops[1][0], loops[0][0]])
     outer = gmsh.model.occ.addPlaneSurface([loops[2][0], loops[1][0]])
