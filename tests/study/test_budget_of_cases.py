@@ -141,11 +141,17 @@ SETTLING = {
 }  # fmt: skip
 
 
+BRIEF = {**SETTLING, "analysis": {**SETTLING["analysis"], "duration": 2.0}}
+
+
 @pytest.mark.parametrize(
-    "metric, adequate", [pytest.param("end", True, marks=pytest.mark.heavy), ("early", False)]
+    "content, metric, adequate",
+    [pytest.param(SETTLING, "end", True, marks=pytest.mark.heavy), (BRIEF, "early", False)],
 )
-def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_way(metric, adequate):
-    study = budget_of(scenes.scene(**SETTLING), tolerance=0.15, metric=metric)
+def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_way(
+    content, metric, adequate
+):
+    study = budget_of(scenes.scene(**content), tolerance=0.15, metric=metric)
     static = [c for c in study.candidates if c.analysis == "static"]
     assert len(static) == 2
     assert any(c.high <= 0.15 for c in static) == adequate
@@ -159,9 +165,6 @@ def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_wa
     said = study.findings[0].sentence
     assert ("static" in said.split(":")[0]) or not adequate
     assert ("not adequate" in said) != adequate
-
-
-BRIEF = {**SETTLING, "analysis": {**SETTLING["analysis"], "duration": 2.0}}
 
 
 @pytest.mark.heavy

@@ -53,7 +53,7 @@ _FALL = (
 
 @pytest.fixture(scope="module")
 def face():
-    return count_face((10, 50, 100))
+    return count_face((10, 50))
 
 
 @pytest.fixture(scope="module")
