@@ -122,9 +122,9 @@ def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_
 @pytest.mark.parametrize(
     ("body", "strain", "spin", "share", "steps", "most"),
     [
-        # what a step leaves unsolved adds up: a quarter of what 2000 steps may drift
-        (lambda: cut_square(2), 0.4, 3.0, 0.9, 500, 2.5e-9),
-        (lambda: cut_square(2), 0.4, 3.0, 4.0, 500, 2.5e-9),
+        # what a step leaves unsolved adds up: a tenth of what 2000 steps may drift
+        (lambda: cut_square(2), 0.4, 3.0, 0.9, 200, 1e-9),
+        (lambda: cut_square(2), 0.4, 3.0, 4.0, 200, 1e-9),
         *(
             pytest.param(make, 0.3, 2.0, share, 10_000, 1e-8, marks=pytest.mark.heavy)
             for make, share in (
@@ -152,7 +152,7 @@ def test_energy_is_kept_while_pieces_turn_inside_out():
     state = _moving(body, 0.5, 3.0)
     scheme = EnergyMomentum(body, 0.9 * _critical(body))
     inverted, first = 0, None
-    for _ in range(8):
+    for _ in range(4):
         account = run(scheme, body, state, 25)
         first = account.mechanical[0] if first is None else first
         inverted = max(inverted, len(inverted_cells(body.force, state.displacement)))
