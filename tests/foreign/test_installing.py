@@ -1,19 +1,36 @@
 """Installation: hash-checked, whole or not at all, one clear error."""
 
 import json
+import shutil
 import sys
 
 import pytest
 
 from verify.cli import main
 from verify.errors import InputError
-from verify.foreign import foreign_solver, install, remove, state_of
+from verify.foreign import foreign_solver, install, installing, remove, state_of
 from verify.foreign.installing import mark_of, solvers_folder
 
 
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory):
+    """Where the first environment is kept that an installation of these tests makes."""
+    return tmp_path_factory.mktemp("environments") / "first"
+
+
 @pytest.fixture
-def locked(add_example, wheel):
+def locked(add_example, wheel, environment, monkeypatch):
     """A solver of the package ``cutfake``, with the hash of its wheel in the lock."""
+    call = installing._call
+
+    def made_once(solver, command):  # most of what an installation takes is an empty environment
+        if command[1:3] != ["-m", "venv"]:
+            return call(solver, command)
+        if not environment.exists():
+            call(solver, [*command[:3], str(environment)])
+        return shutil.copytree(environment, command[3], symlinks=True)
+
+    monkeypatch.setattr(installing, "_call", made_once)
     folder = add_example("fake", module="cutfake", kind="packages", python="3.12")
     (folder / "requirements.lock").write_text(f"cutfake==1.5 --hash=sha256:{wheel}\n")
     return folder
