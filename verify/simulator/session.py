@@ -267,10 +267,10 @@ class Session:
                 self.integrator.advance(self.state)
             else:
                 self._ledger.record(self.state, self.integrator.step(self.state))
-            if isinstance(self.body.tie, TieForces):
-                change = self.stage.time_step * self.state.velocity
-                count = len(self.cut_work)
-                self.cut_work += self.body.tie.work_by_cut(change, self.state.time, count)
+            if isinstance(tie := self.body.tie, TieForces):
+                change, now = self.stage.time_step * self.state.velocity, self.state.time
+                self.cut_work += tie.work_by_cut(change, now, len(self.cut_work))
+                self.body.tie = tie.still(now)
         with self._timed("mapping"):
             self.surfaces.move(self.displacement)
         with self._timed("collision"):

@@ -102,6 +102,11 @@ class TieForces:
             total[hold.nodes] += hold.factor(time)[:, None] * hold.forces
         return self.phantom.restrict(total)
 
+    def still(self, time: float) -> "TieForces | None":
+        """Give what holds anything at a time or later; None if nothing does."""
+        holds = tuple(hold for hold in self.holds if hold.factor(time).any())
+        return TieForces(self.shape, holds) if holds else None
+
     def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
         """Work (cuts,) in J that the forces of each cut take, as they are at a time.
 
