@@ -105,7 +105,7 @@ class TieForces:
     def still(self, time: float) -> "TieForces | None":
         """Give what holds anything at a time or later; None if nothing does."""
         holds = tuple(hold for hold in self.holds if hold.factor(time).any())
-        return TieForces(self.shape, holds) if holds else None
+        return TieForces(self.phantom, holds) if holds else None
 
     def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
         """Work (cuts,) in J that the forces of each cut take, as they are at a time.
