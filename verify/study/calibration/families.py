@@ -12,7 +12,7 @@ import numpy as np
 
 from verify.judge.richardson import extrapolate
 from verify.scene import Scene
-from verify.study.calibration.motion_scenes import bar, sudden_crack
+from verify.study.calibration.motion_scenes import bar, blade_strip, sudden_crack
 from verify.study.calibration.still_scenes import (
     airy,
     arc_through,
@@ -132,6 +132,7 @@ def families(quick: bool) -> list[Family]:
     return [
         *found,
         Family("sudden crack", sudden_crack, (4, 5), degrees=(2,)),
+        Family("blade strip", blade_strip, (6, 8), degrees=(1,)),
         # linear elements: levels of quadratic ones would take most of the study's time
         Family("solid smooth", solid_smooth, (1.5, 2.5), degrees=(1,)),
         Family("ball and shell", ball_and_shell, (1.5, 2.5), degrees=(1,)),

@@ -1,4 +1,4 @@
-"""Random scenes in motion whose numbers are known: waves in bars, cracks that open suddenly."""
+"""Random scenes in motion whose numbers are known: bars, sudden cracks, strips with a blade."""
 
 from math import cos, radians, sin, sqrt
 from typing import Literal
@@ -144,3 +144,49 @@ def sudden_crack(random: Random) -> Content:
         "quantities": quantities,
         "values": values,
     }  # fmt: skip
+
+
+def blade_strip(random: Random) -> Content:
+    """Return a part of a prestretched strip with a blade through it, at any angle and speed.
+
+    Antiplane, with the exact field on its sides; the wave speed is 1 m/s, the blade reaches a tenth
+    to seven tenths of it.
+    """
+    speed, angle = float(random.uniform(0.1, 0.7)), float(random.uniform(-15.0, 15.0))
+    ahead = np.array([cos(radians(angle)), sin(radians(angle))])
+    tip = random.uniform([-0.08, -0.01], [0.0, 0.01])
+    duration = float(random.uniform(0.05, 0.09)) / speed
+    sides = ["left", "right", "front", "back"]
+    content: Content = {
+        "title": "blade strip",
+        "requirement": "The stated uncertainty of the reference shall cover its true error.",
+        "geometry": {"kind": "box", "lower": [-0.15, -0.05, 0.0], "upper": [0.15, 0.05, 0.006]},
+        "mesh": {"cells": [[24, 8, 1]]},
+        "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},
+        "analysis": {"kind": "dynamic", "duration": duration, "outputs": 3},
+        "exact": {
+            "solution": "blade_strip",
+            "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed, "angle": angle,
+                           "tip": tip.tolist()},
+        },
+        "initial": {"kind": "field", "displacement": "exact", "velocity": "exact"},
+        "supports": [
+            *({"where": side, "components": ["x", "y"], "displacement": [0.0, 0.0]}
+              for side in ("bottom", "top")),
+            *({"where": side, "displacement": "exact"} for side in sides),
+        ],
+        "cuts": [{"kind": "tool_path", "depth": 0.008, "direction": [0.0, 0.0, 1.0],
+                  "points": [[*(tip + way * ahead), -0.001] for way in (-0.35, speed * duration)],
+                  "times": [-0.35 / speed, duration], "expected": "edge"}],
+        "quantities": [],
+    }  # fmt: skip
+    for k, behind in enumerate(random.uniform([0.01, 0.04], [0.03, 0.06])):
+        place = [*(tip - behind * ahead), 0.003]
+        content["quantities"].append(
+            {"kind": "opening", "name": f"opening {k}", "point": place, "component": "tangential"}
+        )
+    for k, at in enumerate(random.uniform([-0.13, 0.02], [0.13, 0.04], (2, 2)) * [[1, 1], [1, -1]]):
+        content["quantities"].append(
+            {"kind": "displacement", "name": f"u {k}", "point": [*at, 0.003], "component": "z"}
+        )
+    return content

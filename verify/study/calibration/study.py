@@ -79,6 +79,7 @@ def _judged(
     found = []
     if exact is not None:
         own = Measured(finest, body, law, scene).field
+        exact = exact.at(scene.analysis.duration) if scene.analysis.duration else exact
         known_norms = [name for name in NORMS if name in stated.norms]
         norms = Rules(body, size, count=2).norms(known_norms, own, exact, law)
         for name, (fine, check) in norms.items():
