@@ -1,0 +1,38 @@
+"""References that come with the cases: of their physics, small, and solved again by a heavy test."""
+
+import numpy as np
+import pytest
+
+from verify.runner.job import Job
+from verify.runner.references import BESIDE, bundle_of_case
+from verify.scene import case_folder, load_scene
+from verify.solution import read_solution
+from verify.solvers import find_solver
+
+BUNDLES = sorted(case_folder().rglob(f"{BESIDE}/*.zip"))
+CASES = [path.parent.parent / f"{path.stem}.toml" for path in BUNDLES]
+
+
+def test_each_is_that_of_its_case_and_all_are_small():
+    assert CASES
+    assert sum(path.stat().st_size for path in BUNDLES) < 20e6
+    for case in CASES:
+        scene = load_scene(case)
+        bundle = bundle_of_case(scene)
+        assert bundle is not None, f"{case}: its physics is another than that of its bundle"
+        assert bundle.levels(scene) == scene.reference.levels
+
+
+@pytest.mark.heavy
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.stem)
+def test_each_level_is_what_the_reference_solves(case, tmp_path):
+    """On the same mesh; the solves of another version of FEniCSx differ by their round-off."""
+    scene, solver = load_scene(case), find_solver("reference")
+    bundle = bundle_of_case(scene)
+    for level in range(scene.reference.levels):
+        bundle.take(scene, Job(scene.name, "reference", level, 1, "any", tmp_path))
+        kept, made = read_solution(tmp_path / "solution"), solver.solve(scene, level, 0)
+        np.testing.assert_allclose(made.points, kept.points, atol=1e-12)
+        largest = np.abs(kept.displacement).max()
+        np.testing.assert_allclose(made.displacement, kept.displacement, atol=1e-6 * largest)
