@@ -1,4 +1,4 @@
-"""References that come with the cases: of their physics, small, and solved again by a heavy test."""
+"""References that come with cases: of their physics, small, and solved again by a heavy test."""
 
 import numpy as np
 import pytest
