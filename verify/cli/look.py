@@ -181,7 +181,8 @@ def _other(check: Any) -> str:
 def _keys(part: Any, *without: str) -> str:
     said = part.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=set(without))
     head = said.pop("kind", said.pop("check", ""))
-    body = ", ".join(f"{key} {_value(value)}" for key, value in said.items() if value not in ({}, []))
+    stated = {key: value for key, value in said.items() if value not in ({}, [])}
+    body = ", ".join(f"{key} {_value(value)}" for key, value in stated.items())
     return f"{head}{': ' if head and body else ''}{body}"
 
 
