@@ -1,15 +1,18 @@
 """Bodies of files that people have: their groups, kinds of cells, units; and what is no body."""
 
 import itertools
+import json
 
 import meshio
 import numpy as np
 import pytest
 from independent_p1 import energy, energy_of_field
+from scipy.spatial import cKDTree
 
 from verify.cli import main
 from verify.errors import InputError
-from verify.scene import load_scene, read_mesh
+from verify.exchange import export_case, problem_of
+from verify.scene import load_scene, read_mesh, restore_scene, scene_content
 from verify.scene.mesh_file import read_body
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.structured_meshes import box_mesh
@@ -480,3 +483,38 @@ def test_a_spoilt_file_gives_one_line(tmp_path, capsys, monkeypatch, form):
         refused += 1
     assert refused >= 6
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["case.toml", file])
+
+
+def test_guests_get_groups_and_metres(tmp_path):
+    """What is exported is in metres, with a material for each cell and the nodes of each clamp."""
+    points, cells, hard, ends, turn = block(2)
+    file, names = write(tmp_path, "gmsh22", 1000.0 * points @ turn, cells, hard, ends)
+    scene = case(tmp_path, file, turn, *names, geometry="scale = 1e-3")
+    scene = restore_scene(json.loads(json.dumps(scene_content(scene))))  # as in another process
+    export_case(scene, tmp_path / "out", conforming=False)
+    folder = tmp_path / "out" / "level-0"
+    mesh = meshio.read(folder / "mesh.vtu")
+    middles = mesh.points[mesh.cells_dict["tetra"]].mean(axis=1)
+    numbers = mesh.cell_data_dict["material"]["tetra"]
+    own = cKDTree(points[cells].mean(axis=1) @ turn).query(middles)
+    assert own[0].max() < 1e-12
+    assert (numbers == hard[own[1]]).all()
+    problem = problem_of(scene, 0)
+    for held, end in zip(problem.held, ends, strict=True):
+        given = np.sort(problem.points[held.nodes], axis=0)
+        wanted = np.sort(points[np.unique(end)] @ turn, axis=0)
+        np.testing.assert_allclose(given, wanted, atol=1e-12)
+
+
+def test_pieces_that_share_an_edge_alone_are_warned_of(tmp_path, capsys):
+    mesh = box_mesh((2, 1, 1), (0.0,) * 3, (1.0,) * 3)
+    beside = mesh.points + np.array([1.0, 1.0, 0.0])  # along z they share an edge
+    points = np.vstack([mesh.points, beside])
+    points, number = np.unique(points, axis=0, return_inverse=True)
+    cells = number.ravel()[np.vstack([mesh.cells, mesh.cells + len(mesh.points)])]
+    meshio.Mesh(points, [("tetra", cells)]).write(tmp_path / "body.vtu")
+    case(tmp_path, "body.vtu", None, "x < 0.5", "x < 0.1", "x > 1.9")
+    text = (tmp_path / "case.toml").read_text().split("[[cuts]]")[0]
+    (tmp_path / "case.toml").write_text(text)
+    err = said_by_check(tmp_path, capsys)[1]
+    assert f"in 2 pieces that share no facet, the least of {len(mesh.cells)} cells around" in err

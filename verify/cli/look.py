@@ -254,7 +254,13 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
-    from verify.runner.mesh_faults import body_notes, mesh_warning, unit_warning, unused_groups
+    from verify.runner.mesh_faults import (
+        body_notes,
+        mesh_warning,
+        pieces_warning,
+        unit_warning,
+        unused_groups,
+    )
     from verify.scene import load_scenes
 
     try:
@@ -265,15 +271,14 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         error_row = {"title": None, "error": one_line(error), "body": ""}
         return {"file": file, **error_row, "notes": [], "warnings": [], "cost": []}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
+    warnings = (mesh_warning, pieces_warning, unit_warning, unused_groups)
     return {
         "file": file,
         "title": f"{scenes[0].title}{rows}",
         "error": None,
         "body": body_text(scenes[0]),
         "notes": body_notes(scenes[0]),
-        "warnings": [
-            *filter(None, (say(scenes[0]) for say in (mesh_warning, unit_warning, unused_groups)))
-        ],
+        "warnings": [said for say in warnings if (said := say(scenes[0]))],
         "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
     }
 

@@ -67,7 +67,8 @@ def mesh_warning(scene: Scene) -> str:
         return ""
     return (
         f"'{scene.geometry.file}' is not joined where {'; '.join(said)}: the body is apart there; "
-        "merge nodes or mesh it anew if it is not meant to be"
+        "merge nodes (weld = 1e-6 in [geometry] joins those within 1e-6 m) or mesh it anew if it "
+        "is not meant to be"
     )
 
 
@@ -93,6 +94,29 @@ def body_notes(scene: Scene) -> list[str]:
         unused = "" if name in used else " (unused)"
         said.append(f"{GROUP}{name}: {', '.join(words)}, in {box} m{unused}")
     return [*said, *filter(None, [wave_time(scene)])]
+
+
+def pieces_warning(scene: Scene) -> str:
+    """Warn of a body of a mesh file in pieces that share no facet, or say ""."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    if not isinstance(scene.geometry, MeshFile):
+        return ""
+    points, cells = read_mesh(scene)
+    facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
+    _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
+    cell = np.tile(np.arange(len(cells)), cells.shape[1])
+    link = coo_array((np.ones(len(cell)), (cell, facet.ravel()))).tocsr()
+    count, piece = connected_components(link @ link.T, directed=False)
+    if count == 1:
+        return ""
+    least = np.bincount(piece).argmin()
+    own = cells[piece == least]
+    return (
+        f"'{scene.geometry.file}' is in {count} pieces that share no facet, "
+        f"the least of {len(own)} cells around {_at(points[own].mean(axis=(0, 1)))}"
+    )
 
 
 def unit_warning(scene: Scene) -> str:
