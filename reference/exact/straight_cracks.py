@@ -219,7 +219,7 @@ class Griffith(ComplexCrack):
         return Potentials(
             0.5 * s * root + gamma * z,
             0.5 * s * z / root + gamma,
-            np.asarray(-0.5 * s * a**2 / root**3, dtype=complex),
+            np.asarray(-0.5 * s * a**2 / (root * root * root), dtype=complex),
             0.5 * s * bar - gamma * z.conj(),
             0.5 * s * z.conj() / bar - gamma,
         )

@@ -3,6 +3,7 @@
 They are computed from a `verify.solution.Solution` alone, so from any solver's.
 """
 
+from reference.fracture.cells import stress_of
 from reference.fracture.front import (
     CircularFront,
     Front,
@@ -15,7 +16,7 @@ from reference.fracture.front import (
 )
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
 from reference.fracture.intensity import DomainError, StressIntensity, stress_intensity
-from reference.fracture.tips import Tip, no_tip, tips
+from reference.fracture.tips import Tip, no_tip, tip_at, tips
 
 __all__ = [
     "CircularFront",
@@ -33,5 +34,7 @@ __all__ = [
     "station_count",
     "station_spacing",
     "stress_intensity",
+    "stress_of",
+    "tip_at",
     "tips",
 ]

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 # Gauss points per direction of the collapsed square or cube: exact to degree 10 in the plane and
 # 4 in space, where a tube has a hundred times the cells of a ring
 _ORDER = {2: 6, 3: 3}
+_PRODUCT = 3  # of div u times a hat: degree 2 in a straight cell, 3 in a curved one in the plane
 _EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of VTK; the first three in the plane
 MIXED = "displacement and pressure"  # what a solution's note on its unknowns says
 _CHUNK = 20_000  # cells
@@ -56,7 +57,9 @@ class CellGradients(NamedTuple):
     shape: Array
 
 
-def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1) -> CellGradients:
+def cell_gradients(
+    solution: Solution, cells: NDArray[np.int64], step: int = -1, order: int | None = None
+) -> CellGradients:
     """Evaluate the gradient in some cells of a solution, isoparametric if it is quadratic.
 
     Parameters
@@ -66,11 +69,13 @@ def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1)
         Which cells.
     step : int
         Which output time; default the last.
+    order : int, optional
+        Gauss points per direction of the collapsed square or cube.
     """
     d = solution.dimension
     nodes = solution.cells[cells]
     x, u = solution.points[nodes], solution.displacement[step][nodes]
-    xi, weight = _rule(d, _ORDER[d])
+    xi, weight = _rule(d, order or _ORDER[d])
     corner, corner_slope = _linear(xi)
     shape, slope = (corner, corner_slope) if solution.order == 1 else _quadratic(xi)
     jacobian = np.einsum("qka,mki->mqia", slope, x)  # ∂x_i/∂ξ_a
@@ -146,7 +151,7 @@ class NodalPressure:
         right, measure = np.zeros(len(corners)), np.empty(len(self._place))
         for start in range(0, len(self._place), _CHUNK):
             cells = np.arange(start, min(start + _CHUNK, len(self._place)))
-            at = cell_gradients(solution, cells, step)
+            at = cell_gradients(solution, cells, step, _PRODUCT)
             divergence = np.trace(at.gradient, axis1=2, axis2=3) * at.weights
             shares = law.lame * divergence @ at.corner_shares
             right += np.bincount(self._place[cells].ravel(), shares.ravel(), len(corners))
@@ -168,9 +173,10 @@ class NodalPressure:
         return deviatoric + pressure[..., None, None] * np.eye(law.dimension)
 
 
-def stress_of(
-    solution: Solution, law: Hooke, step: int = -1
-) -> Callable[[NDArray[np.int64], CellGradients], Array]:
+Stresses = Callable[[NDArray[np.int64], CellGradients], Array]
+
+
+def stress_of(solution: Solution, law: Hooke, step: int = -1) -> Stresses:
     """Give the stress (m, q, d, d) at points of cells: with a pressure if the solution has one."""
     if solution.notes.get("unknowns") == MIXED:
         return partial(NodalPressure(solution, law, step).stress, law)

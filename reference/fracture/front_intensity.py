@@ -10,6 +10,7 @@ from reference.fracture.cells import (
     CellGradients,
     Force,
     NetForce,
+    Stresses,
     cell_gradients,
     net_force,
     stress_of,
@@ -59,6 +60,7 @@ def front_intensity(
     drag: float = 0.0,
     step: int = -1,
     fitted: bool = True,
+    stresses: Stresses | None = None,
 ) -> FrontIntensity:
     """K_I, K_II and K_III along the front of a plane crack.
 
@@ -90,6 +92,8 @@ def front_intensity(
     fitted : bool
         Whether cells of the mesh must touch the front. They need not in a mesh whose cut ends
         beside the front.
+    stresses : callable, optional
+        What `stress_of` gives for the solution: where several fronts share it.
 
     Raises
     ------
@@ -115,7 +119,10 @@ def front_intensity(
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
     nodes = place[solution.cells[within, :4]]
     force = net_force(solution, material, body_force, drag, step)
-    nodal = _nodal_shares(solution, material, front, within, nodes, at.axes[:, 0], force, step)
+    stresses = stresses or stress_of(solution, hooke(material), step)
+    nodal = _nodal_shares(
+        solution, material, front, within, nodes, at.axes[:, 0], force, stresses, step
+    )
     hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
@@ -203,10 +210,10 @@ def _nodal_shares(
     nodes: NDArray[np.int64],
     ahead: Array,
     force: NetForce | None,
+    stresses: Stresses,
     step: int,
 ) -> Array:
     """M (c, 3) of the three modes, linear in the extension of each node along `ahead` (c, 3)."""
-    stresses = stress_of(solution, hooke(material), step)
     nodal = np.zeros((len(ahead), 3))
     for start in range(0, len(cells), _CHUNK):
         part, corners = cells[start : start + _CHUNK], nodes[start : start + _CHUNK]

@@ -7,7 +7,14 @@ from numpy.typing import NDArray
 
 from reference.exact.field import Hooke, hooke
 from reference.exact.solution import ExactSolution
-from reference.fracture.cells import CellGradients, Force, cell_gradients, net_force, stress_of
+from reference.fracture.cells import (
+    CellGradients,
+    Force,
+    Stresses,
+    cell_gradients,
+    net_force,
+    stress_of,
+)  # fmt: skip
 from reference.fracture.tips import ahead_of, tip_fields
 from verify.errors import InputError
 from verify.scene import ArcCut, Material
@@ -124,6 +131,7 @@ def stress_intensity(
     drag: float = 0.0,
     step: int = -1,
     arc: ArcCut | None = None,
+    stresses: Stresses | None = None,
 ) -> StressIntensity:
     """K_I and K_II of a crack that is straight, or an arc, from a plane field.
 
@@ -157,6 +165,8 @@ def stress_intensity(
         Which output time; default the last.
     arc : ArcCut, optional
         Of which the tip is an end.
+    stresses : callable, optional
+        What `stress_of` gives for the solution: where several tips share it.
 
     Raises
     ------
@@ -165,7 +175,7 @@ def stress_intensity(
         carries no accelerations.
     """
     law = hooke(material)
-    stresses = stress_of(solution, law, step)
+    stresses = stresses or stress_of(solution, law, step)
     force = net_force(solution, material, body_force, drag, step)
     modes = tip_fields(material, tip, direction, arc)
     u = solution.displacement[step]

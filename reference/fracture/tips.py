@@ -64,7 +64,7 @@ class Tip:
 def tips(scene: Scene) -> list[Tip]:
     """Tips of the cuts of a plane scene: ends inside the body at which nothing else is met."""
     return [
-        _tip(scene, cut, end)
+        tip_at(scene, cut.name, end)
         for cut in scene.final_cuts
         for end in _ENDS
         if isinstance(cut, ArcCut | PolylineCut) and no_tip(scene, cut.name, end) is None
@@ -114,9 +114,11 @@ def _features_around(scene: Scene, point: Array) -> tuple[int, list[tuple[float,
     return ending, away
 
 
-def _tip(scene: Scene, cut: ArcCut | PolylineCut, end: End) -> Tip:
-    """Make a tip of an end that is one."""
+def tip_at(scene: Scene, name: str, end: End) -> Tip:
+    """Make the tip of an end that is one, by `no_tip`."""
     assert isinstance(scene.geometry, Rectangle | Polygon)
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
+    assert isinstance(cut, ArcCut | PolylineCut)
     at = _ENDS.index(end)
     point = _ends(cut)[at]
     _, away = _features_around(scene, point)

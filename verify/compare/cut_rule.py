@@ -254,6 +254,17 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
     else:
         border = _BORDER * spacing
 
+    lower, upper = body.corners.min(axis=(0, 1)), body.corners.max(axis=(0, 1))
+
+    def meets_body(some: Array, sizes: Array) -> NDArray[np.bool_]:
+        """Whether cells may hold a part of the body: by boxes, wider where a patch bulges."""
+        margin = np.full(len(some), AWAY * body.size)
+        if patch.curvature:  # a chord of a radius at most has its arc within itself
+            margin += np.where(sizes * patch.curvature <= 1.0, sizes, np.inf)
+        corners = in_space(some)
+        low, high = corners.min(axis=1) - margin[:, None], corners.max(axis=1) + margin[:, None]
+        return np.asarray(((low <= upper) & (high >= lower)).all(axis=1))
+
     def wanted(some: Array, _: Array) -> NDArray[np.bool_]:
         sizes = size(some)
         target = np.full(len(some), spacing)
@@ -264,6 +275,7 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
         if border < np.inf:
             within = body.inside(in_space(some).reshape(-1, 3)).reshape(-1, 3)
             too_large |= (within.any(axis=1) & ~within.all(axis=1)) & (sizes > border)
+            too_large &= meets_body(some, sizes)
         return np.asarray(too_large)
 
     cells = divide(cells, wanted)

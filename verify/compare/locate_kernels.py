@@ -12,10 +12,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+def _axes(dimension: int) -> tuple[int, ...]:
+    """Return the axes of space as kernels take them: loops over a tuple are unrolled."""
+    return tuple(range(dimension))
+
+
 @njit(inline="always")
-def _depth(x, normals, corners):
+def _depth(x, normals, corners, axes):
     """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
-    d = x.shape[0]
+    d = len(axes)
     depth = np.inf
     for facet in range(d + 1):
         on_it = (facet + 1) % (d + 1)
@@ -41,9 +46,9 @@ def segment_distance2(x, a, b):
 
 
 @njit(inline="always")
-def _outside_distance2(x, normals, corners):
+def _outside_distance2(x, normals, corners, axes):
     """Squared distance to a simplex of a point outside of it."""
-    d = x.shape[0]
+    d = len(axes)
     best = np.inf
     for i in range(d + 1):
         for j in range(i):
@@ -94,10 +99,10 @@ def allowed(wish, side):
 
 
 @njit(inline="always")
-def _containing(x, direction, sided, wish, searched, sides, tolerance, stack):
+def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     lower, upper, cells, corners, normals, centres = searched
-    d = x.shape[0]
+    d = len(axes)
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
     stack[0], top = 1, 1
@@ -120,7 +125,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, stack):
             cell = cells[k]
             if cell < 0:
                 break
-            depth = _depth(x, normals[cell], corners[cell])
+            depth = _depth(x, normals[cell], corners[cell], axes)
             if depth < -tolerance or not allowed(wish, sides[cell]):
                 continue
             if depth > tolerance:
@@ -137,7 +142,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, stack):
 
 
 @njit(cache=True)
-def _nearest(x, wish, searched, sides, stack):
+def _nearest(x, wish, searched, sides, axes, stack):
     """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
     lower, upper, cells, corners, normals, _ = searched
     leaves = lower.shape[0] // 2
@@ -164,9 +169,9 @@ def _nearest(x, wish, searched, sides, stack):
                 break
             if not allowed(wish, sides[cell]):
                 continue
-            if _depth(x, normals[cell], corners[cell]) >= 0.0:
+            if _depth(x, normals[cell], corners[cell], axes) >= 0.0:
                 return cell
-            distance2 = _outside_distance2(x, normals[cell], corners[cell])
+            distance2 = _outside_distance2(x, normals[cell], corners[cell], axes)
             if distance2 < best2:
                 best, best2 = cell, distance2
     return best
@@ -217,24 +222,31 @@ def find_cells(
     either = np.zeros(wanted.shape[1], dtype=wanted.dtype)
     _find_cells(
         points, some, some is directions, wanted, either, searched, sides, tolerance, nearest,
-        found,
+        _axes(points.shape[1]), found,
     )  # fmt: skip
     return found
 
 
 @njit(cache=True)
 def _find_cells(
-    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, found
+    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, axes, found
 ):
+    _, _, _, corners, normals, _ = searched
     stack = np.empty(64, dtype=np.int64)
+    cell = -1
     for i in range(len(points)):
         wish = wanted[i]
+        # points follow each other closely: one well inside the cell of the last belongs to it
+        held = cell >= 0 and allowed(wish, sides[cell])
+        if held and _depth(points[i], normals[cell], corners[cell], axes) > tolerance:
+            found[i] = cell
+            continue
         for _ in range(2):
             cell = _containing(
-                points[i], directions[i], sided, wish, searched, sides, tolerance, stack
+                points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack
             )
             if cell < 0 and nearest:
-                cell = _nearest(points[i], wish, searched, sides, stack)
+                cell = _nearest(points[i], wish, searched, sides, axes, stack)
             if cell >= 0 or not nearest:
                 break
             wish = either
@@ -246,14 +258,14 @@ def evaluate_linear(
 ) -> Floats:
     """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
     result = np.empty(points.shape)
-    _evaluate_linear(points, found, origins, values, slopes, result)
+    _evaluate_linear(points, found, origins, values, slopes, _axes(points.shape[1]), result)
     return result
 
 
 @njit(cache=True)
-def _evaluate_linear(points, found, origins, values, slopes, result):
-    n, d = points.shape
-    for i in range(n):
+def _evaluate_linear(points, found, origins, values, slopes, axes, result):
+    d = len(axes)
+    for i in range(points.shape[0]):
         cell = found[i]
         for c in range(d):
             value = values[cell, c]
@@ -267,40 +279,48 @@ def evaluate_quadratic(
 ) -> tuple[Floats, Floats]:
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape
-    u, grad, weight = np.zeros((n, d)), np.zeros((n, d, d)), np.empty(d + 1)
-    _evaluate_quadratic(points, found, nodes, values, corners, gradients, weight, u, grad)
+    u, grad = np.empty((n, d)), np.empty((n, d, d))
+    _evaluate_quadratic(
+        points, found, nodes, values, corners, gradients, _axes(d), np.empty(d + 1), np.empty(d),
+        u, grad,
+    )  # fmt: skip
     return u, grad
 
 
 @njit(cache=True)
-def _evaluate_quadratic(points, found, nodes, values, corners, gradients, weight, u, grad):
-    n, d = points.shape
-    count = corners.shape[1]
-    for i in range(n):
+def _evaluate_quadratic(
+    points, found, nodes, values, corners, gradients, axes, weight, slope, u, grad
+):
+    d = len(axes)
+    for i in range(points.shape[0]):
         cell = found[i]
-        g = gradients[cell]
-        for k in range(count):
+        for k in range(d + 1):
             weight[k] = 0.0
             for a in range(d):
-                weight[k] += g[k, a] * (points[i, a] - corners[cell, (k + 1) % count, a])
-        for k in range(count):
-            node = nodes[cell, k]
-            shape, slope = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
-            for c in range(d):
-                u[i, c] += shape * values[node, c]
+                from_facet = points[i, a] - corners[cell, (k + 1) % (d + 1), a]
+                weight[k] += gradients[cell, k, a] * from_facet
+        for c in range(d):
+            u[i, c] = 0.0
+            for a in range(d):
+                grad[i, c, a] = 0.0
+        for k in range((d + 1) * (d + 2) // 2):
+            if k <= d:
+                shape, factor = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
                 for a in range(d):
-                    grad[i, c, a] += slope * g[k, a] * values[node, c]
-        for edge in range(count * (count - 1) // 2):
-            # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
-            p = edge if edge < 3 else edge - 3
-            q = (edge + 1) % 3 if edge < 3 else 3
-            node = nodes[cell, count + edge]
-            shape = 4.0 * weight[p] * weight[q]
-            for c in range(d):
-                u[i, c] += shape * values[node, c]
+                    slope[a] = factor * gradients[cell, k, a]
+            else:  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
+                edge = k - d - 1
+                p = edge if edge < 3 else edge - 3
+                q = (edge + 1) % 3 if edge < 3 else 3
+                shape = 4.0 * weight[p] * weight[q]
                 for a in range(d):
-                    slope = 4.0 * (weight[p] * g[q, a] + weight[q] * g[p, a])
-                    grad[i, c, a] += slope * values[node, c]
+                    both = weight[p] * gradients[cell, q, a] + weight[q] * gradients[cell, p, a]
+                    slope[a] = 4.0 * both
+            for c in range(d):
+                value = values[nodes[cell, k], c]
+                u[i, c] += shape * value
+                for a in range(d):
+                    grad[i, c, a] += slope[a] * value
 
 
 @njit(cache=True)

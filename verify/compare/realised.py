@@ -337,5 +337,4 @@ class SidedField(SolutionField):
     def _in_material(self, points: Array) -> NDArray[np.bool_]:
         """Whether points (n, d) lie in a cell: in a hole that a method left nothing is stored."""
         tolerance = ROUND_OFF * self.scale
-        height = self.shape.heights(points, holding_cells(points, self._searched, tolerance))
-        return np.asarray(height.min(axis=1, initial=np.inf) >= -tolerance)
+        return holding_cells(points, self._searched, tolerance, nearest=False) >= 0

@@ -158,8 +158,7 @@ def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
     margin = _MARGIN * float(np.linalg.norm(np.ptp(points, axis=0)))
 
     def inside(x: Array) -> NDArray[np.bool_]:
-        height = shape.heights(x, holding_cells(x, searched, margin))
-        return np.asarray(height.min(axis=1) >= -margin)
+        return holding_cells(x, searched, margin, nearest=False) >= 0
 
     return inside
 

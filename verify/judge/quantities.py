@@ -48,7 +48,7 @@ class Measured:
         cut: RealisedCut | None = None,
     ) -> None:  # fmt: skip
         self.solution, self.body, self.law, self.scene = solution, body, law, scene
-        self.cut = cut
+        self.cut, self._factors = cut, {}
         self.motion = SolutionMotion(solution, body, continued=True if cut is None else cut)
 
     def continued(self, everywhere: bool) -> SolutionMotion:
@@ -97,7 +97,7 @@ class Measured:
                 raise UnsupportedSceneError("a stress-intensity factor needs the scene")
             if asked.mode == "III" and asked.point is None:  # at a blade
                 return blade_intensity(self.scene, self.motion, self.body, asked)
-            return solution_intensity(self.scene, self.solution, asked)
+            return solution_intensity(self.scene, self.solution, asked, self._factors)
         if isinstance(asked, PartQuantity):
             if self.scene is None:
                 raise UnsupportedSceneError("a number of a part needs the scene")

@@ -26,6 +26,7 @@ from verify.scene.physics import factor_at, jumps
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
+Found = dict[Any, Any]  # modes by tip and time, stress by law and output
 _SAME_TIME = 1e-9  # of the duration
 _AROUND = 65  # directions, and distances, in which the material around a tip is looked at
 
@@ -106,10 +107,21 @@ def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     return None
 
 
-def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQuantity) -> float:
-    """K_I or K_II in Pa √m at an end of a cut, from the field alone.
+def solution_intensity(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, found: Found | None = None
+) -> float:
+    """K_I, K_II or K_III in Pa √m at an end of a cut or a point of a front, from the field alone.
 
     The mean over domains around the end as asked: a tip that a solver has put elsewhere shows.
+
+    Parameters
+    ----------
+    scene : Scene
+    solution : Solution
+    asked : StressIntensityQuantity
+    found : dict, optional
+        What other factors of the same solution share, and this one adds to: the modes of a tip, and
+        the stress of the field.
 
     Raises
     ------
@@ -119,9 +131,13 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     InputError
         If the solution has no field at that time.
     """
+    found = {} if found is None else found
+    time, mode = _time(scene, asked), ("I", "II", "III").index(asked.mode)
+    place = asked.cut, asked.end, None if asked.point is None else tuple(asked.point), time
+    if place in found:
+        return found[place][mode]
     if reason := intensity_defect(scene, asked):
         raise UnsupportedSceneError(reason)
-    time = _time(scene, asked)
     step = int(np.argmin(np.abs(solution.times - time)))
     moving = scene.analysis.kind == "dynamic"
     if abs(solution.times[step] - time) > _SAME_TIME * (scene.analysis.duration or np.inf):
@@ -133,32 +149,49 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
         raise UnsupportedSceneError("the solution carries no velocities: its damping is unknown")
     modes = _front_modes if scene.dimension == 3 else _tip_modes
     given = {"body_force": _body_force(scene, time), "drag": drag, "step": step}
+    free = _with_free_faces(scene, solution, asked, time)
     try:
-        found = modes(scene, _with_free_faces(scene, solution, asked, time), asked, given)
+        found[place] = modes(scene, free, asked, given, found if free is solution else {})
     except InputError as problem:
         raise UnsupportedSceneError(str(problem)) from None
-    return found[("I", "II", "III").index(asked.mode)]
+    return found[place][mode]
+
+
+def _shared_stresses(solution: Solution, material: Material, step: int, found: Found) -> Any:
+    """Give the stress of a field: a pressure, if it has one, is found once for all of its tips."""
+    from reference.exact.field import hooke
+    from reference.fracture import stress_of
+
+    law = hooke(material)
+    if (law, step) not in found:
+        found[law, step] = stress_of(solution, law, step)
+    return found[law, step]
 
 
 def _tip_modes(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
-) -> tuple[float, ...]:
-    from reference.fracture import DomainError, stress_intensity, tips
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any],
+    found: Found,
+) -> tuple[float, ...]:  # fmt: skip
+    from reference.fracture import DomainError, stress_intensity, tip_at
 
-    tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
+    assert asked.end is not None  # the scene is plane
+    tip = tip_at(scene, asked.cut, asked.end)
     material = _material_around(scene, tip.point, max(tip.radii()))
+    stresses = _shared_stresses(solution, material, given["step"], found)
     try:
-        found = stress_intensity(
-            solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc, **given
-        )
+        modes = stress_intensity(
+            solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc,
+            stresses=stresses, **given,
+        )  # fmt: skip
     except DomainError as problem:
         raise InputError(f"{problem}: {tip.nearest}, {tip.reach:.4g} m away") from None
-    return found.mode_1, found.mode_2
+    return modes.mode_1, modes.mode_2
 
 
 def _front_modes(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
-) -> tuple[float, ...]:
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any],
+    found: Found,
+) -> tuple[float, ...]:  # fmt: skip
     """K_I, K_II and K_III (Pa √m) at the point of a front, from the field alone.
 
     Each station of the interaction integral gives the mean of K with a hat along the front; the
@@ -174,11 +207,14 @@ def _front_modes(
 
     front, radii = front_at(scene, asked)
     stations, middle = station_count(front), 0 if front.closed else 1
-    found = front_intensity(
-        solution, scene.material.each[0], front, radii, stations=stations, fitted=False, **given
-    ).modes
-    around = found[middle - 1] - 2.0 * found[middle] + found[middle + 1]
-    k_1, k_2, k_3 = found[middle] - around / 12.0
+    material = scene.material.each[0]
+    stresses = _shared_stresses(solution, material, given["step"], found)
+    modes = front_intensity(
+        solution, material, front, radii, stations=stations, fitted=False, stresses=stresses,
+        **given,
+    ).modes  # fmt: skip
+    around = modes[middle - 1] - 2.0 * modes[middle] + modes[middle + 1]
+    k_1, k_2, k_3 = modes[middle] - around / 12.0
     return float(k_1), float(k_2), float(k_3)
 
 
