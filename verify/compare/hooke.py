@@ -52,11 +52,11 @@ class Hooke:
 
     def energy_density(self, gradient: Array) -> Array:
         """½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
-        strain = 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
-        trace = np.einsum("nii->n", strain)
-        square = np.einsum("nij,nij->n", strain, strain)
-        density: Array = 0.5 * self.lame * trace**2 + self.shear * square
-        return density
+        d = gradient.shape[1]
+        normal = [gradient[:, i, i] for i in range(d)]
+        sheared = [gradient[:, i, j] + gradient[:, j, i] for i in range(d) for j in range(i)]
+        square = sum(e * e for e in normal) + 0.5 * sum(e * e for e in sheared)
+        return np.asarray(0.5 * self.lame * sum(normal) ** 2 + self.shear * square)
 
     def power_density(self, gradient: Array, rate: Array) -> Array:
         """Power (n,) in W/m³ of the stress of displacement gradients on velocity gradients."""

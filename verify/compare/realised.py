@@ -170,17 +170,20 @@ def _orientations(
 
 def _spread(nodes: Ints, near: NDArray[np.bool_], fresh: Ints, bits: Bits, at_node: Bits) -> None:
     """Hand the `bits` (m,) of `fresh` cells on to those `near` without any, by common nodes."""
+    open_ = np.flatnonzero(near & (bits == 0))
     while len(fresh):
         given = np.zeros_like(at_node)
         np.bitwise_or.at(given, nodes[fresh], bits[fresh, None])
         given[at_node != 0] = 0  # a layer at a time: who was first, stays
         at_node |= given
-        met = at_node[nodes]
-        sides = np.where((met == _PLUS).any(axis=1), _PLUS, 0).astype(np.int8)
-        sides |= np.where((met == _MINUS).any(axis=1), _MINUS, 0).astype(np.int8)
-        sides[(sides == 0) & (met == _BOTH).any(axis=1)] = _BOTH  # at a tip: neither, from there on
-        fresh = np.flatnonzero(near & (bits == 0) & (sides != 0))
-        bits[fresh] = sides[fresh]
+        open_ = open_[bits[open_] == 0]
+        sides, both = np.zeros(len(open_), dtype=np.int8), np.zeros(len(open_), dtype=bool)
+        for met in at_node[nodes[open_].T]:
+            sides |= np.where(met == _BOTH, 0, met)
+            both |= met == _BOTH
+        sides[(sides == 0) & both] = _BOTH  # at a tip: neither, from there on
+        fresh = open_[sides != 0]
+        bits[fresh] = sides[sides != 0]
 
 
 # A triangle of which less than this share reaches across a plane is on one side of it: meshes that

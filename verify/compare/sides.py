@@ -32,14 +32,15 @@ def nearest_segments(
     distance, foot = np.empty(len(points)), np.array(points, dtype=float)
     which = np.empty(len(points), dtype=np.int64)
     starts, ends = (np.ascontiguousarray(segments[:, k]) for k in (0, 1))
-    _nearest(np.ascontiguousarray(points), starts, ends, distance, foot, which)
+    axes = tuple(range(points.shape[1]))  # a loop over a tuple is unrolled
+    _nearest(np.ascontiguousarray(points), starts, ends, axes, distance, foot, which)
     return distance, foot, which
 
 
 @njit(cache=True)
-def _nearest(points, starts, ends, distance, foot, which):
-    n, d = points.shape
-    for i in range(n):
+def _nearest(points, starts, ends, axes, distance, foot, which):
+    d = len(axes)
+    for i in range(points.shape[0]):
         best, share, which[i] = np.inf, 0.0, -1
         for k in range(starts.shape[0]):
             along, length2 = 0.0, 0.0
