@@ -14,7 +14,7 @@ from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError
-from verify.judge.stress_intensity import solution_intensity
+from verify.judge.stress_intensity import Found, solution_intensity
 from verify.scene import Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,
@@ -48,7 +48,8 @@ class Measured:
         cut: RealisedCut | None = None,
     ) -> None:  # fmt: skip
         self.solution, self.body, self.law, self.scene = solution, body, law, scene
-        self.cut, self._factors = cut, {}
+        self.cut = cut
+        self._factors: Found = {}
         self.motion = SolutionMotion(solution, body, continued=True if cut is None else cut)
 
     def continued(self, everywhere: bool) -> SolutionMotion:
