@@ -36,6 +36,12 @@ class Solved:
         return Ending(0, 0.0, 0.0)
 
 
+@pytest.fixture
+def solved_here(monkeypatch):
+    """Let a solver that neither crashes nor hangs solve in this process."""
+    monkeypatch.setattr(trials, "_start", Solved)
+
+
 AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it can fail
 
 
@@ -74,7 +80,6 @@ AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it ca
         ("SaysTooFast", "energy-in-motion", "not the rates of its displacements"),
         ("KnowsOnlyUpright", "mirrored-cut", "discretisation"),
         ("DependsOnNumbers", "renumbering", ""),
-        ("Noisy", "repeatability", "not equal bit by bit"),
         pytest.param("Remembers", "repeatability", "not equal bit by bit", marks=AGAIN),
         pytest.param("LosesAPiece", "cut-patch", "do not cover the body", marks=AGAIN),
         ("AnswersAnything", "free-piece", "nothing holds a piece"),
@@ -82,7 +87,7 @@ AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it ca
     ],
 )
 def test_a_fault_breaks_the_check_that_is_there_for_it(solver, check, said, monkeypatch):
-    if check != "repeatability":  # the others neither crash nor ask what another process does
+    if check != "repeatability":  # that asks what another process does
         monkeypatch.setattr(trials, "_start", Solved)
     found = state(solver, check)[check]
     assert found.state is State.FAIL
@@ -136,10 +141,12 @@ def test_a_solver_that_leaves_cuts_out_fails_where_they_meet():
         assert found.state is State.FAIL, found
 
 
+@pytest.mark.usefixtures("solved_here")
 def test_a_solver_that_states_the_energy_of_its_field_keeps_its_account():
     assert state("Stating", "energy-account")["energy-account"].state is State.PASS
 
 
+@pytest.mark.usefixtures("solved_here")
 def test_a_loss_of_three_thousandths_is_measured_as_that():
     names = ["energy-in-motion", "work-of-supports"]
     for name, found in state("LosesEnergySlowly", *names).items():
@@ -168,6 +175,8 @@ def test_noise_far_below_the_errors_breaks_repeatability_only():
     found = state("Noisy", "uncut-2d", "cut-patch", "repeatability")
     assert found["uncut-2d"].state is found["cut-patch"].state is State.PASS
     assert found["repeatability"].state is State.FAIL
+    assert "not equal bit by bit" in found["repeatability"].reason
+    assert exit_code_of(list(found.values())) == 1
 
 
 def test_a_crash_is_a_finding_and_the_checks_after_it_still_run():
@@ -186,6 +195,7 @@ def test_a_solver_that_hangs_is_stopped_and_the_checks_after_it_still_run():
     assert found["uncut-3d"].state is State.PASS
 
 
+@pytest.mark.usefixtures("solved_here")
 def test_a_solver_that_refuses_everything_has_shown_nothing():
     found = state("DoesNothing", "uncut-2d", "cut-patch", "refusals")
     assert found["cut-patch"].state is State.REFUSED
