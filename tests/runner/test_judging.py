@@ -9,9 +9,11 @@ import pytest
 
 from verify.compare.error_field import nodal_error
 from verify.compare.locate import SolutionField
+from verify.judge import accuracy
 from verify.records import ReferenceRecord
 from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
-from verify.runner import exit_code
+from verify.runner import exit_code, judging
+from verify.runner.directory import MEASURED
 from verify.runner.solve import solve_job
 from verify.scene import load_scene, scene_content
 from verify.solution import Solution
@@ -104,6 +106,40 @@ def test_changed_acceptance_is_judged_again_without_solving(verify):
     case.write_text(case.read_text().replace("at_most = 1e-10", "at_most = 10.0"))
     assert verdicts(verify(*command, COUNT_SOLVES=str(solves)))[WRONG][0] == "PASS"
     assert len(solves.read_text().splitlines()) == 2
+
+
+def test_a_comparison_that_was_stopped_goes_on_at_the_solve_that_it_was_at(verify, monkeypatch):
+    """No finished pair of solution and reference is measured twice, and the result is the same."""
+    with_checks(verify, check())
+    assert verify(*BESIDE).returncode == 1
+    (question,) = verify.folder.glob("out/cases/*/judge.json")
+    folder, measure, calls = question.parent, accuracy._measure, []
+    whole = json.loads((folder / "result.json").read_text())
+    assert not (folder / MEASURED).exists()  # it is over
+    (folder / "judged.json").unlink()
+
+    def stopped(record, *others):
+        calls.append((record.solver, record.level))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return measure(record, *others)
+
+    monkeypatch.setattr(judging, "die_with_parent", lambda: None)
+    monkeypatch.setattr(accuracy, "_measure", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        judging.main(question)
+    assert len(calls) == 3
+    judging.main(question)
+    assert sorted(set(calls)) == sorted([*calls[:2], *calls[3:]])  # the third once more
+    assert calls[2] == calls[3]
+    assert json.loads((folder / "result.json").read_text()) == whole
+    # of another key nothing is taken
+    (folder / MEASURED).mkdir()
+    kept = judging._Measurements(folder, "one")
+    kept.keep(SolveRecord("c", INSTANT, 0, Status.SOLVED))
+    assert kept.measured(SolveRecord("c", INSTANT, 0, Status.SOLVED)) is not None
+    other = judging._Measurements(folder, "two")
+    assert other.measured(SolveRecord("c", INSTANT, 0, Status.SOLVED)) is None
 
 
 def result(verdicts=(), statuses=()):

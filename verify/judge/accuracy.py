@@ -6,6 +6,7 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -68,12 +69,25 @@ _ON_SURFACE = 0.01  # of the size of a membrane: so far apart two triangulations
 _SAME_TIME = 1e-6  # of the duration
 
 
+class Kept(Protocol):
+    """Measured solves of a comparison that may be stopped."""
+
+    def measured(self, record: SolveRecord) -> SolveRecord | None:
+        """Return a solve as it was measured before, or None."""
+        ...
+
+    def keep(self, record: SolveRecord) -> None:
+        """Keep a solve that was measured."""
+        ...
+
+
 def assess_accuracy(
     scene: Scene,
     records: Sequence[SolveRecord],
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None = None,
     announce: Callable[[SolveRecord], None] = lambda record: None,
+    kept: Kept | None = None,
 ) -> CaseResult:
     """Measure all solutions of a case.
 
@@ -89,6 +103,8 @@ def assess_accuracy(
         The exact solution that the scene names.
     announce : callable
         Is told of each solve before it is measured.
+    kept : Kept, optional
+        Solves that were measured before a comparison was stopped; those measured now are added.
 
     Returns
     -------
@@ -114,16 +130,24 @@ def assess_accuracy(
         own = {i: s for i in rows if (s := _solved(records[i], solutions)) is not None}
         if body is None:
             measured = [_noted(r, _named(scene, missing)) for r in measured]
-        elif own:
+            continue
+        before = {i: one for i in own if kept and (one := kept.measured(records[i])) is not None}
+        for i, one in before.items():
+            measured[i] = one
+        if len(before) < len(own):
             # the same points for all solvers of a level: their errors are compared
             finest = min(compared_size(s, body) for s in own.values())
             rules = Rules(body, finest, 3 if reference else 1)
             judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
             for i, solution in own.items():
+                if i in before:
+                    continue
                 announce(records[i])
                 try:
-                    one = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
-                    measured[i] = _measure(records[i], one, judge_of, missing, rules, exact)
+                    here = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
+                    measured[i] = _measure(records[i], here, judge_of, missing, rules, exact)
+                    if kept:
+                        kept.keep(measured[i])
                 except Exception as problem:  # a fault of the comparison costs this solve alone
                     traceback.print_exception(problem)  # for the log
                     why = one_line(f"{type(problem).__name__}: {problem}")

@@ -31,7 +31,7 @@ from verify.whole_files import asked_place
 RUN_SCHEMA = 1
 # files by which a process says what is needed if it dies: the solve that a comparison is at, and
 # how many levels a solver has that takes the case
-JUDGING, LEVELS = "judging", "levels"
+JUDGING, MEASURED, LEVELS = "judging", "measured", "levels"
 _IDENTITY = ("cases", "options_of_result")
 
 

@@ -8,8 +8,9 @@ was compared.
 import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,15 @@ from verify.result import (
     error_picture,
 )
 from verify.result_files import write_result
-from verify.runner.directory import JUDGING, check_files, folder_name, load_record
+from verify.runner.directory import (
+    JUDGING,
+    MEASURED,
+    check_files,
+    folder_name,
+    load_record,
+    record_of,
+)  # fmt: skip
+from verify.runner.fingerprint import digest_of
 from verify.runner.mesh_faults import mesh_notices
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
@@ -63,7 +72,8 @@ def main(question_file: Path) -> None:
         for record, name in zip(records, question["folders"], strict=True)
     ]
     exact = exact_of(scene)
-    measured = assess_accuracy(scene, records, solutions, exact, announce)
+    kept = _Measurements(folder, digest_of([question["key"], sorted(unfit)]))
+    measured = assess_accuracy(scene, records, solutions, exact, announce, kept)
     solutions = _comparable(measured, solutions)
     measured = _with_openings(measured, scene, solutions, exact, announce)
     (folder / JUDGING).unlink(missing_ok=True)
@@ -80,6 +90,35 @@ def main(question_file: Path) -> None:
     result = replace(result, pictures={**result.pictures, **pictures})
     write_result(result, folder / "result.json")
     write_json({"key": question["key"]}, folder / "judged.json")
+    rmtree(folder / MEASURED, ignore_errors=True)
+
+
+class _Measurements:
+    """Solves measured by a comparison, kept in the folder of its case until that has ended.
+
+    A comparison that was killed so goes on at the solve that it was at. What it kept holds for the
+    same `key` only: the same solves, demands and code, and the same solves left out.
+    """
+
+    def __init__(self, folder: Path, key: str) -> None:
+        self._folder, self._key = folder / MEASURED, key
+
+    def measured(self, record: SolveRecord) -> SolveRecord | None:
+        """Return a solve as it was measured before, or None."""
+        where = self._file(record)
+        try:
+            content = read_json(where)
+            return record_of(content["record"], str(where)) if content["key"] == self._key else None
+        except (InputError, KeyError, TypeError):
+            return None
+
+    def keep(self, record: SolveRecord) -> None:
+        """Keep a solve that was measured."""
+        self._folder.mkdir(exist_ok=True)
+        write_json({"key": self._key, "record": asdict(record)}, self._file(record))
+
+    def _file(self, record: SolveRecord) -> Path:
+        return self._folder / f"{folder_name(record.solver)}-{record.level}.json"
 
 
 def _stored(
