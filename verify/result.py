@@ -196,7 +196,7 @@ class Rate:
         Half-width from the spread of the levels and the reference's uncertainty.
     reason : str
         Empty if the order means something; else ``"floor"`` (errors at round-off or at the
-        reference's uncertainty), ``"oscillating"``, ``"rising"`` or ``"slowing"`` slopes,
+        reference's uncertainty), ``"oscillating"``, ``"uneven"``, ``"rising"``, ``"slowing"``,
         ``"diverging"``, ``"too few levels"``, followed by the numbers that say so.
     pairwise : list of float
         Slope between each pair of successive levels.

@@ -58,7 +58,7 @@ def of_slopes(*slopes):
         ([0.1, 0.2, 0.3, 0.4], 0.0, "diverging"),
         ([0.1, 0.05, 0.07, 0.01], 0.0, "oscillating"),
         # a tip that lies elsewhere in its element on every level
-        (of_slopes(1.25, 1.99, 1.09), 0.0, "oscillating"),
+        (of_slopes(1.25, 1.99, 1.09), 0.0, "uneven"),
         (of_slopes(0.5, -0.2, 0.4), 0.0, "oscillating"),
         (of_slopes(0.29, 0.08, 0.01), 0.0, "slowing"),
         (of_slopes(0.10, -0.02), 0.0, "slowing"),

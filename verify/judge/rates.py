@@ -82,7 +82,8 @@ def observed_rate(
             )
     if all(b < a for a, b in pairwise(slopes)):
         return replace(without(f"slowing: slopes {shown}"), uncertainty=spread)
-    what = "rising" if all(b > a for a, b in pairwise(slopes)) else "oscillating"
+    what = "oscillating" if min(slopes) < 0 else "uneven"
+    what = "rising" if all(b > a for a, b in pairwise(slopes)) else what
     return without(f"{what}: slopes {shown}, so that the last says little about the next")
 
 

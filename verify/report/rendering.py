@@ -8,7 +8,6 @@ is read back by the process that asked for it, and by nobody else.
 import pickle
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from time import sleep
@@ -97,7 +96,7 @@ def _written(run: Run, directory: Path, drawings: Path | None) -> tuple[Path, di
     palette, cases = run_palette(run.record), []
     for index, entry in enumerate(run.entries):
         made = drawn_before(drawings / f"{entry.folder.name}.pickle", palette) if drawings else None
-        cases.append((made or drawn_case(run.root, index, entry, palette)).view)
+        cases.append((made or drawn_case(run.root, index, entry, palette))[0])
     pictures = [case.pictures for case in cases]
     notes: list[str] = []
 
@@ -154,12 +153,8 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
 _LOOK_SECONDS = 0.02
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A case as the page shows it, and the styles that its figures give labels."""
-
-    view: CaseView
-    styles: dict[str, Style]
+# a case as the page shows it, and the styles that its figures give labels
+Drawn = tuple[CaseView, dict[str, Style]]
 
 
 def main(folder: Path) -> NoReturn:
@@ -191,7 +186,7 @@ def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Dr
             picture.image = draw(picture.body, picture.view)
     except Exception as error:
         pictures = CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
-    return Drawn(case_view(index, entry, pictures, palette), dict(palette))
+    return case_view(index, entry, pictures, palette), dict(palette)
 
 
 def drawn_before(file: Path, palette: Palette) -> Drawn | None:
@@ -200,7 +195,7 @@ def drawn_before(file: Path, palette: Palette) -> Drawn | None:
         drawn: Drawn = pickle.loads(file.read_bytes())  # our own, in a folder of this process
     except (OSError, EOFError, pickle.UnpicklingError):
         return None
-    same = all(palette[label] == style for label, style in drawn.styles.items())
+    same = all(palette[label] == style for label, style in drawn[1].items())
     return drawn if same else None
 
 
