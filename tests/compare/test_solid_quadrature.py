@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
@@ -119,20 +121,25 @@ def test_an_inverse_square_root_at_a_front_is_integrated():
     assert rule.weights @ r**-0.5 == pytest.approx(exact, rel=1e-4)
 
 
-def test_a_body_given_by_tetrahedra_has_its_volume_and_its_cut_its_area(tmp_path):
+def body_from_a_file(folder, polygon):
+    """The cube as tetrahedra of a file, with a cut."""
     import meshio
 
     points, cells = cube_grid(3, 3, 3)
-    meshio.Mesh(points, [("tetra", cells)]).write(tmp_path / "cube.vtu")
-    case = tmp_path / "case.toml"
+    meshio.Mesh(points, [("tetra", cells)]).write(folder / "cube.vtu")
+    case = folder / "case.toml"
     case.write_text(
         'title = "t"\nrequirement = "it shall hold"\n'
         '[geometry]\nkind = "file"\nfile = "cube.vtu"\ndimension = 3\n'
         '[mesh]\npattern = "given"\n[material]\nyoung = 1.0\npoisson = 0.3\n'
         '[[supports]]\nwhere = "z < 1e-9"\ndisplacement = [0.0, 0.0, 0.0]\n'
-        f'[[cuts]]\nkind = "polygon"\npoints = {inclined()["points"]}\n'
+        f'[[cuts]]\nkind = "polygon"\npoints = {polygon}\n'
     )
-    body = body_of(load_scene(case))
+    return body_of(load_scene(case))
+
+
+def test_a_body_given_by_tetrahedra_has_its_volume_and_its_cut_its_area(tmp_path):
+    body = body_from_a_file(tmp_path, inclined()["points"])
     rule = body_rule(body, 0.2)
     assert rule.weights.sum() == pytest.approx(1, abs=1e-13)
     above = rule.points[:, 2] > height(rule.points)
@@ -141,3 +148,22 @@ def test_a_body_given_by_tetrahedra_has_its_volume_and_its_cut_its_area(tmp_path
     # no plane to clip at: to the cells on the border, a 16th of the spacing
     assert area == pytest.approx(np.sqrt(1 + 1 / 9 + 1 / 25), rel=5e-3)
     assert not len(body.front)
+
+
+def test_what_a_cut_costs_does_not_depend_on_how_far_it_reaches_beyond_the_body(tmp_path):
+    """Outside the body cells are halved on the way to it alone: a few at each halving."""
+    asked, areas = [], []
+    for times in (1.0, 16.0, 256.0):
+        centre = np.array([0.5, 0.5, 0.5])
+        polygon = centre + times * (np.array(inclined()["points"]) - centre)
+        body = body_from_a_file(tmp_path, polygon.tolist())
+        seen = []
+
+        def counted(points, inside=body.inside, seen=seen):
+            seen.append(len(points))
+            return inside(points)
+
+        areas.append(surface_rule(replace(body, inside=counted), 0.1).weights.sum())
+        asked.append(sum(seen))
+    assert areas == pytest.approx([np.sqrt(1 + 1 / 9 + 1 / 25)] * 3, rel=5e-3)
+    assert max(asked) < 2 * asked[0]
