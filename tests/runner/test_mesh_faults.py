@@ -200,7 +200,9 @@ def test_hanging_nodes_are_counted(tmp_path, kind, count):
     text = found(tmp_path, kind, turned(kind, joined(coarse, fine), 7))
     assert f"is not joined where {count} nodes hang on facets" in text
     # it stands beside the verdicts too
-    (notice,) = mesh_notices(load_scene(tmp_path / "case.toml"))
+    # beside it the record says which cells were turned
+    notice, *beside = mesh_notices(load_scene(tmp_path / "case.toml"))
+    assert all("are turned" in one.text for one in beside)
     assert (notice.kind, notice.text) == (NoticeKind.WARNING, text)
 
 
