@@ -13,7 +13,7 @@ from verify.cli import ranking as runner_ranking
 from verify.cli.ranking import rank_run
 from verify.conformance import CheckResult, State
 from verify.report import plots as figures
-from verify.report.notation import error_text, number, with_interval
+from verify.report.notation import error_text, number, scientific, with_interval
 from verify.report.plots import Palette
 from verify.report.rendering import render
 from verify.report.run_directory import load_run
@@ -70,6 +70,18 @@ def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
         8.0787592969, "8.078757937 ± 1e-05 (relative)", "",
     )  # fmt: skip
     assert check_row(found)[1] == "8.078759"
+
+
+def test_a_value_and_its_limit_have_their_unit_and_powers_of_ten_are_written_alike():
+    found = VerdictRecord(
+        "value", "xfem", "mass_below", Verdict.FAIL, -24.4972870, -24.4972870, -24.4972870,
+        "-24.5 ± 1e-07 (relative)", "off by 1.11e-04 (relative)",
+    )  # fmt: skip
+    _, observed, limit, verdict = check_row(found, "N s/m")
+    assert observed == "−24.4973 N s/m"  # what it is off by can be seen, and no more
+    assert limit == "-24.5 N s/m ± 10⁻⁷ (relative)"
+    assert verdict.note == "off by 1.11×10⁻⁴ (relative)"
+    assert scientific("plane[epsilon=1e-12] of 2.50e+03") == "plane[epsilon=1e-12] of 2500"
 
 
 LEAST, MOST = (0.9, 0.5, 0.1), (1e3, 1e4, 1e6)
