@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verify.runner.job import Job
+from verify.runner.directory import Job
 from verify.runner.references import BESIDE, bundle_of_case
 from verify.scene import case_folder, load_scene
 from verify.solution import read_solution
