@@ -1,5 +1,6 @@
 """Claims about time: repeated beside other programs, then undecided; wrong on a quiet machine."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -29,13 +30,20 @@ def test_claim(fresh):
 """
 
 
+@pytest.fixture(autouse=True)
+def _inner_session(monkeypatch):
+    """Bring back the variable that the inner session sets and leaves to a folder that is gone."""
+    monkeypatch.setenv("VERIFY_CACHE", os.environ["VERIFY_CACHE"])
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # most of what a session takes
+
+
 def run(pytester, taken, passes, breaks=False):
     """Run the claim where other programs take so many cores."""
     clock = f"\ndef time_of_others():\n    return {taken} * time.monotonic()\n"
     pytester.makeconftest(CONFTEST + clock)
     pytester.makeini("[pytest]\nmarkers = timing: claims about time\n")
     pytester.makepyfile(CLAIM.format(passes=passes, breaks=breaks))
-    found = pytester.runpytest_subprocess("-rs", "-p", "no:cacheprovider")
+    found = pytester.runpytest_inprocess("-rs", "-p", "no:cacheprovider")
     return found, len((pytester.path / "calls").read_text())
 
 

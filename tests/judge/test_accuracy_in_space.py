@@ -23,7 +23,7 @@ def interpolant(n, flip=False):
     return Solution(points, cells.astype(np.int64), u[None], size=1 / n, unknowns=3 * len(points))
 
 
-LEVELS = {0: interpolant(4), 1: interpolant(6), 2: interpolant(10)}
+LEVELS = {0: interpolant(4), 1: interpolant(6), 2: interpolant(8)}
 
 
 def assess(checks, solvers, exact=None, **more):
