@@ -2,8 +2,8 @@
 
 A node is let go when its cut begins to be swept. The force that has held it is then multiplied by
 1 − s, with s(t) the swept share of ∫ N dA over the cut in its support: nothing is late, as s is a
-half when the blade is in the middle. Integrals run over simplices so small that the time of the
-blade is linear in each; every one is swept at a constant rate.
+half when the blade is in the middle. Integrals are exact where the time of the blade is linear over
+a simplex of the cut: on straight parts of a path at one speed. Other cuts are divided.
 """
 
 from collections.abc import Callable
@@ -19,6 +19,7 @@ Numbers = NDArray[np.int64]
 
 _DIVISIONS = 6  # of each edge of a simplex of the cut
 _STILL = 1e-30  # s: a simplex that is swept at once
+_LINEAR = 1e-13  # of the longest time in which a simplex is swept
 
 
 class CutSimplices(NamedTuple):
@@ -69,29 +70,28 @@ class Fading:
     ----------
     row : (e,) int array
         Which of the forces each swept simplex belongs to.
-    begin, end : (e,) array
-        When it is swept, s.
-    weight : (e,) array
-        Share of what was not swept yet at the start.
+    times : (e, k) array
+        When the blade is at its corners, s, ascending.
+    values : (e, k) array
+        Shape function there, times the measure of the simplex, over ∫ N dA of what was not swept
+        yet at the start.
     count : int
         Number of forces.
     """
 
     row: Numbers
-    begin: Array
-    end: Array
-    weight: Array
+    times: Array
+    values: Array
     count: int
 
     def at(self, time: float) -> Array:
         """Return the factors (count,) at a time."""
-        left = self.weight * (1.0 - _passed(self.begin, self.end, time))
-        return np.bincount(self.row, left, self.count)
+        return np.bincount(self.row, _left(self.times, self.values, time), self.count)
 
     @cached_property
     def last(self) -> float:
         """Time from which on all are zero, s."""
-        return float(self.end.max(initial=-np.inf))
+        return float(self.times.max(initial=-np.inf))
 
 
 class SweptShares:
@@ -102,14 +102,15 @@ class SweptShares:
     pieces : int
         Number of pieces.
     divisions : int
-        Of each edge of a simplex of the cut; one where nothing is asked but when it is passed.
+        Of each edge of a simplex of a cut over which the time is not linear; one where nothing is
+        asked but when it is passed.
     by_node : bool
         Whether nodes are let go one by one, or as soon as all pieces at them are open.
     """
 
     def __init__(self, pieces: int, divisions: int = _DIVISIONS, by_node: bool = False) -> None:
         self._pieces, self._divisions, self._by_node_alone = pieces, divisions, by_node
-        self._parts: list[tuple[Numbers, Numbers, Array, Array, Array]] = []
+        self._parts: list[tuple[Numbers, Array, Array, Array]] = []
 
     @property
     def used(self) -> bool:
@@ -126,14 +127,22 @@ class SweptShares:
             When the blade is at points (n, d) of the cut, s.
 
         """
-        inside, parts = _divided(cut.points.shape[1], self._divisions)
+        corners = cut.points.shape[1]
+        inside, parts = _divided(corners, self._divisions)
         points = inside @ cut.points
-        times = passed_at(points.reshape(-1, points.shape[2])).reshape(points.shape[:2])[:, parts]
+        times = passed_at(points.reshape(-1, points.shape[2])).reshape(points.shape[:2])
+        if self._divisions > 1:
+            whole = _divided(corners, 1)
+            at_corners = passed_at(cut.points.reshape(-1, points.shape[2])).reshape(-1, corners)
+            off = np.abs(times - at_corners @ inside.T).max(initial=0.0)
+            if off <= _LINEAR * np.ptp(times, axis=1).max(initial=0.0):
+                (inside, parts), times = whole, at_corners @ whole[0].T
+        times = times[:, parts]
         begin, end = times.min(axis=2), times.max(axis=2)
-        shape = (inside[parts].mean(axis=1) @ cut.shape) / len(parts)
-        weight = shape * measures(cut.points)[:, None, None]
-        nodes = np.broadcast_to(cut.node[:, None], weight.shape)
-        held = weight > 0.0
+        values = np.einsum("skc,qcn->qsnk", inside[parts], cut.shape)
+        values *= (measures(cut.points) / len(parts))[:, None, None, None]
+        nodes = np.broadcast_to(cut.node[:, None], values.shape[:3])
+        held = values.max(axis=3) > 0.0
         count = int(cut.node.max(initial=-1)) + 1
 
         starts = np.full(count, np.inf)
@@ -146,9 +155,11 @@ class SweptShares:
             free = np.full(count, -np.inf)
             np.maximum.at(free, cut.node, np.broadcast_to(let_go[cut.piece, None], cut.node.shape))
 
-        moments = (np.broadcast_to(x[..., None], held.shape)[held] for x in (begin, end))
-        node = nodes[held]
-        self._parts.append((node, free[node], *moments, weight[held]))  # type: ignore[arg-type]
+        node, order = nodes[held], np.argsort(times, axis=2)[:, :, None]
+        sorted_times = np.take_along_axis(times[:, :, None], order, axis=3)
+        values = np.take_along_axis(values, order, axis=3)[held]
+        moments = np.broadcast_to(sorted_times, (*held.shape, corners))[held]
+        self._parts.append((node, free[node], moments, values))
         return Passage(let_go, passed, starts[cut.node])
 
     def fading(self, nodes: Numbers, since: float, close: float = 0.0) -> Fading:
@@ -166,31 +177,52 @@ class SweptShares:
         close : float
             Times that differ by no more are one, s.
         """
-        free, begin, end, weight, first = self._by_node
+        free, times, values, first = self._by_node
         known = np.minimum(nodes, len(first) - 2)
         size = np.where(nodes == known, first[known + 1] - first[known], 0)
         row = np.repeat(np.arange(len(nodes)), size)
         entry = first[known][row] + np.arange(len(row)) - np.repeat(np.cumsum(size) - size, size)
-        left = (free[entry] <= since + close) & (end[entry] > since)
+        left = (free[entry] <= since + close) & (times[entry, -1] > since)
         entry, row = entry[left], row[left]
-        begin, end, weight = begin[entry], end[entry], weight[entry]
-        total = np.bincount(row, weight * (1.0 - _passed(begin, end, since)), len(nodes))
-        return Fading(row, begin, end, weight / total[row], len(nodes))
+        times, values = times[entry], values[entry]
+        total = np.bincount(row, _left(times, values, since), len(nodes))
+        return Fading(row, times, values / total[row, None], len(nodes))
 
     @cached_property
-    def _by_node(self) -> tuple[Array, Array, Array, Array, Numbers]:
-        """When a node is free, and begin, end and weight of all simplices; the first of a node."""
+    def _by_node(self) -> tuple[Array, Array, Array, Numbers]:
+        """When a node is free, times and values of all simplices; the first of a node."""
         node, *columns = (np.concatenate(one) for one in zip(*self._parts, strict=True))
         order = np.argsort(node, kind="stable")
         first = np.searchsorted(node[order], np.arange(int(node.max(initial=-1)) + 2))
-        free, begin, end, weight = (column[order] for column in columns)
-        return free, begin, end, weight, first
+        free, times, values = (column[order] for column in columns)
+        return free, times, values, first
 
 
-def _passed(begin: Array, end: Array, time: float) -> Array:
-    """Return the share (e,) of each simplex that is swept at a time."""
-    share = (time - begin) / np.maximum(end - begin, _STILL)
-    return np.clip(share, 0.0, 1.0)
+def _left(times: Array, values: Array, time: float) -> Array:
+    """Integral (e,) of a linear function over what is not swept yet of simplices at a time.
+
+    Of a triangle that is, from the middle corner on, the triangle at the last corner, and before
+    all but the one at the first.
+
+    Parameters
+    ----------
+    times, values : (e, k) array
+        At the corners, ascending in time; values times the measure of the simplex.
+    time : float
+    """
+    first, last = times[:, :1], times[:, -1:]
+    still = np.clip((last - time) / np.maximum(last - times[:, :-1], _STILL), 0.0, 1.0)
+    end = values[:, -1]
+    if times.shape[1] == 2:
+        share = still[:, 0]
+        return share * (end + 0.5 * share * (values[:, 0] - end))
+    gone = np.clip((time - first) / np.maximum(times[:, 1:] - first, _STILL), 0.0, 1.0)
+    begin = values[:, 0]
+    behind = gone * (values[:, 1:] - begin[:, None])
+    ahead = still * (values[:, :-1] - end[:, None])
+    swept = gone.prod(axis=1) * (begin + behind.sum(axis=1) / 3.0)
+    left = still.prod(axis=1) * (end + ahead.sum(axis=1) / 3.0)
+    return np.where(time < times[:, 1], values.mean(axis=1) - swept, left)
 
 
 def _divided(corners: int, n: int) -> tuple[Array, Numbers]:
