@@ -219,9 +219,8 @@ def find_cells(
     """
     found = np.full(len(points), -1)
     some = directions if len(directions) == len(points) else points
-    either = np.zeros(wanted.shape[1], dtype=wanted.dtype)
     _find_cells(
-        points, some, some is directions, wanted, either, searched, sides, tolerance, nearest,
+        points, some, some is directions, wanted, searched, sides, tolerance, nearest,
         _axes(points.shape[1]), found,
     )  # fmt: skip
     return found
@@ -229,10 +228,10 @@ def find_cells(
 
 @njit(cache=True)
 def _find_cells(
-    points, directions, sided, wanted, either, searched, sides, tolerance, nearest, axes, found
+    points, directions, sided, wanted, searched, sides, tolerance, nearest, axes, found
 ):
     _, _, _, corners, normals, _ = searched
-    stack = np.empty(64, dtype=np.int64)
+    stack, either = np.empty(64, dtype=np.int64), np.zeros(wanted.shape[1], dtype=wanted.dtype)
     cell = -1
     for i in range(len(points)):
         wish = wanted[i]
@@ -281,17 +280,15 @@ def evaluate_quadratic(
     n, d = points.shape
     u, grad = np.empty((n, d)), np.empty((n, d, d))
     _evaluate_quadratic(
-        points, found, nodes, values, corners, gradients, _axes(d), np.empty(d + 1), np.empty(d),
-        u, grad,
+        points, found, nodes, values, corners, gradients, _axes(d), u, grad
     )  # fmt: skip
     return u, grad
 
 
 @njit(cache=True)
-def _evaluate_quadratic(
-    points, found, nodes, values, corners, gradients, axes, weight, slope, u, grad
-):
+def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, u, grad):
     d = len(axes)
+    weight, slope = np.empty(d + 1), np.empty(d)
     for i in range(points.shape[0]):
         cell = found[i]
         for k in range(d + 1):
