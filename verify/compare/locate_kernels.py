@@ -279,34 +279,33 @@ def evaluate_quadratic(
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape
     u, grad = np.empty((n, d)), np.empty((n, d, d))
-    _evaluate_quadratic(
-        points, found, nodes, values, corners, gradients, _axes(d), u, grad
-    )  # fmt: skip
+    axes, vertices = _axes(d), _axes(corners.shape[1])  # a triangle in space has three of each
+    _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad)
     return u, grad
 
 
 @njit(cache=True)
-def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, u, grad):
-    d = len(axes)
-    weight, slope = np.empty(d + 1), np.empty(d)
+def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad):
+    d, count = len(axes), len(vertices)
+    weight, slope = np.empty(count), np.empty(d)
     for i in range(points.shape[0]):
         cell = found[i]
-        for k in range(d + 1):
+        for k in range(count):
             weight[k] = 0.0
             for a in range(d):
-                from_facet = points[i, a] - corners[cell, (k + 1) % (d + 1), a]
+                from_facet = points[i, a] - corners[cell, (k + 1) % count, a]
                 weight[k] += gradients[cell, k, a] * from_facet
         for c in range(d):
             u[i, c] = 0.0
             for a in range(d):
                 grad[i, c, a] = 0.0
-        for k in range((d + 1) * (d + 2) // 2):
-            if k <= d:
+        for k in range(count * (count + 1) // 2):
+            if k < count:
                 shape, factor = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
                 for a in range(d):
                     slope[a] = factor * gradients[cell, k, a]
             else:  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
-                edge = k - d - 1
+                edge = k - count
                 p = edge if edge < 3 else edge - 3
                 q = (edge + 1) % 3 if edge < 3 else 3
                 shape = 4.0 * weight[p] * weight[q]
