@@ -4,6 +4,7 @@ from cut_meshes import cube, grid, layered, quadratic, solution
 
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
+from verify.solution import Solution
 
 RNG = np.random.default_rng(1)
 
@@ -88,3 +89,21 @@ def test_gradients_in_sliver_cells_lose_no_more_than_round_off_over_height(thin,
 def test_a_body_pressed_to_nothing_has_a_tree_without_cells(d):
     tree = build_cell_tree(*np.full((2, 5, d), np.nan))
     assert (tree.cells < 0).all()
+
+
+def test_a_quadratic_field_on_a_quadratic_triangle_in_space_is_reproduced_along_it():
+    """Three corners and six nodes, not four and ten: values, and slopes along the surface."""
+    corners = np.array([[0.1, 0.2, 0.0], [1.3, 0.1, 0.4], [0.3, 1.1, 0.7]])
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    points, form = np.vstack([corners, middles]), np.random.default_rng(4).normal(size=(3, 3, 3))
+
+    def exact(x):
+        return np.einsum("cab,na,nb->nc", form, x, x)
+
+    field = SolutionField(Solution(points, np.arange(6)[None], exact(points)[None], order=2))
+    inside = np.random.default_rng(5).dirichlet(np.ones(3), 20) @ corners
+    u, gradient = field.evaluate(inside)
+    assert u == pytest.approx(exact(inside), abs=1e-13)
+    slope = np.einsum("cab,nb->nca", form + form.swapaxes(1, 2), inside)
+    for along in corners[1:] - corners[0]:
+        assert gradient @ along == pytest.approx(slope @ along, abs=1e-12)
