@@ -147,3 +147,22 @@ def test_what_a_case_expects_of_a_cut_is_no_physics():
     given = [cut, {**cut, "expected": "edge"}, {**cut, "points": [[-0.1, 0.5], [0.5, 0.53]]}]
     plain, expecting, other = (fingerprint.physics_digest(scenes.scene([one])) for one in given)
     assert plain == expecting != other
+
+
+def test_a_reference_that_opened_late_by_default_is_that_of_another_scene():
+    """Bundles from before the default was `swept` do not judge what opens so now."""
+    blade = {"kind": "tool_path", "points": [[-0.1, 0.5], [0.5, 0.52]], "times": [0.0, 1.0]}
+    motion = {"kind": "dynamic", "duration": 1.0, "time_step": 0.1}
+    swept, late = (
+        scenes.scene(
+            [blade], analysis={**motion, "opening": rule}, material=scenes.soft(density=1.0)
+        )
+        for rule in ("swept", "late")
+    )
+    words = {"title", "requirement", "tags", "acceptance", "known_findings", "contact", "adequacy"}
+    stored = swept.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
+    for cut in stored["cuts"]:
+        cut.pop("expected", None)
+    before = fingerprint.digest_of([swept.schema_, stored])
+    now, other = fingerprint.physics_digest(swept), fingerprint.physics_digest(late)
+    assert len({before, now, other}) == 3

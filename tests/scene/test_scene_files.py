@@ -47,6 +47,13 @@ def test_a_scene_survives_the_way_to_another_process(tmp_path):
     assert (restored.name, restored.file) == (scene.name, scene.file)
 
 
+def test_a_static_scene_written_when_cuts_opened_late_by_default_is_read(tmp_path):
+    scene = load(tmp_path, WHOLE)
+    content = json.loads(json.dumps(scene_content(scene)))
+    content["scene"]["analysis"]["opening"] = "late"
+    assert restore_scene(content) == scene
+
+
 def test_the_schema_knows_every_key_and_forbids_others():
     schema = scene_schema()
     assert set(schema["properties"]) == {

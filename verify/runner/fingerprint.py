@@ -76,6 +76,9 @@ def physics_digest(scene: Scene) -> str:
     words["cuts"] = {"__all__": {"expected"}}
     physics = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     content: list[Any] = [scene.schema_, physics]
+    if any(cut.on_the_way for cut in scene.cuts):
+        # its default was another: what was stored under no word is what opened late
+        content.append({"opening": scene.analysis.opening})
     if isinstance(scene.geometry, MeshFile):
         content.append(file_digest(mesh_path(scene)))
     if scene.exact is not None:

@@ -202,8 +202,13 @@ def scene_content(scene: Scene) -> dict[str, Any]:
 
 
 def restore_scene(content: dict[str, Any]) -> Scene:
-    """Read the scene that `scene_content` wrote down."""
-    scene = Scene.model_validate(content["scene"])
+    """Read the scene that `scene_content` wrote down, by an older version too."""
+    written = content["scene"]
+    analysis = written.get("analysis", {})
+    if analysis.get("kind", "static") == "static":  # written with defaults: they were others
+        analysis = {key: value for key, value in analysis.items() if key != "opening"}
+        written = {**written, "analysis": analysis}
+    scene = Scene.model_validate(written)
     file = Path(content["file"]) if content["file"] else None
     row = Row(**content["row"]) if content.get("row") else None
     scene.came_from(file, content["name"], row)
