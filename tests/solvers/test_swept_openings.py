@@ -15,6 +15,7 @@ from tool_path_scenes import (
     PLANE,
     SPUN,
     UNSTRUCTURED,
+    path_text,
 )
 
 from verify.compare.released import advance
@@ -172,6 +173,23 @@ def test_what_is_let_go_keeps_its_momenta_but_for_the_couple_of_the_forces(tmp_p
     for axis in turning:
         impulse = ledger.get(f"cut_angular_impulse_{axis}", np.zeros(1))
         assert np.ptp(ledger[f"angular_momentum_{axis}"] - impulse) <= 1e-10 * size
+
+
+@pytest.mark.parametrize(
+    ("method", "scheme"), [("xfem", "newmark"), ("virtual_node", "central_differences")]
+)
+def test_the_work_of_each_blade_is_listed_and_they_add_up(tmp_path, method, scheme):
+    """One by one: what the blade that is not there yet has taken is nothing."""
+    first = path_text([[-0.1, 0.21], [1.1, 0.31]], [0.0, 0.12], name="first")
+    later = path_text([[1.1, 0.55], [-0.1, 0.47]], [0.16, 0.28], name="later")
+    pulled = '[initial]\nkind = "equilibrium"\n' + support_text("bottom", [0.0, -0.02])
+    text = UNSTRUCTURED + MOTION + pulled + support_text("top", [0.0, 0.02]) + first + later
+    ledger = solve(tmp_path, method, text, scheme=scheme).ledger
+    both = ledger["cut_work_first"] + ledger["cut_work_later"]
+    size = np.abs(ledger["cut_work"]).max()
+    np.testing.assert_allclose(both, ledger["cut_work"], rtol=0, atol=1e-12 * size)
+    assert ledger["cut_work_first"][1] > 0.0 == ledger["cut_work_later"][1]  # at 0.1 s
+    assert ledger["cut_work_later"][-1] > 0.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -359,3 +377,6 @@ def test_the_account_of_ten_thousand_steps_with_twenty_blades_closes():
     largest = max(largest, np.ptp(ledger["gravity"]))
     assert np.ptp(ledger["total"]) < 1e-12 * largest
     assert (np.diff(ledger["cut_work"]) > 0.0).all()
+    each = np.array([ledger[f"cut_work_cut {k}"] for k in range(20)])
+    assert (each[:, -1] > 0.0).all()
+    np.testing.assert_allclose(each.sum(axis=0), ledger["cut_work"], atol=1e-12 * largest)

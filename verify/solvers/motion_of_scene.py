@@ -208,6 +208,9 @@ class CutMotion:
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
         self._account = StagedAccount(opening.removal)
         self._outputs: list[_Output] = []
+        self._blades = [k for k, cut in enumerate(scene.cuts) if isinstance(cut, ToolPathCut)]
+        self._by_cut = np.zeros(len(scene.cuts))  # energy that each cut has taken, J
+        self._by_cut_put_out: list[_Floats] = []
         self._solves = 0
         start = -np.inf if closed_before else timeline.close
         body = self._made(start, passed=True)
@@ -291,15 +294,23 @@ class CutMotion:
         acceleration = acceleration_of(body, self.state) if linear and alone else None
         self._outputs.append(_Output(body.force.phantom, self.state.copy(), acceleration))
         self._instants.append(self._taken)
+        self._by_cut_put_out.append(self._by_cut.copy())
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""
         if size not in self._integrators:
             self._integrators[size] = self._integrator(size)
+        tie, before = self.body.tie, self.state.displacement.copy()
         with self.record.timed("steps"):
             forces = self._integrators[size].step(self.state)
         with self.record.timed("accounting"):
             self._recorder.record(self.state, forces)
+            if isinstance(tie, TieForces) and len(self._blades) > 1:
+                change, start = self.state.displacement - before, self.state.time - size
+                for share, weight in forces.loaded_at:
+                    self._by_cut += weight * tie.work_by_cut(
+                        change, start + share * size, len(self._by_cut)
+                    )
         self._taken += 1
 
     def _made(self, time: float, passed: bool = False) -> DynamicBody:
@@ -373,9 +384,20 @@ class CutMotion:
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),
             "mass": self._mass(phantom),
-            "ledger": self._account.columns(),
+            "ledger": {**self._account.columns(), **self._work_by_cut()},
             "unknowns": phantom.node_points.size,
         }
+
+    def _work_by_cut(self) -> dict[str, _Floats]:
+        """Share (t,) of each of several blades in ``cut_work``, J.
+
+        None for meshes that are welded along a cut and opened: their pieces lie on no side of it.
+        """
+        sides = self.body.force.phantom.label.shape[1]
+        if len(self._blades) < 2 or sides < len(self.scene.cuts) or not self._by_cut.any():
+            return {}
+        table = np.array(self._by_cut_put_out)
+        return {f"cut_work_{self.scene.cuts[k].name}": table[:, k] for k in self._blades}
 
     def _mass(self, phantom: PhantomMesh) -> str | csr_array:
         """Mass of the corners of the body with all its cuts."""
