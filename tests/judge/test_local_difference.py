@@ -10,8 +10,7 @@ from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
-from verify.judge.local_difference import local_difference
-from verify.judge.quantities import Measured
+from verify.judge.quantities import Measured, local_difference
 from verify.judge.richardson import place_uncertainty
 from verify.solution import Solution
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from verify.compare.body import body_of
-from verify.judge.error_fall import error_fall
-from verify.judge.rates import observed_rate
+from verify.judge.rates import error_fall, observed_rate
 from verify.judge.richardson import extrapolate, field_uncertainty, observed_order
-from verify.judge.time_to_accuracy import time_to_accuracy
+from verify.judge.sufficiency import time_to_accuracy
 from verify.scene import Scene, load_scene
 from verify.solution import Solution
 

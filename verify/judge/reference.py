@@ -28,10 +28,8 @@ from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.error_fall import counted_order, cut_on_the_way, error_fall
-from verify.judge.local_difference import local_difference
-from verify.judge.quantities import Measured, field_quantity
-from verify.judge.rates import ROUND_OFF
+from verify.judge.quantities import Measured, field_quantity, local_difference
+from verify.judge.rates import ROUND_OFF, counted_order, cut_on_the_way, error_fall
 from verify.judge.richardson import (
     Extrapolation,
     extrapolate,
@@ -40,7 +38,7 @@ from verify.judge.richardson import (
     place_uncertainty,
 )
 from verify.judge.stress_intensity import exact_intensity
-from verify.judge.time_to_accuracy import time_to_accuracy
+from verify.judge.sufficiency import time_to_accuracy
 from verify.records import ReferenceRecord
 from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
