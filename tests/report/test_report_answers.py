@@ -89,11 +89,11 @@ def test_the_interval_of_times_holds_the_median_of_other_cases_of_the_same_kind(
 
 
 def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():
-    def moving(name, drift):
+    def moving(name, drift, *more):
         total = [1.0, 1.0 - drift, 1.0 + 2 * drift]
         account = {"time": [0.0, 1.0, 4.0], "total": total}
-        return case(name, solve("xfem", 0, None, metrics=[Metric("energy_drift", 7 * drift, "1")],
-                                account=account))  # fmt: skip
+        metrics = [Metric("energy_drift", 7 * drift, "1"), *more]
+        return case(name, solve("xfem", 0, None, metrics=metrics, account=account))
 
     cases = [moving("calm", 1e-6), moving("wild", 1e-3)]
     assert "XFEM 7.0×10⁻³ (wild)" in answers(cases)[1].sentence.replace("0.0070", "7.0×10⁻³")
@@ -103,6 +103,11 @@ def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():
         (0.25, pytest.approx(3.5e-3)),
         (1.0, pytest.approx(7e-3)),
     ]
+    # what a blade takes is no drift
+    bladed = moving("cut", 0.3, Metric("released_to_cut", 0.2, "N"))
+    said = answers([*cases, bladed])[1].sentence
+    assert "(wild). Left out: 1 case in which a blade takes energy." in said.replace(",", "")
+    assert "a blade takes energy" in answers([bladed])[1].sentence
 
 
 def test_slivers_are_held_against_the_largest_epsilon_and_rows_without_slivers_are_left_out():

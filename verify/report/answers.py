@@ -77,7 +77,10 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
 
 
 def energy(results: Sequence[CaseResult]) -> Answer:
-    """Answer how far the total energy drifts."""
+    """Answer how far the total energy drifts where nothing is to take any.
+
+    A blade takes energy, as the solver says; verdicts on `released_to_cut` judge that.
+    """
     worst: dict[str, tuple[float, float, str]] = {}
     cases = set()
     for result, solve in moving(results):
@@ -88,8 +91,11 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         known = worst.get(solve.solver)
         if known is None or drift.value > known[0]:
             worst[solve.solver] = drift.value, drift.value + drift.uncertainty, result.case
+    cut = {result.case for result, _ in moving(results, cut=True)}
+    cases_cut = f"{len(cut)} case{'s' * (len(cut) != 1)}"
+    left = f" Left out: {cases_cut} in which a blade takes energy." if cut else ""
     if not worst:
-        return Answer("Energy", "No energy was followed: a case in motion would tell.")
+        return Answer("Energy", f"No energy was followed: a case in motion would tell.{left}")
     order = sorted(worst, key=lambda name: (name == BASELINE, worst[name][0]))
     parts = []
     for name in order[:_NAMED]:
@@ -100,7 +106,8 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         parts.append(f"{solver_title(name)} {number(value, 2)}{said}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
     return Answer(
-        "Energy", f"Largest relative change of the total energy in {where}: {'; '.join(parts)}."
+        "Energy",
+        f"Largest relative change of the total energy in {where}: {'; '.join(parts)}.{left}",
     )
 
 
@@ -174,12 +181,18 @@ def compared_curves(result: CaseResult) -> list[Curve]:
     return [c for c in error_curves(result, _ERROR) if c.solver != _REFERENCE]
 
 
-def moving(results: Sequence[CaseResult]) -> Iterator[tuple[CaseResult, SolveRecord]]:
-    """Yield the solves, on the finest level of each solver, whose total energy is known."""
+def moving(
+    results: Sequence[CaseResult], cut: bool = False
+) -> Iterator[tuple[CaseResult, SolveRecord]]:
+    """Yield the solves, on the finest level of each solver, whose total energy is known.
+
+    Those in which a blade takes energy, or the others.
+    """
     for result in results:
         solved = (s for s in result.solves if s.status is Status.SOLVED)
         for solve in finest_of(solved).values():
-            if solve.solver != _REFERENCE and len(solve.account.get("total", [])) > 1:
+            followed = solve.solver != _REFERENCE and len(solve.account.get("total", [])) > 1
+            if followed and (solve.metric("released_to_cut") is not None) == cut:
                 yield result, solve
 
 

@@ -29,8 +29,8 @@ _STEP = 0.2  # of a static solve
 _LEAST = {True: 1e-3, False: 3e-4}  # s of a step, however few the unknowns
 _FINENESS = {2: 12, 3: 4}  # elements over a body's extent on the first level of its reference
 _GRADED = {2: 3.0, 3: 1.5}  # times as many elements, where a reference is graded
-# of 81 levels of references of published runs, 72 had between 0.6 and 5 times as many unknowns; more
-# where cuts are near each other, fewer (0.55) where a small mesh is as fine everywhere as at its cut
+# of 81 levels of references of published runs, 72 had between 0.6 and 5 times as many unknowns;
+# more where cuts are near each other, fewer (0.55) where a mesh is fine everywhere
 _RANGE = (0.5, 5.0)
 _PER_AREA, _PER_VOLUME = 2 / sqrt(3), sqrt(2)  # nodes per h^d of equilateral triangles, tetrahedra
 
