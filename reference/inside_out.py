@@ -1,4 +1,4 @@
-"""Where a solve is lost: cells turned inside out, and places that are held too weakly.
+"""Places at which a solve fails: inverted cells, and supports that hold too weakly.
 
 The corotated energy has no barrier at det F = 0. At a tip, a re-entrant corner or the end of a
 support its strains are unbounded, so that det F ≤ 0 in a small zone around such a place is a

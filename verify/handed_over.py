@@ -1,4 +1,4 @@
-"""What a solver hands over, checked there, so that a wrong answer fails there and not later.
+"""Checks of a solution as its solver returns it, so that a malformed one fails there, not later.
 
 Shapes, types, and numbers that mean nothing: what is not finite, or so large that its square is
 not; sizes and times below zero. Whether an answer is right is not asked here.

@@ -1,7 +1,8 @@
-"""What every exact solution is made of: a field known at every point, a law, its parameters."""
+"""Base of exact solutions: a field known at every point, a law, parameters."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -180,6 +181,7 @@ class ExactField(ABC):
 
     has_body_force: bool = False
     moves: bool = False
+    time: float = 0.0  # s, of a field that moves
 
     def __init__(self, law: Hooke) -> None:
         self.law = law
@@ -204,7 +206,11 @@ class ExactField(ABC):
 
     def at(self, time: float) -> Self:
         """Return the field at a time, s: itself, if it stands still."""
-        return self
+        if not self.moves:
+            return self
+        other = copy(self)
+        other.time = float(time)
+        return other
 
     @abstractmethod
     def displacement(self, points: Array, near: Array | None = None) -> Array:

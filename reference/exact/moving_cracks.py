@@ -1,7 +1,6 @@
 """Motions known exactly: a blade through a prestretched strip, a bar let go, a sudden crack."""
 
-from copy import copy
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,13 +46,6 @@ class BladeStrip(ExactSolution):
             )
         self._g = float(np.sqrt(1.0 - (self._v / wave) ** 2))
         self.moves = self._v > 0.0
-        self.time = 0.0
-
-    def at(self, time: float) -> Self:
-        """Return the field at a time, s."""
-        other = copy(self)
-        other.time = float(time)
-        return other
 
     @property
     def stress_intensity(self) -> tuple[float, float, float]:
@@ -162,13 +154,6 @@ class ReleasedBar(ExactSolution):
         if law.density is None:
             raise InputError("a bar in motion needs the density of the material")
         self._speed = float(np.sqrt((law.lame + 2 * law.shear) / law.density))
-        self.time = 0.0
-
-    def at(self, time: float) -> Self:
-        """Return the field at a time, s."""
-        other = copy(self)
-        other.time = float(time)
-        return other
 
     @property
     def cut_plane(self) -> Plane | None:

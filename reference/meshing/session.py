@@ -1,4 +1,4 @@
-"""What gmsh is given: element sizes, uniform or graded to singular points, in one quiet session.
+"""Sessions of gmsh, and element sizes in them: uniform, or graded to singular points.
 
 A session is deterministic and closed whatever happens; unfitted background meshes are made here.
 """

@@ -1,4 +1,4 @@
-"""How far a realised cut is from the cut as asked: closed forms in general position."""
+"""Distance of a realised cut from the cut as asked: closed forms in general position."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""However a solve ends, it is a record with its reason, and the others go on."""
+"""Solves that end badly: each is a record with its reason, and the others go on."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""What `check` says of mesh files: size and mass, nodes written twice, why one is not read."""
+"""Mesh files in `check`: size and mass, nodes written twice, the reason why one is not read."""
 
 import json
 import warnings

@@ -1,4 +1,4 @@
-"""What a blade is about to sweep opens ahead of it, held by forces that fade: in real time too."""
+"""Openings ahead of a blade, held by forces that fade: in real time too."""
 
 import numpy as np
 import pytest

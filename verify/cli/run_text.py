@@ -1,4 +1,4 @@
-"""What a run says: the expected cost before anything is solved, the verdicts after."""
+"""Text of a run: the expected cost before anything is solved, the verdicts after."""
 
 import os
 from collections import Counter

@@ -1,4 +1,4 @@
-"""What is printed: no escape sequence of others reaches the terminal; JSON; the command line."""
+"""Output to the terminal, free of escape sequences of others; JSON; the command line as text."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What a run says to the four questions: accuracy, energy, slivers, cost; each in one sentence.
+"""Answers of a run to the four questions: accuracy, energy, slivers, cost; each in one sentence.
 
 How large are the displacement errors, does the energy drift, what do slivers do, and what does
 accuracy cost? Numbers come from the results alone. An error and a time are compared with those of

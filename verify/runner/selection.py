@@ -1,4 +1,4 @@
-"""What a run is asked for: its options, and its cases by name, file, pattern, ``-k`` or weight."""
+"""Options of a run, and selection of its cases by name, file, pattern, ``-k`` or weight."""
 
 import re
 from collections.abc import Callable, Sequence

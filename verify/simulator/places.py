@@ -1,4 +1,4 @@
-"""Where material points are: boxes of elements in a tree, and the element that holds a point.
+"""Search for the element that holds a material point, in a tree of boxes of elements.
 
 The tree is over the elements of a mesh at rest. It is a heap: node 1 is the root, node i has the
 children 2i and 2i + 1. With n items the leaves are nodes n to 2n − 1, in the order of a curve that

@@ -1,4 +1,4 @@
-"""What all own solvers share: what a run says of itself, energies over time, cells of a scene."""
+"""Record and account of a run of any own solver, and the cells that a scene asks for."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""How a study makes what it measures: scenes by the runner, single parts as tasks; both are kept.
+"""Solves of a study: scenes by the runner, single parts as tasks; both are kept.
 
 Every solve and every part runs in a watched process with limits of time and memory. A study that
 was stopped goes on where it was when it is asked for again.

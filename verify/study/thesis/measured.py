@@ -1,4 +1,4 @@
-"""What the study of the thesis measures, before it is judged.
+"""Measurements of the study of the thesis, before they are judged.
 
 Slivers: explicit step and condition of bodies whose cut comes ever nearer to nodes. Methods: error,
 energy, step and time of each against one conforming reference or exact solution.
