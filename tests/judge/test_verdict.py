@@ -327,7 +327,7 @@ def blades(solver, *levels, **more):
         ([*blades("xfem", 0.45, 0.44), *blades("reference", 0.28, 0.3, to_scheme=0.05)],
          Verdict.FAIL),
         ([*blades("xfem", 0.60, 0.44), *blades("reference", 0.28, 0.3, to_scheme=0.05)],
-         Verdict.PASS),  # 0.44 ± 0.16
+         Verdict.UNDECIDED),  # 0.44 ± 0.16
     ],
 )  # fmt: skip
 def test_forces_at_a_cut_take_no_more_than_the_blade_releases(records, expected):
@@ -339,8 +339,9 @@ def test_forces_at_a_cut_take_no_more_than_the_blade_releases(records, expected)
 @pytest.mark.parametrize(
     ("levels", "expected"),
     [
-        ((0.30, 0.33), Verdict.PASS),
-        ((0.37, 0.365), Verdict.PASS),  # 0.365 ± 0.005
+        ((0.32, 0.33), Verdict.PASS),
+        ((0.30, 0.34), Verdict.UNDECIDED),  # 0.34 ± 0.04
+        ((0.37, 0.365), Verdict.UNDECIDED),  # 0.365 ± 0.005
         ((0.38, 0.375), Verdict.FAIL),
         ((0.35,), Verdict.PASS),
         ((0.37,), Verdict.UNDECIDED),  # one level does not say how well that is known

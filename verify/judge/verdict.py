@@ -103,10 +103,14 @@ def _cut_works(records: Sequence[SolveRecord], judge_only: Sequence[str]) -> lis
             limit = f"at most {most.high:.4g} J/m², by {source}"
             text = "taken by the forces at the cut per area that the blade has swept"
             alone = taken.half_width == inf
-            if taken.value <= most.high or not alone:
-                verdict = Verdict.FAIL if taken.low > most.high else Verdict.PASS
-            else:
+            if (taken.value if alone else taken.high) <= most.high:
+                verdict = Verdict.PASS
+            elif taken.low > most.high:
+                verdict = Verdict.FAIL
+            if alone:
                 text += "; one level does not say how well that is known"
+            elif verdict is Verdict.UNDECIDED:
+                text += "; the limit lies within what the last level changed"
         low, high = (None, None) if taken.half_width == inf else (taken.low, taken.high)
         found.append(
             VerdictRecord(

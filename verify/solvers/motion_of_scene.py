@@ -300,12 +300,13 @@ class CutMotion:
         """Advance the state by a time, s, and account for it."""
         if size not in self._integrators:
             self._integrators[size] = self._integrator(size)
-        tie, before = self.body.tie, self.state.displacement.copy()
+        tie = self.body.tie if len(self._blades) > 1 else None  # one has all of `cut_work`
+        before = self.state.displacement.copy() if tie is not None else self.state.displacement
         with self.record.timed("steps"):
             forces = self._integrators[size].step(self.state)
         with self.record.timed("accounting"):
             self._recorder.record(self.state, forces)
-            if isinstance(tie, TieForces) and len(self._blades) > 1:
+            if isinstance(tie, TieForces):
                 change, start = self.state.displacement - before, self.state.time - size
                 for share, weight in forces.loaded_at:
                     self._by_cut += weight * tie.work_by_cut(
