@@ -149,8 +149,11 @@ class ReleasedBar(ExactSolution):
         self._ends = parameters.take("ends", (2,))
         self._at = float(parameters.take("at", ()))
         self._origin = float(parameters.take("origin", (), default=0.0))
-        if parameters.has("ends") and not self._ends[0] <= self._at <= self._ends[1]:
-            raise InputError(f"parameters.at = {self._at:g}; expected between the ends")
+        if parameters.has("ends"):
+            if not self._ends[0] < self._ends[1]:
+                raise InputError(f"parameters.ends = {list(self._ends)}; expected two that ascend")
+            if not self._ends[0] <= self._at <= self._ends[1]:
+                raise InputError(f"parameters.at = {self._at:g}; expected between the ends")
         if law.density is None:
             raise InputError("a bar in motion needs the density of the material")
         self._speed = float(np.sqrt((law.lame + 2 * law.shear) / law.density))
@@ -199,7 +202,7 @@ class ReleasedBar(ExactSolution):
         """Side (n,) of the release, 1 or −1, distance from it, and length of that part, m."""
         x = np.asarray(points, dtype=float)[:, 0]
         decides = (x if near is None else np.asarray(near)[:, 0]) - self._at
-        above = (decides >= 0.0) & (self._at < self._ends[1])
+        above = (decides >= 0.0) & (self._at < self._ends[1]) | (self._at <= self._ends[0])
         side = np.where(above, 1.0, -1.0)
         length = np.where(above, self._ends[1] - self._at, self._at - self._ends[0])
         return side, side * (x - self._at), length

@@ -183,6 +183,9 @@ def test_a_bar_that_is_let_go_moves_by_waves(at, dimension):
     points = np.random.default_rng(2).uniform(-0.2, 1.1, (300, dimension))
     step, shift = 1e-4, 1e-4 * np.eye(dimension)[0]
     assert bar.at(-1.0).displacement(points)[:, 0] == pytest.approx(0.02 * (points[:, 0] - 0.4))
+    for end in (-0.2, 1.1):  # the ends themselves, and round-off beyond them
+        beyond = np.full((1, dimension), np.nextafter(end, np.sign(end) * np.inf))
+        assert np.isfinite(bar.at(0.11).displacement(beyond)).all()
     for time in (0.11, 0.74, 3.3):
         field = bar.at(time)
         far = field.smooth(points, 5e-4) & (np.abs(points[:, 0] - at) > 5e-4)

@@ -43,6 +43,17 @@ def test_a_reference_level_has_the_unknowns_of_halved_elements():
     assert 3.5 < finest.unknowns / fine.unknowns < 4.0
 
 
+def test_a_step_of_the_reference_s_own_is_in_its_forecast():
+    scene = load_scenes("cutting/plate_crossed_quick")[0]
+    assert 4 * scene.reference.time_step == scene.analysis.time_step
+    levels = scene.reference.model_copy(update={"time_step": None})
+    plain = scene.model_copy(update={"reference": levels})
+    own, asked = (solver_costs(s, "reference")[2].seconds for s in (scene, plain))
+    assert 3.0 < own / asked < 4.1
+    xfem = [solver_costs(s, "xfem")[-1].seconds for s in (scene, plain)]
+    assert xfem[0] == xfem[1]
+
+
 @pytest.mark.parametrize(
     "name, found",  # unknowns of the references of published runs, coarse to fine
     [

@@ -118,9 +118,11 @@ def blade_forces(scene: Scene, account: MotionAccount) -> dict[str, list[float]]
 
 
 def travelled(cut: ToolPathCut, times: Array) -> Array:
-    """Length (n,) of the way that the tip of a blade has come at some times, m."""
-    steps = np.linalg.norm(np.diff(np.array(cut.points, dtype=float), axis=0), axis=1)
-    return np.interp(times, cut.moments, np.concatenate([[0.0], np.cumsum(steps)]))
+    """Length (n,) of the way that a blade has come at some times, m: of the end that goes farther.
+
+    As `verify.xfem.ToolPath.travel` has it for what is played.
+    """
+    return np.interp(times, cut.moments, cut.travel)
 
 
 def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
@@ -138,7 +140,8 @@ def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
     Returns
     -------
     (n,) array
-        NaN where the blade does not move.
+        NaN where the blade does not move. What it takes at rest, as forces fade on, counts at the
+        place where it rests: to the advance on either side within `length`.
     """
     goes = np.diff(advance) > 0.0
     moving = np.append(goes, False) | np.append(False, goes)

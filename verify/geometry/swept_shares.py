@@ -14,12 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.geometry.spatial import measures
+
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 _DIVISIONS = 6  # of each edge of a simplex of the cut
 _STILL = 1e-30  # s: a simplex that is swept at once
 _LINEAR = 1e-13  # of the longest time in which a simplex is swept
+_ROUND_OFF = 16 * np.finfo(float).eps  # of a time
 
 
 class CutSimplices(NamedTuple):
@@ -135,7 +138,8 @@ class SweptShares:
             whole = _divided(corners, 1)
             at_corners = passed_at(cut.points.reshape(-1, points.shape[2])).reshape(-1, corners)
             off = np.abs(times - at_corners @ inside.T).max(initial=0.0)
-            if off <= _LINEAR * np.ptp(times, axis=1).max(initial=0.0):
+            longest = np.ptp(times, axis=1).max(initial=0.0)
+            if off <= _LINEAR * longest + _ROUND_OFF * np.abs(times).max(initial=0.0):
                 (inside, parts), times = whole, at_corners @ whole[0].T
         times = times[:, parts]
         begin, end = times.min(axis=2), times.max(axis=2)
@@ -237,10 +241,3 @@ def _divided(corners: int, n: int) -> tuple[Array, Numbers]:
     downs = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in number if i + j < n - 1]
     parts = np.array([[number[place] for place in part] for part in ups + downs])
     return np.concatenate([1.0 - at.sum(axis=1, keepdims=True), at], axis=1), parts
-
-
-def measures(points: Array) -> Array:
-    """Lengths or areas (q,) of simplices (q, k, d)."""
-    edges = points[:, 1:] - points[:, :1]
-    gram = np.linalg.det(edges @ edges.swapaxes(1, 2)).clip(0.0)
-    return np.asarray(np.sqrt(gram) / (1.0 if edges.shape[1] == 1 else 2.0))

@@ -36,7 +36,7 @@ Rows = Mapping[float, CaseResult]
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1
 # of the energy that a blade releases, what is found again in a reference
-_OF_REFERENCE = ("released_to_cut", "released_to_scheme", "released_to_short_waves")
+_TO_CUT, _TO_SCHEME, _WAVES = (f"released_to_{name}" for name in ("cut", "scheme", "short_waves"))
 
 
 def judge(
@@ -84,56 +84,72 @@ def _cut_works(records: Sequence[SolveRecord], judge_only: Sequence[str]) -> lis
     """Judge what the forces at released cuts took against the energy release rate.
 
     What one element more or less makes is that of a level more or less. Without an exact rate it is
-    what the forces, the scheme and the shortest waves of the reference took together.
+    what the forces, the scheme and the shortest waves of the reference took together; where the
+    waves are not known, more than the rest is UNDECIDED.
     """
+    judged = [
+        solver
+        for solver in dict.fromkeys(record.solver for record in records)
+        if solver != REFERENCE and (not judge_only or solver in judge_only)
+    ]
     found = []
-    for solver in dict.fromkeys(record.solver for record in records):
-        taken = _taken(records, solver, ("released_to_cut",))
-        if taken is None or solver == REFERENCE or (judge_only and solver not in judge_only):
+    for solver in judged:
+        own = [record for record in records if record.solver == solver]
+        if not any(record.metric(_TO_CUT) for record in own):
             continue
-        finest = max((r for r in records if r.solver == solver), key=lambda r: r.level)
-        exact, most, source = finest.metric("released"), None, "the reference"
-        if exact is not None:
-            most, source = Interval(exact.value, exact.value, exact.value), "the exact field"
-        else:
-            most = _taken(records, REFERENCE, _OF_REFERENCE)
-        verdict, limit = Verdict.UNDECIDED, "at most what the blade releases"
-        text = "what the blade releases is not known: no exact rate, and no reference of two levels"
-        if most is not None:
-            limit = f"at most {most.high:.4g} J/m², by {source}"
-            text = "taken by the forces at the cut per area that the blade has swept"
-            alone = taken.half_width == inf
-            if (taken.value if alone else taken.high) <= most.high:
-                verdict = Verdict.PASS
-            elif taken.low > most.high:
-                verdict = Verdict.FAIL
-            if alone:
-                text += "; one level does not say how well that is known"
-            elif verdict is Verdict.UNDECIDED:
-                text += "; the limit lies within what the last level changed"
-        low, high = (None, None) if taken.half_width == inf else (taken.low, taken.high)
-        found.append(
-            VerdictRecord(
-                "excess", solver, "released_to_cut", verdict, taken.value, low, high, limit, text
-            )
-        )
+        try:
+            found.append(_cut_work(_levels(records, solver), records))
+        except NotMeasuredError as problem:
+            found.append(_excess(solver, Verdict.ERROR, None, "", str(problem)))
     return found
 
 
-def _taken(records: Sequence[SolveRecord], solver: str, names: Sequence[str]) -> Interval | None:
-    """Sum the metrics of a solver that has the first, give or take what its last level changed."""
-    own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
-    values = [
-        sum(metric.value for name in names if (metric := record.metric(name)) is not None)
-        for record in own[-2:]
-        if record.metric(names[0]) is not None
-    ]
-    if not values or own[-1].metric(names[0]) is None:
-        return None
-    width = abs(values[-1] - values[0]) if len(values) > 1 else inf
-    if width == inf and solver == REFERENCE:
-        return None
-    return Interval(values[-1], values[-1] - width, values[-1] + width)
+def _cut_work(own: Sequence[SolveRecord], records: Sequence[SolveRecord]) -> VerdictRecord:
+    """Judge one solver, by its levels from coarse to fine."""
+    solver, taken = own[-1].solver, _taken(own, (_TO_CUT,))
+    exact, why, source = own[-1].metric("released"), "", "the reference"
+    most: Interval | None = None
+    if exact is not None:
+        most, source = Interval(exact.value, exact.value, exact.value), "the exact field"
+    else:
+        try:
+            reference = _levels(records, REFERENCE)
+            waves = all(record.metric(_WAVES) for record in reference[-2:])
+            names = (_TO_CUT, _TO_SCHEME, _WAVES) if waves else (_TO_CUT, _TO_SCHEME)
+            most = _taken(reference, names)
+            why = "" if waves else f"; without its short waves: {reference[-1].notes.get(_WAVES)}"
+        except NotMeasuredError as problem:
+            why = f": {problem}"
+    if most is None or not isfinite(most.half_width):
+        text = "what the blade releases is not known: no exact rate, no reference of two levels"
+        return _excess(solver, Verdict.UNDECIDED, taken, "at most what is released", text + why)
+    limit = f"at most {most.value:.4g} ± {most.half_width:.1g} J/m², by {source}"
+    text = f"taken by the forces at the cut per area that the blade has swept{why}"
+    if taken.high <= most.low:
+        return _excess(solver, Verdict.PASS, taken, limit, text)
+    if taken.low > most.high and not why:
+        return _excess(solver, Verdict.FAIL, taken, limit, text)
+    if not isfinite(taken.half_width):
+        text += "; one level does not say how well that is known"
+    return _excess(solver, Verdict.UNDECIDED, taken, limit, text)
+
+
+def _excess(
+    solver: str, verdict: Verdict, taken: Interval | None, limit: str, reason: str
+) -> VerdictRecord:
+    low, high, value = None, None, None
+    if taken is not None:
+        value = taken.value
+        if isfinite(taken.half_width):
+            low, high = taken.low, taken.high
+    return VerdictRecord("excess", solver, _TO_CUT, verdict, value, low, high, limit, reason)
+
+
+def _taken(levels: Sequence[SolveRecord], names: Sequence[str]) -> Interval:
+    """Sum metrics on the finest level, give or take what that level changed."""
+    *before, value = (sum(_metric(record, name).value for name in names) for record in levels[-2:])
+    width = abs(value - before[0]) if before else inf
+    return Interval(value, value - width, value + width)
 
 
 def with_verdicts(

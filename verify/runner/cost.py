@@ -122,7 +122,9 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
         work = unknowns * _SECONDS[heavy] * (_IN_SPACE if scene.cell_dimension == 3 else 1.0)
         work *= scene.reference.degree if reference else 1  # more entries to a row
         if scene.analysis.kind == "dynamic":
-            work = max(_STEP * work, _LEAST[heavy]) * _steps(scene, size, level if reference else 0)
+            work = max(_STEP * work, _LEAST[heavy]) * _steps(
+                scene, size, level if reference else 0, reference
+            )
         else:
             work *= _ITERATIONS[scene.analysis.kinematics]
         times = 1 if reference else 1 + repetitions
@@ -184,8 +186,9 @@ def _nodes(scene: Scene, size: float) -> float:
     return float(inside + d * volume ** ((d - 1) / d) / size ** (d - 1))
 
 
-def _steps(scene: Scene, size: float, halved: int) -> float:
+def _steps(scene: Scene, size: float, halved: int, reference: bool) -> float:
     """Time steps of a motion: those that are asked, or of a pressure wave across an element."""
     analysis = scene.analysis
-    largest = analysis.time_step or size * 2**halved / wave_speed(scene.material)
+    asked = scene.reference.time_step if reference else None
+    largest = asked or analysis.time_step or size * 2**halved / wave_speed(scene.material)
     return analysis.steps(largest) * 2.0**halved

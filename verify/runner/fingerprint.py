@@ -73,7 +73,7 @@ def physics_digest(scene: Scene) -> str:
         ("title", "requirement", "tags", "acceptance", "known_findings", "contact", "adequacy"),
         True,
     )
-    words["cuts"] = {"__all__": {"expected"}}
+    words["cuts"] = {"__all__": {"expected", "toughness"}}  # what no solve depends on
     physics = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     content: list[Any] = [scene.schema_, physics]
     if any(cut.on_the_way for cut in scene.cuts):

@@ -146,7 +146,8 @@ def plan_case(
 ) -> CasePlan:
     """Lay out the solves of `scene` that are known before any has run."""
     physics, solvers = physics_digest(scene), solvers_of(scene, options)
-    kept = bundle or (bundle_of_case(scene) if options.cache else None)
+    as_stored = options.cache and not parameters_of(REFERENCE, options.parameters)
+    kept = bundle or (bundle_of_case(scene) if as_stored else None)
     found = {name: loaded.get(name, Loaded()) for name in solvers}
 
     def job_of(name: str, level: int) -> Job:

@@ -102,7 +102,9 @@ class Entry:
 
     def taken_by(self, job: Job, words: str) -> SolveRecord:
         """Return its record as that of `job`, with a note in `words` on where it comes from."""
-        notes = {**self.record.notes, "cache": f"{words}, solved {self.made}{self._by()}"}
+        code = "; the code of the reference has changed since" if self.outdated else ""
+        said = f"{words}, solved {self.made}{self._by()}{code}"
+        notes = {**self.record.notes, "cache": said}
         return replace(self.record, case=job.case, notes=notes)
 
     def _by(self) -> str:

@@ -146,7 +146,8 @@ def _too_many_nodes(scene: SceneTables) -> tuple[Any, ...] | None:
 
 def _too_many_steps(scene: SceneTables) -> tuple[float, float, float] | None:
     asked = scene.analysis
-    steps = asked.duration / asked.time_step if asked.duration and asked.time_step else 0.0
+    given = [step for step in (asked.time_step, scene.reference.time_step) if step]
+    steps = asked.duration / min(given) if asked.duration and given else 0.0
     return (steps, asked.duration or 0.0, _MOST) if steps > _MOST else None
 
 

@@ -122,12 +122,17 @@ class ToolPathCut(CutShape):
         return np.broadcast_to(blade, (len(self.points), 3)).copy()
 
     @property
+    def travel(self) -> NDArray[np.float64]:
+        """(n,) way of the blade up to each point, m: of the end that goes farther."""
+        tips, blades = self._tips(), self._blades()
+        moves = [np.linalg.norm(np.diff(end, axis=0), axis=1) for end in (tips, tips + blades)]
+        return np.concatenate([[0.0], np.cumsum(np.max(moves, axis=0))])
+
+    @property
     def top_speed(self) -> float:
         """Largest speed of an end of the blade, m/s."""
-        tips, blades = self._tips(), self._blades()
         lasting = np.diff(self.moments) > 0.0
-        moves = [np.linalg.norm(np.diff(end, axis=0), axis=1) for end in (tips, tips + blades)]
-        return float(np.max(np.array(moves)[:, lasting] / np.diff(self.moments)[lasting]))
+        return float(np.max(np.diff(self.travel)[lasting] / np.diff(self.moments)[lasting]))
 
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Points (n, d) of the tip, each once; `spacing` does not matter to straight segments."""

@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from verify.geometry.swept_shares import SweptShares, measures
+from verify.geometry.spatial import measures
+from verify.geometry.swept_shares import SweptShares
 from verify.simulator.semi_progressive import SemiProgressiveCutter, Stroke
 from verify.solvers.openings_of_scene import sections
 from verify.xfem.arrays import Floats, Ints

@@ -266,7 +266,8 @@ class Crossings:
     leave : (k,) float array
         When it had passed all of them, in seconds.
     seen : (k,) float array
-        Time of the `advance` that split the element: `leave`, rounded up to a frame.
+        Time of the `advance` that split the element: `leave`, rounded up to a frame; before
+        `entry` where elements open ahead of the blade.
     """
 
     cell: Ints

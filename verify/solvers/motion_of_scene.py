@@ -31,6 +31,7 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.release import TieForces, acceleration_at_corners, hold_released
 
 _Floats = NDArray[np.float64]
+_NO_ROUND_OFF = 1e-6  # of a force
 _STAGE = {
     "load_work": "work_of_loads",
     "support_work": "work_of_supports",
@@ -208,9 +209,11 @@ class CutMotion:
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
         self._account = StagedAccount(opening.removal)
         self._outputs: list[_Output] = []
-        self._blades = [k for k, cut in enumerate(scene.cuts) if isinstance(cut, ToolPathCut)]
-        self._by_cut = np.zeros(len(scene.cuts))  # energy that each cut has taken, J
+        asked = opening.openings.asked  # as `Hold.cut` counts them: by when they open
+        self._blades = {k: c.name for k, c in enumerate(asked) if isinstance(c, ToolPathCut)}
+        self._by_cut = np.zeros(len(asked))  # energy that each cut has taken, J
         self._by_cut_put_out: list[_Floats] = []
+        self._spread = 0.0  # as of `Hold`, the most
         self._solves = 0
         start = -np.inf if closed_before else timeline.close
         body = self._made(start, passed=True)
@@ -278,6 +281,7 @@ class CutMotion:
                 fade,
             )
             further.tie = TieForces(new, holds) if holds else None
+            self._spread = max(self._spread, *(hold.spread for hold in holds), 0.0)
         self._leave()
         self._account.open(self.body, self.state, further, state)
         self._take(further, state)
@@ -395,10 +399,10 @@ class CutMotion:
         None for meshes that are welded along a cut and opened: their pieces lie on no side of it.
         """
         sides = self.body.force.phantom.label.shape[1]
-        if len(self._blades) < 2 or sides < len(self.scene.cuts) or not self._by_cut.any():
+        if len(self._blades) < 2 or sides < len(self._by_cut) or not self._by_cut.any():
             return {}
         table = np.array(self._by_cut_put_out)
-        return {f"cut_work_{self.scene.cuts[k].name}": table[:, k] for k in self._blades}
+        return {f"cut_work_{name}": table[:, k] for k, name in self._blades.items()}
 
     def _mass(self, phantom: PhantomMesh) -> str | csr_array:
         """Mass of the corners of the body with all its cuts."""
@@ -421,3 +425,8 @@ class CutMotion:
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["a tool path opens"] = self.opening.rule
             record.notes |= blade_advance(self.scene, sizes, self.opening.openings.size)
+        if self._spread > _NO_ROUND_OFF:
+            record.notes["jump of accelerations"] = (
+                f"loads or masses are shared out anew at openings: up to {self._spread:.1%} of the "
+                "largest force that holds what is released"
+            )

@@ -36,12 +36,16 @@ class Hold:
         Factors (k,) at a time, from 1 to 0.
     cut : (k,) int array
         Number of the cut that has released each.
+    spread : float
+        Share of the largest force that was spread over the parts of a node, so that they sum up
+        to zero: by this accelerations jump.
     """
 
     nodes: Ints
     forces: Floats
     factor: Callable[[float], Floats]
     cut: Ints
+    spread: float = 0.0
 
     def handed_on(self, source: Ints, weights: Floats, time: float) -> "Hold | None":
         """Give the same of a body that is cut further; None if nothing is left of it.
@@ -172,43 +176,52 @@ def hold_released(
         return carried
     inherited = MotionState(state.displacement[source], state.velocity[source], time)
     forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
-    _balance(forces, nodes, source, new.fixed | old.fixed[source], new.mass.weights)
+    spread = _balance(forces, nodes, source, new.fixed | old.fixed[source], new.mass.weights)
     forces[new.fixed] = 0.0
     cut = _parting_cuts(new.force.phantom, nodes, source[nodes])
-    hold = Hold(nodes, forces[nodes], fading(nodes, time), cut)
+    hold = Hold(nodes, forces[nodes], fading(nodes, time), cut, spread)
     new.tie = TieForces(new.force.phantom, (*carried, hold))
     return new.tie.holds
 
 
-def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> None:
+def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> float:
     """Spread in proportion to masses what the forces (N, d) on parts of one node sum up to.
 
-    That is round-off, but where loads are shared out anew, as those of hooks are, and where slivers
-    follow others or are penalised. What supports hold has a sum.
+    That is round-off, but where loads or masses (EVS, GEVS) are shared out anew, as those of hooks
+    are, and where slivers follow others or are penalised. What supports hold has a sum. Gives the
+    largest that is spread, as a share of the largest force.
     """
+    largest, most = float(np.abs(forces[nodes]).max(initial=0.0)), 0.0
     number = np.unique(source[nodes], return_inverse=True)[1]
     share = weights[nodes] / np.bincount(number, weights[nodes])[number]
     for axis in range(forces.shape[1]):
         total = np.bincount(number, forces[nodes, axis])
         total[np.bincount(number, held[nodes, axis]) > 0.0] = 0.0
         forces[nodes, axis] -= share * total[number]
+        most = max(most, float(np.abs(total).max(initial=0.0)))
+    return most / largest if largest > 0.0 else 0.0
 
 
 def _parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
-    """First cut (k,) that has some pieces of the nodes of a parent on one side, others beyond."""
+    """First cut (k,) that has some pieces of the nodes of a parent on one side, others beyond.
+
+    Where several cuts part them only together it is the first that any piece lies beside.
+    """
     row = np.full(phantom.node_count, -1)
     row[nodes] = np.arange(len(nodes))
     at = row[phantom.cells]
     piece, corner = np.nonzero(at >= 0)
     number = np.unique(parent, return_inverse=True)[1]
-    found = np.zeros(len(nodes), dtype=np.int64)
+    found, parts = np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=bool)
     for cut in reversed(range(phantom.label.shape[1])):
         there = [np.zeros(len(nodes), dtype=bool) for _ in range(2)]
         for side, here in zip((1, -1), there, strict=True):
             here[at[piece, corner][phantom.label[piece, cut] == side]] = True
         above, below = there[0] & ~there[1], there[1] & ~there[0]
         apart = (np.bincount(number, above) > 0) & (np.bincount(number, below) > 0)
-        found[apart[number]] = cut
+        beside = np.bincount(number, there[0] | there[1]) > 0
+        first = apart[number] | beside[number] & ~parts
+        found[first], parts = cut, parts | apart[number]
     return found
 
 
