@@ -11,7 +11,7 @@ from solid_meshes import cube_grid
 
 from verify.compare.mass import kinetic
 from verify.compare.motion_account import balance, energy_scale, total_energy
-from verify.compare.released import blade_forces, driving_force
+from verify.compare.released import blade_forces, driving_force, swept_area
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solution import Solution
@@ -153,6 +153,45 @@ def test_what_a_toughness_asks_is_that_of_the_area_in_the_body_less_the_driving_
     told = stated | {"cut_work_second": 3.0 * stated["cut_work"]}
     forces = blade_forces(two, SimpleNamespace(times=times, stated=told))
     assert list(forces) == ["driving_force_second"]
+
+
+SWINGING = """
+[[cuts]]
+kind = "tool_path"
+points = [[0.3, 0.4, 0.45], [0.3, 0.4, 0.45], [0.3, 0.4, 0.45], [0.9, 0.4, 0.65]]
+times = [0.5, 1.5, 2.0, 3.0]
+depth = 0.4
+direction = [[-0.6, 0, 0.8], [0.6, 0, 0.8], [0.6, 0, 0.8], [0.6, 0, 0.8]]
+toughness = 30.0
+"""
+
+
+def test_a_blade_that_swings_about_its_resting_tip_sweeps_a_sector(tmp_path):
+    """Its other end goes along the chord; a part until the middle has half of the triangle."""
+    scene = blades(tmp_path, SWINGING)
+    (cut,) = scene.cuts
+    whole, moved = 0.5 * 0.48 * 0.32, np.linalg.norm(np.cross([0.6, 0, 0.2], [0.24, 0, 0.32]))
+    for start, end, area in (
+        (0.0, 0.5, 0.0), (0.0, 1.0, whole / 2), (1.0, 1.5, whole / 2), (0.7, 0.9, whole / 5),
+        (1.2, 1.8, 0.3 * whole), (1.5, 2.0, 0.0), (1.3, 2.5, 0.2 * whole + moved / 2),
+        (0.0, 4.0, whole + moved), (3.0, 4.0, 0.0),
+    ):  # fmt: skip
+        assert swept_area(scene, [cut], start, end) == pytest.approx(area, rel=1e-9, abs=1e-15)
+    # what it asks while it swings: R times the area per way of its end, 0.48 m along the chord
+    stated = {"cut_work": np.zeros(5)}
+    times = np.array([0.5, 0.75, 1.0, 1.25, 1.5])
+    forces = blade_forces(scene, SimpleNamespace(times=times, stated=stated))
+    np.testing.assert_allclose(forces["resistance_cut"], 30.0 * whole / 0.48)
+
+
+def test_a_path_that_begins_anew_elsewhere_counts_the_jump_once(tmp_path):
+    """In the plane; the tip is moved at once at 1 s, and what lies between is cut then."""
+    body = body_text("blade", "It shall count.", [2.0, 1.0], [[4, 4]], density="1e3")
+    path = '[[cuts]]\nkind = "tool_path"\npoints = [[0.2, 0.3], [0.6, 0.6], [0.9, 0.2], [1.2, 0.6]]\n'
+    (tmp_path / "jump.toml").write_text(body + MOTION + path + "times = [0.0, 1.0, 1.0, 2.0]\n")
+    scene = load_scene(tmp_path / "jump.toml")
+    parts = [swept_area(scene, scene.cuts, *ends) for ends in ((-1, 0.5), (0.5, 1), (1, 1.5))]
+    np.testing.assert_allclose(parts, [0.25, 0.75, 0.25])
 
 
 def test_a_cut_that_no_blade_makes_has_no_toughness(tmp_path):

@@ -361,3 +361,19 @@ def test_an_exact_energy_release_rate_is_the_most_that_is_taken(levels, expected
     (found,) = judge(scene([STRAIGHT]), records, ())
     assert found.verdict is expected
     assert judge(scene([STRAIGHT]), records, (), judge_only=("conforming",)) == []
+
+
+def test_an_excess_can_be_listed_as_known():
+    path = {"kind": "tool_path", "points": STRAIGHT["points"], "times": [0.0, 1.0]}
+    finding = {"solver": "xfem", "check": "excess", "metric": "released_to_cut", "reason": "so"}
+    more = {
+        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
+        "analysis": {"kind": "dynamic", "duration": 1.0},
+        "known_findings": [finding],
+    }
+    (found,) = judge(scene([path], **more), [*blades("xfem", 0.45, 0.44), *RELEASED], ())
+    assert (found.verdict, found.known, found.counts_as_failed) == (FAIL, "so", False)
+    (found,) = judge(scene([path], **more), [*blades("xfem", 0.31, 0.32), *RELEASED], ())
+    assert "listed as a known finding" in found.reason
+    with pytest.raises(ValueError, match="no check 'excess of released_to_cut'"):
+        scene([STRAIGHT], **more)  # no blade is on its way

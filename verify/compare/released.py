@@ -165,7 +165,7 @@ def advance(scene: Scene) -> float:
 
 def swept_area(scene: Scene, paths: Sequence[ToolPathCut], start: float, end: float) -> float:
     """Area that blades sweep in the body of a scene between two times, m² (2D: m)."""
-    parts = [part for cut in paths if (part := _between(cut, start, end)) is not None]
+    parts = [part for cut in paths if (part := cut.between(start, end)) is not None]
     total = 0.0
     for part in parts:
         alone = scene.model_copy(update={"cuts": [part]})
@@ -177,26 +177,6 @@ def swept_area(scene: Scene, paths: Sequence[ToolPathCut], start: float, end: fl
         if body.has_cuts:
             total += float(cut_rules(body, body.size / 20, 1)[0].weights.sum())
     return total
-
-
-def _between(cut: ToolPathCut, start: float, end: float) -> ToolPathCut | None:
-    """Part of a tool's way between two times; None if it does not move then."""
-    moments = cut.moments
-    start, end = max(start, float(moments[0])), min(end, float(moments[-1]))
-    if not end > start:
-        return None
-    times = np.unique([start, *moments[(moments > start) & (moments < end)], end])
-
-    def at(values: np.ndarray) -> list[list[float]]:
-        return np.column_stack([np.interp(times, moments, v) for v in values.T]).tolist()
-
-    tips = np.array(cut.points, dtype=float)
-    if not np.ptp(np.array(at(tips)), axis=0).any():
-        return None
-    given: dict[str, Any] = {"kind": "tool_path", "points": at(tips), "times": times.tolist()}
-    if cut.dimension == 3:
-        given |= {"depth": cut.depth, "direction": [tuple(row) for row in at(cut.blade)]}
-    return ToolPathCut.model_validate(given)
 
 
 def _dissipated(account: MotionAccount) -> tuple[dict[str, float], dict[str, str]]:

@@ -141,7 +141,11 @@ def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scen
 
 
 def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
-    known = [known for known in scene.known_findings if any(map(known.concerns, checks))]
+    known = [
+        known
+        for known in scene.known_findings
+        if known.check == "excess" or any(map(known.concerns, checks))
+    ]
     changed = scene.model_copy(update={"acceptance": checks, "known_findings": known})
     changed._name, changed._file, changed._row = scene.name, scene.file, scene.row
     return changed

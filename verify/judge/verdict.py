@@ -76,8 +76,8 @@ def judge(
         except NotMeasuredError as problem:
             found = verdict_record(check, Verdict.ERROR, str(problem))
         found = found or verdict_record(check, Verdict.UNDECIDED, applied.not_judged)
-        verdicts.append(_marked(scene, found))
-    return verdicts + _cut_works(records, judge_only)
+        verdicts.append(found)
+    return [_marked(scene, one) for one in verdicts + _cut_works(records, judge_only)]
 
 
 def _cut_works(records: Sequence[SolveRecord], judge_only: Sequence[str]) -> list[VerdictRecord]:

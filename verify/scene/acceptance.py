@@ -251,7 +251,7 @@ class KnownFinding(Strict):
     """A check that a solver is known to fail: shown as failed, not counted in the exit code."""
 
     solver: str
-    check: Literal["rate", "error", "ratio", "value"]
+    check: Literal["rate", "error", "ratio", "value", "excess"]
     metric: str
     reason: Line = Field(description="why it fails, in one sentence")
 

@@ -156,19 +156,46 @@ class ToolPathCut(CutShape):
         InputError
             If the blade turns on its way and sweeps no plane: no other kind of cut is that.
         """
+        return self._made(self._tips(), self._blades())
+
+    def between(self, start: float, end: float) -> PolylineCut | SweptCut | PolygonCut | None:
+        """Return what the blade sweeps after one time until another, s; None if it rests.
+
+        Raises
+        ------
+        InputError
+            As `whole`.
+        """
+        moments, ends = self.moments, np.hstack([self._tips(), self._blades()])
+
+        def at(time: float) -> tuple[int, NDArray[np.float64]]:
+            k = int(np.searchsorted(moments, time, side="right"))
+            if not 0 < k < len(moments):
+                return k, ends[:0]
+            share = (time - moments[k - 1]) / (moments[k] - moments[k - 1])
+            return k, ends[k - 1 : k] + share * (ends[k] - ends[k - 1])
+
+        (first, before), (last, after) = at(start), at(end)
+        way = np.concatenate([before, ends[first:last], after])
+        if not len(way) or not np.ptp(way, axis=0).any():
+            return None
+        return self._made(*np.hsplit(way, 2))
+
+    def _made(
+        self, tips: NDArray[np.float64], blades: NDArray[np.float64]
+    ) -> PolylineCut | SweptCut | PolygonCut:
+        """Return the cut that a blade sweeps from place to place, tips and blades (n, d)."""
         shared: dict[str, Any] = {"name": self.name, "expected": self.expected}
-        tips = self.vertices()
+        moved = np.append(True, np.diff(tips, axis=0).any(axis=1))
+        points: list[Any] = [tuple(map(float, tip)) for tip in tips[moved]]
         if self.dimension == 2:
-            points = [(float(x), float(y)) for x, y in tips]
             return PolylineCut(kind="polyline", points=points, **shared)
-        blades = self.blade
         try:
             if np.allclose(blades, blades[0], rtol=0.0, atol=_SAME * (self.depth or 0.0)):
-                line = [(float(x), float(y), float(z)) for x, y, z in tips]
                 x, y, z = map(float, blades[0])
-                return SweptCut(kind="swept", points=line, along=(x, y, z), **shared)
-            outline = [*self._tips(), *(self._tips() + blades)[::-1]]
-            corners = [(float(x), float(y), float(z)) for x, y, z in _distinct(outline)]
+                return SweptCut(kind="swept", points=points, along=(x, y, z), **shared)
+            outline = [*tips, *(tips + blades)[::-1]]
+            corners: list[Any] = [tuple(map(float, point)) for point in _distinct(outline)]
             return PolygonCut(kind="polygon", points=corners, **shared)
         except ValidationError as error:
             reason = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
