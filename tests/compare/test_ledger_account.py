@@ -187,8 +187,9 @@ def test_a_blade_that_swings_about_its_resting_tip_sweeps_a_sector(tmp_path):
 def test_a_path_that_begins_anew_elsewhere_counts_the_jump_once(tmp_path):
     """In the plane; the tip is moved at once at 1 s, and what lies between is cut then."""
     body = body_text("blade", "It shall count.", [2.0, 1.0], [[4, 4]], density="1e3")
-    path = '[[cuts]]\nkind = "tool_path"\npoints = [[0.2, 0.3], [0.6, 0.6], [0.9, 0.2], [1.2, 0.6]]\n'
-    (tmp_path / "jump.toml").write_text(body + MOTION + path + "times = [0.0, 1.0, 1.0, 2.0]\n")
+    path = '[[cuts]]\nkind = "tool_path"\ntimes = [0.0, 1.0, 1.0, 2.0]\n'
+    path += "points = [[0.2, 0.3], [0.6, 0.6], [0.9, 0.2], [1.2, 0.6]]\n"
+    (tmp_path / "jump.toml").write_text(body + MOTION + path)
     scene = load_scene(tmp_path / "jump.toml")
     parts = [swept_area(scene, scene.cuts, *ends) for ends in ((-1, 0.5), (0.5, 1), (1, 1.5))]
     np.testing.assert_allclose(parts, [0.25, 0.75, 0.25])
