@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.errors import InputError
 from verify.scene import Box, DiscCut, PolygonCut, Scene
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.cuts import distance_to_cuts
 
 Array = NDArray[np.float64]
@@ -167,7 +167,7 @@ _STATIONS = (12, 3)  # hats of 30 degrees along a round front; along a straight 
 _WAY = 0.75
 
 
-def front_at(scene: Scene, asked: StressIntensityQuantity) -> tuple[Front, Array]:
+def front_at(scene: Scene, asked: FractureQuantity) -> tuple[Front, Array]:
     """Give the front around a point at which a factor is asked for, and radii of domains, m.
 
     A straight front is the part of it that hats at the point lie on. The radii are 0 where the
@@ -194,7 +194,7 @@ def station_spacing(front: Front) -> float:
     return front.length / (station_count(front) + (0 if front.closed else 1))
 
 
-def front_reach(scene: Scene, asked: StressIntensityQuantity) -> float:
+def front_reach(scene: Scene, asked: FractureQuantity) -> float:
     """Distance (m) from a front to what a domain must not meet; 0 if it meets it.
 
     Of a round front all of it counts; of a straight one what of it the hats at a point lie on.
@@ -261,7 +261,7 @@ def _straight_reach(cut: PolygonCut, point: Array, box: Array, others: list[Any]
     return reach if reach > 0.5 * length / (_AROUND - 1) else 0.0
 
 
-def _cut(scene: Scene, asked: StressIntensityQuantity) -> DiscCut | PolygonCut:
+def _cut(scene: Scene, asked: FractureQuantity) -> DiscCut | PolygonCut:
     cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
     if not isinstance(cut, DiscCut | PolygonCut):
         raise InputError(f"cut '{asked.cut}' is neither a disc nor a polygon")

@@ -1,4 +1,4 @@
-"""Stress intensity factors along a front in space, by the interaction integral in domain form."""
+"""Stress intensity factors and G along a front in space, by integrals in domain form."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ _SAMPLES = 480  # places along a front, where weights are integrated
 
 @dataclass(frozen=True)
 class FrontIntensity:
-    """Stress intensity factors along a front, Pa·√m.
+    """Stress intensity factors along a front, Pa·√m, and its energy release rate.
 
     Attributes
     ----------
@@ -38,14 +38,17 @@ class FrontIntensity:
     modes : (c, 3) array
         K_I, K_II and K_III, means over the domains. K_II is positive where the upper face, seen
         across the front, slides ahead; K_III where it slides along the front's third axis.
+    release : (c,) array
+        G, J/m², means over the domains.
     spread : (c, 3) array
-        Largest deviation of a domain from the mean.
+        Largest deviation of a domain from the mean, of the factors.
     domains : (r, c, 3) array
-        By domain.
+        Factors by domain.
     """
 
     along: Array
     modes: Array
+    release: Array
     spread: Array
     domains: Array
 
@@ -71,6 +74,8 @@ def front_intensity(
     extension q points
     ahead of the front, falls off linearly from half the radius to the radius, and along the front
     by a hat per station: K is a mean with that weight. Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds.
+    G is ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds, of the
+    field alone.
 
     Parameters
     ----------
@@ -132,10 +137,10 @@ def front_intensity(
             f"{stations} stations along a front of {front.length:.4g} m: one of them has no node "
             "of the mesh; ask for fewer, or refine"
         )
-    scale = np.array([modulus, modulus, hooke(material).shear]) / extents[:, None]
+    scale = np.array([modulus, modulus, hooke(material).shear, 1.0]) / extents[:, None]
     domains = np.array([(hats * fall) @ nodal * scale for fall in falls])
-    mean = domains.mean(axis=0)
-    return FrontIntensity(centres, mean, np.abs(domains - mean).max(axis=0), domains)
+    mean, spread = domains.mean(axis=0), np.abs(domains - domains.mean(axis=0)).max(axis=0)
+    return FrontIntensity(centres, mean[:, :3], mean[:, 3], spread[:, :3], domains[:, :, :3])
 
 
 def _stations(front: Front, count: int) -> tuple[Array, float | None]:
@@ -213,17 +218,17 @@ def _nodal_shares(
     stresses: Stresses,
     step: int,
 ) -> Array:
-    """M (c, 3) of the three modes, linear in the extension of each node along `ahead` (c, 3)."""
-    nodal = np.zeros((len(ahead), 3))
+    """M of the modes and G (c, 4), linear in the extension of each node along `ahead` (c, 3)."""
+    nodal = np.zeros((len(ahead), 4))
     for start in range(0, len(cells), _CHUNK):
         part, corners = cells[start : start + _CHUNK], nodes[start : start + _CHUNK]
         field = cell_gradients(solution, part, step)
         stress = stresses(part, field)
         forces = None if force is None else force(part, field)
         found = _interaction(material, front, field, stress, ahead[corners], forces)
-        for mode in range(3):
-            values = found[:, :, mode].ravel()
-            nodal[:, mode] += np.bincount(corners.ravel(), values, minlength=len(ahead))
+        for column in range(4):
+            values = found[:, :, column].ravel()
+            nodal[:, column] += np.bincount(corners.ravel(), values, minlength=len(ahead))
     return nodal
 
 
@@ -235,7 +240,7 @@ def _interaction(
     ahead: Array,
     forces: Array | None,
 ) -> Array:
-    """M (m, 4, 3) of the three modes in some cells, if a corner alone moves by one ahead."""
+    """M of the modes and G (m, 4, 4) in some cells, if a corner alone moves by one ahead."""
     local = front.coordinates(at.points.reshape(-1, 3))
     axes = local.axes
     # a corner's direction and slopes in the axes of each point: (points, 4, 3)
@@ -247,17 +252,22 @@ def _interaction(
     turned = gradient.swapaxes(1, 2)
     share = np.tile(at.corner_shares, (len(at.points), 1))
     weights = at.weights.reshape(-1, 1)
-    found = np.empty((len(at.points), 4, 3))
-    for mode in (1, 2, 3):
-        field = mode_field(mode, material, local.ahead, local.across, front.curvature)
-        work = np.sum(field.stress * gradient, axis=(1, 2))  # σ̂ : ε = σ : ε̂
-        flux = field.gradient.swapaxes(1, 2) @ stress + turned @ field.stress
+    found = np.empty((len(at.points), 4, 4))
+    for mode in (1, 2, 3, 4):
+        if mode < 4:
+            field = mode_field(mode, material, local.ahead, local.across, front.curvature)
+            work = np.sum(field.stress * gradient, axis=(1, 2))  # σ̂ : ε = σ : ε̂
+            moved = field.gradient.swapaxes(1, 2)
+            flux = moved @ stress + turned @ field.stress
+            source = (turned @ field.divergence[:, :, None])[:, :, 0]
+            source[:, 0] += np.sum(stress * field.misfit, axis=(1, 2))
+        else:  # the field itself
+            work, moved = 0.5 * np.sum(stress * gradient, axis=(1, 2)), turned
+            flux, source = moved @ stress, np.zeros((len(turned), 3))
         flux[:, [0, 1, 2], [0, 1, 2]] -= work[:, None]
-        source = (turned @ field.divergence[:, :, None])[:, :, 0]
-        source[:, 0] += np.sum(stress * field.misfit, axis=(1, 2))
         if forces is not None:
             force = axes @ forces.reshape(-1, 3, 1)
-            source -= (field.gradient.swapaxes(1, 2) @ force)[:, :, 0]
+            source -= (moved @ force)[:, :, 0]
         density = np.sum((unit @ flux) * slope, axis=2)
         density += share * (unit @ source[:, :, None])[:, :, 0]
         found[:, :, mode - 1] = (weights * density).reshape(len(at.points), -1, 4).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Stress-intensity factors of tips in the plane, by interaction integrals over rings of cells."""
+"""Stress-intensity factors and G of tips in the plane, by integrals over rings of cells."""
 
 from dataclasses import dataclass
 
@@ -103,20 +103,23 @@ def ring(
 
 @dataclass(frozen=True)
 class StressIntensity:
-    """Stress intensity factors at a tip, Pa·√m.
+    """Stress intensity factors at a tip, Pa·√m, and its energy release rate.
 
     Attributes
     ----------
     mode_1, mode_2 : float
         K_I and K_II, means over the domains.
+    release : float
+        G, J/m²: mean over the domains of the integral of the field itself.
     spread : (2,) array
-        Largest deviation of a domain from the mean, of each.
+        Largest deviation of a domain from the mean, of each factor.
     domains : (r, 2) array
-        By domain.
+        Factors by domain.
     """
 
     mode_1: float
     mode_2: float
+    release: float
     spread: Array
     domains: Array
 
@@ -142,7 +145,9 @@ def stress_intensity(
     moves the tip by one, and δu = u_,t − ω u: the faces of the arc and an isotropic law stay what
     they are in it (J. K. Knowles & E. Sternberg, Arch. Ration. Mech. Anal. 44, 1972), so that the
     integral has no terms of the curvature. The fields of both modes are in equilibrium and free
-    of traction on the crack; a tip that stands still has them in a motion too.
+    of traction on the crack; a tip that stands still has them in a motion too. G is the domain
+    form of Rice's J of the field alone (C. F. Shih, B. Moran & T. Nakamura, Int. J. Fract. 30,
+    1986), ∫ (σ_ij δu_i − ½ σ:ε t_j) q,_j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δu_i q dA.
 
     Parameters
     ----------
@@ -179,7 +184,7 @@ def stress_intensity(
     force = net_force(solution, material, body_force, drag, step)
     modes = tip_fields(material, tip, direction, arc)
     u = solution.displacement[step]
-    values = []
+    values, released = [], []
     for radius in np.atleast_1d(radii):
         around = ring(solution, tip, float(radius), force is not None, step)
         at = around.at
@@ -192,10 +197,14 @@ def stress_intensity(
             _interaction(around, law, stress, change, way, turn, mode, forces) for mode in modes
         ]
         values.append([0.5 * law.plane_modulus * one for one in found])
+        flux = np.einsum("mqij,mqi->mqj", stress, change)
+        flux -= 0.5 * np.sum(stress * at.gradient, axis=(2, 3))[..., None] * way
+        released.append(_integral(around, flux, change, forces))
     domains = np.array(values)
     mean = domains.mean(axis=0)
     spread = np.abs(domains - mean).max(axis=0)
-    return StressIntensity(float(mean[0]), float(mean[1]), spread, domains)
+    release = float(np.mean(released))
+    return StressIntensity(float(mean[0]), float(mean[1]), release, spread, domains)
 
 
 def _interaction(
@@ -220,7 +229,12 @@ def _interaction(
     flux = np.einsum("mqij,mqi->mqj", stress, own)
     flux += np.einsum("mqij,mqi->mqj", law.stress(gradient), change)
     flux -= np.sum(stress * gradient, axis=(2, 3))[..., None] * way
+    return _integral(around, flux, own, forces)
+
+
+def _integral(around: Ring, flux: Array, change: Array, forces: Array | None) -> float:
+    """Integrate a flux (m, q, 2) on ∇q, less the work of forces on the change (m, q, 2) on q."""
     density = np.sum(flux * around.grad_q, axis=2)
     if forces is not None:
-        density -= np.sum(forces * own, axis=2) * around.q
-    return float(np.sum(density * at.weights))
+        density -= np.sum(forces * change, axis=2) * around.q
+    return float(np.sum(density * around.at.weights))

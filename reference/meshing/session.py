@@ -25,7 +25,7 @@ from reference.meshing.interfaces import plane_interfaces
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.tool_path import Cut
 
 Array = NDArray[np.float64]
@@ -168,7 +168,7 @@ def clear_radii(scene: Scene, points: Array) -> Array:
     asked = [
         cuts[one.cut].vertices()[0 if one.end == "start" else -1]
         for one in scene.quantities
-        if isinstance(one, StressIntensityQuantity)
+        if isinstance(one, FractureQuantity)
     ]
     from_asked = np.linalg.norm(points[:, None] - np.reshape(asked, (1, -1, 2)), axis=2)
     return np.where((from_asked <= touching).any(axis=1), nearest, np.inf)

@@ -28,6 +28,7 @@ ASKED = [
     for end in ("start", "end")
     for mode in ("I", "II")
 ]
+RELEASED = {"kind": "energy_release_rate"}
 
 
 def griffith(**more):
@@ -38,7 +39,10 @@ def griffith(**more):
 
 @pytest.mark.fenicsx
 def test_a_graded_solution_has_the_factors_of_the_exact_crack_at_both_ends():
-    case = griffith(reference={"kind": "conforming", "size": 0.8, "levels": 3})
+    asked = [*ASKED, RELEASED | {"name": "G", "end": "end"}]
+    case = griffith(
+        quantities=asked, reference={"kind": "conforming", "size": 0.8, "levels": 3}
+    )  # fmt: skip
     exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
     body, law = body_of(case, exact.singular_points), hooke(case.material)
     stated = exact_reference(case, exact, body, law).quantities
@@ -49,7 +53,11 @@ def test_a_graded_solution_has_the_factors_of_the_exact_crack_at_both_ends():
         assert width == 0.0
         # P2 graded to the tips, a coarse mesh away from them
         assert abs(found - expected) < 0.01 * scale, asked.name
-    assert unit_of(case.quantities[0], 2) == "Pa √m"
+    assert stated["G"][0] == pytest.approx(
+        (stated["K_I at the end"][0] ** 2 + stated["K_II at the end"][0] ** 2)
+        * (1 - case.material.poisson**2) / case.material.young
+    )  # fmt: skip
+    assert [unit_of(case.quantities[i], 2) for i in (0, -1)] == ["Pa √m", "J/m²"]
 
 
 @pytest.mark.fenicsx
@@ -234,7 +242,8 @@ def test_the_factors_of_a_pressed_crack_are_those_of_its_closed_form():
         "quantities": [
             {"kind": "stress_intensity", "name": mode, "end": "end", "mode": mode}
             for mode in ("I", "II")
-        ],
+        ]
+        + [RELEASED | {"name": "G", "end": "end"}],
         "acceptance": [],
         "reference": {"kind": "conforming"},
     }
@@ -296,17 +305,21 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field_and_found_at
     next to the front, whose own share of the integral is h/r again: 4 % of the largest factor.
     """
     modes = ("I", "II", "III")
-    scene = straight(16, *({"mode": mode} for mode in modes))
+    scene = straight(16, *({"mode": mode} for mode in modes), RELEASED)
     integrate, calls = fracture.front_intensity, []
     monkeypatch.setattr(
         fracture, "front_intensity", lambda *a, **k: calls.append(1) or integrate(*a, **k)
     )
     one = Measured(sampled(scene, 16), body_of(scene), law_of(scene), scene)
     values = [one.quantity(asked) for asked in scene.quantities]
-    assert values == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
+    assert values[:3] == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
+    released = 0.91 * (1.0**2 + 0.6**2) + 1.3 * 0.8**2
+    assert values[3] == pytest.approx(released, rel=2 * 0.04)
     assert len(calls) == 1
     exact = exact_of(scene)
-    assert [exact_intensity(scene, exact, q) for q in scene.quantities] == [1.0, 0.6, -0.8]
+    assert [exact_intensity(scene, exact, q) for q in scene.quantities] == pytest.approx(
+        [1.0, 0.6, -0.8, released]
+    )
 
 
 def test_a_polygon_whose_faces_bear_a_shear_has_the_factors_of_the_field_that_frees_them():

@@ -38,7 +38,7 @@ def factors(scene, solution, share=1.0):
         )
         for t in tips(scene)
     ]
-    return np.array([[one.mode_1, one.mode_2] for one in found])
+    return np.array([[one.mode_1, one.mode_2, one.release] for one in found])
 
 
 def test_ends_of_arcs_are_tips_and_an_exact_solution_states_both():
@@ -66,10 +66,14 @@ class TestOnTheReference:
         scene = plate_with_an_arc(start, sweep)
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
         expected = np.array([exact.intensity_at(tip.point) for tip in tips(scene)])
+        released = np.sum(expected**2, axis=1) / exact.law.plane_modulus
         found = {}
         for level in (0, 1):
             solution = find_solver("reference").solve(scene, level, repetitions=0)
-            found[level] = [factors(scene, solution, share) for share in (1.0, 0.25)]
+            both = [factors(scene, solution, share) for share in (1.0, 0.25)]
+            found[level] = [one[:, :2] for one in both]
+            for one in both:  # quadratic in K: twice its share
+                assert one[:, 2] == pytest.approx(released, abs=0.04 * released.max() / 2.5**level)
         off = {n: [np.abs(k - expected).max() for k in both] for n, both in found.items()}
         # straight edges along the arc: (h/R)²/8 of the sagitta at h = R/2.3, then half of it
         assert max(off[0]) < 0.02 * np.abs(expected).max()

@@ -43,6 +43,9 @@ def test_both_modes_are_told_apart_in_the_exact_tip_field(intensity):
         found = stress_intensity(field, STRAIN, ORIGIN, ALONG_X, [0.4, 0.6, 0.8])
         assert [found.mode_1, found.mode_2] == pytest.approx(intensity, abs=tolerance)
         assert found.spread.max() < tolerance
+        # Irwin's (K_I² + K_II²)/E'; the field times its own error, twice as often as in K
+        expected = (intensity[0] ** 2 + intensity[1] ** 2) / MODULUS
+        assert found.release == pytest.approx(expected, abs=2 * tolerance)
 
 
 def test_the_intensity_does_not_depend_on_the_axes():
@@ -55,6 +58,7 @@ def test_the_intensity_does_not_depend_on_the_axes():
     one = stress_intensity(field, STRAIN, ORIGIN, ALONG_X, [0.51])
     two = stress_intensity(turned, STRAIN, np.array([3.0, 1.0]), turn @ ALONG_X, [0.51])
     assert [two.mode_1, two.mode_2] == pytest.approx([one.mode_1, one.mode_2], abs=1e-12)
+    assert two.release == pytest.approx(one.release, abs=1e-12)
 
 
 def test_only_ends_inside_the_body_that_end_free_are_tips():

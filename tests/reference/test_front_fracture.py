@@ -58,6 +58,9 @@ def test_the_three_modes_are_told_apart_in_the_exact_fields_of_a_prism(intensity
     # the interpolant's gradient is off by (h/r)² √r of K/E' at h = 1/8: percents next to the front
     # only, where the fields change sign
     assert found.modes == pytest.approx(np.tile(intensity, (2, 1)), abs=6e-3)
+    # Irwin's (K_I² + K_II²)/E' + K_III²/2μ with E' = 1/0.91 and μ = 1/2.6; 1/2μ is 1.3
+    expected = 0.91 * (intensity[0] ** 2 + intensity[1] ** 2) + 1.3 * intensity[2] ** 2
+    assert found.release == pytest.approx([expected] * 2, abs=1.3 * 2 * 6e-3)
     assert found.spread.max() < 6e-3
 
 

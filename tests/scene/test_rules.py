@@ -180,6 +180,11 @@ BROKEN = [
     ({"d": 3, "quantities": factor(end="end"), "cuts": [PATH3], "analysis": MOVES,
       "material": HEAVY3},
      "quantities[0].mode: III alone is measured behind the blade of a tool_path"),
+    ({"d": 3, "quantities": factor(kind="energy_release_rate", end="end"), "cuts": [PATH3],
+      "analysis": MOVES, "material": scenes.soft(3, density=1.0)},
+     "quantities[0].cut: 'cut' is opened on the way; released_to_cut says what its blade takes"),
+    ({"quantities": factor(kind="energy_release_rate"), "cuts": [LINE]},
+     "quantities[0].end: a factor in 2D is at 'end = …'"),
     ({"quantities": factor(), "cuts": [LINE]}, "quantities[0].end: a factor in 2D is at 'end = …'"),
     ({"d": 3, "quantities": factor(end="end"), "cuts": [DISC]},
      "quantities[0].point: a factor in 3D is at 'point = …'"),
@@ -433,7 +438,7 @@ def test_a_broken_rule_is_named_with_its_place(changes, message):
 
 
 def is_broken(place, text, messages):
-    where = re.escape(re.sub(r"\[[\w*]+\]", "[0]", place)) + (": " if place else "")
+    where = re.escape(re.sub(r"\[[\w*|]+\]", "[0]", place)) + (": " if place else "")
     said = re.compile(where + ".*".join(map(re.escape, re.split(r"{.*?}", text))))
     return any(said.match(message) for _, message in messages)
 

@@ -10,7 +10,7 @@ from verify.compare.strain_energy import strain_energy
 from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.result import Notice, NoticeKind, SolveRecord, Status, finest_of
 from verify.scene import RatioCheck, Scene
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.solution import Solution
 
 _ALL = 1.0  # relative error of a solver that answers zero
@@ -123,7 +123,7 @@ def ringing_factors(scene: Scene, levels: Mapping[int, Solution]) -> list[Notice
     levels : mapping of int to Solution
         Of a conforming reference: every level halves step and elements. Empty without one.
     """
-    names = [one.name for one in scene.quantities if isinstance(one, StressIntensityQuantity)]
+    names = [one.name for one in scene.quantities if isinstance(one, FractureQuantity)]
     duration = scene.analysis.duration
     if not names or not levels or duration is None:
         return []

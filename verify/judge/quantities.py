@@ -26,6 +26,7 @@ from verify.judge.stress_intensity import Found, solution_intensity
 from verify.scene import Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,
+    FractureQuantity,
     MaximumDisplacementQuantity,
     OpeningQuantity,
     PartQuantity,
@@ -101,10 +102,10 @@ class Measured:
         InputError
             If it is asked for at a time that the solution does not reach.
         """
-        if isinstance(asked, StressIntensityQuantity):
+        if isinstance(asked, FractureQuantity):
             if self.scene is None:
                 raise UnsupportedSceneError("a stress-intensity factor needs the scene")
-            if asked.mode == "III" and asked.point is None:  # at a blade
+            if isinstance(asked, StressIntensityQuantity) and asked.at_blade:
                 return blade_intensity(self.scene, self.motion, self.body, asked)
             return solution_intensity(self.scene, self.solution, asked, self._factors)
         if isinstance(asked, PartQuantity):
@@ -134,8 +135,8 @@ def unit_of(asked: Quantity, dimension: int) -> str:
     """SI unit of a quantity; energies of plane scenes are per metre of thickness."""
     if isinstance(asked, PartQuantity):
         return part_unit(asked, dimension)
-    if asked.kind == "stress_intensity":
-        return "Pa √m"
+    if isinstance(asked, FractureQuantity):
+        return "J/m²" if asked.column < 0 else "Pa √m"
     if asked.kind == "strain_energy":
         return "J/m" if dimension == 2 else "J"
     return "m"

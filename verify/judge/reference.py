@@ -43,11 +43,11 @@ from verify.records import ReferenceRecord
 from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,
+    FractureQuantity,
     MaximumDisplacementQuantity,
     OpeningQuantity,
     PartQuantity,
     Quantity,
-    StressIntensityQuantity,
 )
 from verify.solution import Solution
 
@@ -145,7 +145,7 @@ def _exact_quantity(
     motion = ExactMotion(exact, end)
     if isinstance(asked, PartQuantity):
         return None  # which parts there are is known of meshes only
-    if isinstance(asked, StressIntensityQuantity):
+    if isinstance(asked, FractureQuantity):
         stated = exact_intensity(scene, field_at(exact, asked.time or end), asked)
         return None if stated is None else (stated, 0.0)
     if isinstance(asked, MaximumDisplacementQuantity):
@@ -331,7 +331,7 @@ def _order_at_the_tip(
     to do with a factor before they pass its tip. The difference of levels near the tip has that
     of their factors in it: its order counts once, not twice as that of a Galerkin solution.
     """
-    if not isinstance(asked, StressIntensityQuantity) or scene.analysis.kind == "static":
+    if not isinstance(asked, FractureQuantity) or scene.analysis.kind == "static":
         return None
     if cut_on_the_way(scene) or "energy_norm_near" not in steps[-1].norms:
         return None

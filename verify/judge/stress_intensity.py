@@ -1,4 +1,4 @@
-"""Stress-intensity factors of any solver's solution, by the reference's interaction integral."""
+"""Stress-intensity factors and G of any solution, by the domain integrals of the reference."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +21,7 @@ from verify.scene import (
     ToolPathCut,
     is_uniform,
 )  # fmt: skip
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.physics import factor_at, jumps
 from verify.solution import Solution
 
@@ -31,10 +31,10 @@ _SAME_TIME = 1e-9  # of the duration
 _AROUND = 65  # directions, and distances, in which the material around a tip is looked at
 
 
-def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+def intensity_defect(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a factor cannot be had from any solution of a scene, or None."""
     cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
-    if asked.mode == "III" and isinstance(cut, ToolPathCut):  # the scene was checked: at a blade
+    if asked.at_blade:
         return None
     if scene.cell_dimension < scene.dimension or scene.analysis.kinematics != "linear":
         return "stress-intensity factors are measured in linear kinematics, and not in membranes"
@@ -58,7 +58,7 @@ def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None
     return no_tip(scene, asked.cut, asked.end)
 
 
-def _front_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+def _front_defect(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a factor at a front cannot be had from any solution of a scene, or None."""
     if not isinstance(scene.geometry, Box):
         return "factors along a front are measured in boxes"
@@ -69,7 +69,7 @@ def _front_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     return None
 
 
-def _defect_on_faces(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+def _defect_on_faces(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a factor cannot be had from a cut whose faces are loaded, or None."""
     for load in _face_loads(scene, asked):
         if not is_uniform(load.components):
@@ -79,11 +79,11 @@ def _defect_on_faces(scene: Scene, asked: StressIntensityQuantity) -> str | None
     return None
 
 
-def _face_loads(scene: Scene, asked: StressIntensityQuantity) -> list[CutFaces]:
+def _face_loads(scene: Scene, asked: FractureQuantity) -> list[CutFaces]:
     return [load for load in scene.loads if isinstance(load, CutFaces) and load.cut == asked.cut]
 
 
-def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+def _defect_in_time(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a factor cannot be had at the time at which it is asked for, or None."""
     duration = scene.analysis.duration
     if duration is None:
@@ -108,9 +108,9 @@ def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
 
 
 def solution_intensity(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, found: Found | None = None
+    scene: Scene, solution: Solution, asked: FractureQuantity, found: Found | None = None
 ) -> float:
-    """K_I, K_II or K_III in Pa √m at an end of a cut or a point of a front, from the field alone.
+    """K_I, K_II, K_III (Pa √m) or G (J/m²) at the end of a cut or a point of a front, by the field.
 
     The mean over domains around the end as asked: a tip that a solver has put elsewhere shows.
 
@@ -118,7 +118,7 @@ def solution_intensity(
     ----------
     scene : Scene
     solution : Solution
-    asked : StressIntensityQuantity
+    asked : FractureQuantity
     found : dict, optional
         What other factors of the same solution share, and this one adds to: the modes of a tip, and
         the stress of the field.
@@ -132,10 +132,10 @@ def solution_intensity(
         If the solution has no field at that time.
     """
     found = {} if found is None else found
-    time, mode = _time(scene, asked), ("I", "II", "III").index(asked.mode)
+    time, column = _time(scene, asked), asked.column
     place = asked.cut, asked.end, None if asked.point is None else tuple(asked.point), time
     if place in found:
-        return found[place][mode]
+        return found[place][column]
     if reason := intensity_defect(scene, asked):
         raise UnsupportedSceneError(reason)
     step = int(np.argmin(np.abs(solution.times - time)))
@@ -154,7 +154,7 @@ def solution_intensity(
         found[place] = modes(scene, free, asked, given, found if free is solution else {})
     except InputError as problem:
         raise UnsupportedSceneError(str(problem)) from None
-    return found[place][mode]
+    return found[place][column]
 
 
 def _shared_stresses(solution: Solution, material: Material, step: int, found: Found) -> Any:
@@ -169,7 +169,7 @@ def _shared_stresses(solution: Solution, material: Material, step: int, found: F
 
 
 def _tip_modes(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any],
+    scene: Scene, solution: Solution, asked: FractureQuantity, given: dict[str, Any],
     found: Found,
 ) -> tuple[float, ...]:  # fmt: skip
     from reference.fracture import DomainError, stress_intensity, tip_at
@@ -185,18 +185,18 @@ def _tip_modes(
         )  # fmt: skip
     except DomainError as problem:
         raise InputError(f"{problem}: {tip.nearest}, {tip.reach:.4g} m away") from None
-    return modes.mode_1, modes.mode_2
+    return modes.mode_1, modes.mode_2, modes.release
 
 
 def _front_modes(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any],
-    found: Found,
+    scene: Scene, solution: Solution, asked: FractureQuantity, given: dict[str, Any],
+    shared: Found,
 ) -> tuple[float, ...]:  # fmt: skip
-    """K_I, K_II and K_III (Pa √m) at the point of a front, from the field alone.
+    """K_I, K_II, K_III (Pa √m) and G (J/m²) at the point of a front, from the field alone.
 
-    Each station of the interaction integral gives the mean of K with a hat along the front; the
-    second difference of three stations, over 12, makes it K at the middle but for the fourth
-    order of the hat's width. At a straight front the hats reach to its nearer end.
+    Each station of the integrals gives a mean with a hat along the front; the second difference of
+    three stations, over 12, makes it the value at the middle but for the fourth order of the hat's
+    width. At a straight front the hats reach to its nearer end.
 
     Raises
     ------
@@ -208,18 +208,18 @@ def _front_modes(
     front, radii = front_at(scene, asked)
     stations, middle = station_count(front), 0 if front.closed else 1
     material = scene.material.each[0]
-    stresses = _shared_stresses(solution, material, given["step"], found)
-    modes = front_intensity(
+    stresses = _shared_stresses(solution, material, given["step"], shared)
+    found = front_intensity(
         solution, material, front, radii, stations=stations, fitted=False, stresses=stresses,
         **given,
-    ).modes  # fmt: skip
-    around = modes[middle - 1] - 2.0 * modes[middle] + modes[middle + 1]
-    k_1, k_2, k_3 = modes[middle] - around / 12.0
-    return float(k_1), float(k_2), float(k_3)
+    )  # fmt: skip
+    rows = np.column_stack([found.modes, found.release])
+    around = rows[middle - 1] - 2.0 * rows[middle] + rows[middle + 1]
+    return tuple((rows[middle] - around / 12.0).tolist())
 
 
 def _with_free_faces(
-    scene: Scene, solution: Solution, asked: StressIntensityQuantity, time: float
+    scene: Scene, solution: Solution, asked: FractureQuantity, time: float
 ) -> Solution:
     """Add the uniform stress that frees the loaded faces of a cut: K is that of both fields."""
     loads = _face_loads(scene, asked)
@@ -272,8 +272,11 @@ def _material_around(scene: Scene, tip: Array, radius: float) -> Material:
     return scene.material.each[found[0]]
 
 
-def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) -> float | None:
-    """Factor that an exact solution states, Pa √m; None if it states none."""
+def exact_intensity(scene: Scene, exact: Any, asked: FractureQuantity) -> float | None:
+    """Factor (Pa √m) or G (J/m²) that an exact solution states; None if it states none.
+
+    Of a tip at rest G = (K_I² + K_II²)/E' + K_III²/2μ (Irwin 1957).
+    """
     if hasattr(exact, "intensity_at"):  # its tips differ
         cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
         point = asked.point
@@ -282,11 +285,18 @@ def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) ->
         stated = exact.intensity_at(point)
     else:
         stated = getattr(exact, "stress_intensity", None)
-    place = ("I", "II", "III").index(asked.mode)
-    return None if stated is None or len(stated) <= place else float(stated[place])
+    if stated is None or len(stated) <= asked.column:
+        return None
+    if asked.column >= 0:
+        return float(stated[asked.column])
+    from reference.exact.field import hooke
+
+    law = hooke(scene.material.each[0])
+    k_1, k_2, k_3 = [*stated, 0.0][:3]
+    return float((k_1**2 + k_2**2) / law.plane_modulus + k_3**2 / (2.0 * law.shear))
 
 
-def _time(scene: Scene, asked: StressIntensityQuantity) -> float:
+def _time(scene: Scene, asked: FractureQuantity) -> float:
     """Time at which a factor is asked for, s; 0 in statics."""
     return float(scene.analysis.output_times[-1] if asked.time is None else asked.time)
 

@@ -5,7 +5,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.runner.mesh_faults import check_overlaps
 from verify.scene import MeshFile, Scene, read_mesh
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.placement import empty_region, group_fault, part_without_mesh
 from verify.scene.strict import nearest
 from verify.solvers import solver_names
@@ -32,7 +32,7 @@ def check_scene(scene: Scene) -> None:
     if scene.played_only is None:
         _check_mechanics(scene, exact)
     for i, asked in enumerate(scene.quantities):
-        if isinstance(asked, StressIntensityQuantity) and (reason := _missing(scene, asked)):
+        if isinstance(asked, FractureQuantity) and (reason := _missing(scene, asked)):
             raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
     for i, check in enumerate(scene.acceptance):
         for name in (check.solver, check.compared):
@@ -77,7 +77,7 @@ def _exact_of(scene: Scene, where: str) -> Any:
         raise InputError(f"exact: {error}", where) from None
 
 
-def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+def _missing(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a stress-intensity factor cannot be had from any solution, or None."""
     from verify.judge.stress_intensity import intensity_defect
 

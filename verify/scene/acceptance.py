@@ -116,10 +116,9 @@ class PartQuantity(Strict):
     )  # fmt: skip
 
 
-class StressIntensityQuantity(Strict):
-    """A factor at an end of a plane cut, a point of a front, or of mode III at a blade, Pa √m."""
+class FractureQuantity(Strict):
+    """What is asked for at an end of a plane cut, or at a point of a front."""
 
-    kind: Literal["stress_intensity"]
     name: Line
     cut: str = "cut"
     end: Literal["start", "end"] | None = Field(
@@ -128,19 +127,36 @@ class StressIntensityQuantity(Strict):
     point: Point3 | None = Field(
         default=None, description="3D: a point of the front of a disc or polygon, m"
     )
-    mode: Literal["I", "II", "III"] = Field(default="I", description="III in 3D only")
-    radius: Positive | None = Field(
-        default=None,
-        description="mode III: how far behind the blade of a tool path in space the cut is read, m",
-    )
     time: NonNegative | None = Field(
         default=None, description="dynamic: an output time, s; default the last"
     )
 
     @property
+    def column(self) -> int:
+        """Place among K_I, K_II, K_III, G."""
+        return len(getattr(self, "mode", "")) - 1
+
+    @property
     def at_blade(self) -> bool:
         """Whether it is asked for at a blade, not at a point of a front."""
-        return self.mode == "III" and self.point is None
+        return self.column == 2 and self.point is None
+
+
+class EnergyReleaseQuantity(FractureQuantity):
+    """The energy release rate G, J/m²: of its own domain integral, not of factors."""
+
+    kind: Literal["energy_release_rate"]
+
+
+class StressIntensityQuantity(FractureQuantity):
+    """A factor at an end of a plane cut, a point of a front, or of mode III at a blade, Pa √m."""
+
+    kind: Literal["stress_intensity"]
+    mode: Literal["I", "II", "III"] = Field(default="I", description="III in 3D only")
+    radius: Positive | None = Field(
+        default=None,
+        description="mode III: how far behind the blade of a tool path in space the cut is read, m",
+    )
 
     rules: ClassVar[Rules] = (
         ("", lambda p: p.at_blade != (p.radius is not None),
@@ -156,6 +172,7 @@ Quantity = Annotated[
     | MaximumDisplacementQuantity
     | OpeningQuantity
     | PartQuantity
+    | EnergyReleaseQuantity
     | StressIntensityQuantity,
     Field(discriminator="kind"),
 ]

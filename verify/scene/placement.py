@@ -14,6 +14,7 @@ from verify.errors import InputError
 from verify.geometry.nearest import distance_to_outline, distance_to_pieces
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.cuts import ArcCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle
 from verify.scene.parts import held_facets, on_part, pieces_on_part
@@ -282,7 +283,7 @@ def misplaced_point(
             cut = next(cut for cut in _known(scene) if cut.name == asked.cut)
             place = f"quantities[{i}].at: {asked.at} of cut '{asked.cut}' is at"
             point = point_along(cut.vertices(), asked.at or 0.0)
-        if point is None or asked.kind == "stress_intensity":
+        if point is None or isinstance(asked, FractureQuantity):
             continue
         at = np.array(point, dtype=float)
         where = f"{place} ({', '.join(f'{x:.6g}' for x in at)})"

@@ -1,10 +1,10 @@
 """The scene, and the rules that take more than one of its tables.
 
 Each rule is a row of a table: place, what breaks the rule, message. A place with brackets is a key
-of the entries of a list: of all (``supports[*].where``), or of those of a kind
-(``loads[gravity].acceleration``). What breaks a rule is asked of the scene, or of the scene and the
-entry. It answers with nothing where the rule holds, else with what the braces of the message stand
-for.
+of the entries of a list: of all (``supports[*].where``), or of those of some kinds
+(``loads[gravity].acceleration``, ``loads[gravity|traction]``). What breaks a rule is asked of the
+scene, or of the scene and the entry. It answers with nothing where the rule holds, else with what
+the braces of the message stand for.
 """
 
 import re
@@ -43,8 +43,8 @@ def first_fault_of_parts(scene: SceneTables) -> str | None:
     """Say in one line which parts of a scene do not fit together; None if all do."""
     for path, rows in _BY_LIST:
         for place, parts in _entries(scene, path):
-            kinds = ("*", getattr(parts[-1], "kind", "*"))
-            rules = tuple(rule for kind, rule in rows if kind in kinds)
+            own = {"*", getattr(parts[-1], "kind", "*")}
+            rules = tuple(rule for kinds, rule in rows if own.intersection(kinds.split("|")))
             if found := first_broken(rules, *parts, place=place):
                 return found
     return None
@@ -318,22 +318,26 @@ RULES: Rules = (
     ("quantities[opening].point",
      lambda s, p: s.dimension == 3 and (p.point is None or p.at is not None),
      "an opening in 3D is at 'point = …'"),
-    ("quantities[stress_intensity].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    ("quantities[stress_intensity|energy_release_rate].cut",
+     lambda s, p: _no_cut(s, p.cut), _NO_CUT),
     ("quantities[stress_intensity].mode",
      lambda s, p: p.mode == "III" and s.dimension == 2, "III belongs to 3D scenes"),
     ("quantities[stress_intensity].mode",
      lambda s, p: p.mode != "III" and s.dimension == 3 and _at_an_end(s, p),
      "III alone is measured behind the blade of a tool_path"),
-    ("quantities[stress_intensity].end", lambda s, p: _at_an_end(s, p)
+    ("quantities[energy_release_rate].cut",
+     lambda s, p: s.dimension == 3 and _at_an_end(s, p) and p.cut,
+     "'{}' is opened on the way; released_to_cut says what its blade takes"),
+    ("quantities[stress_intensity|energy_release_rate].end", lambda s, p: _at_an_end(s, p)
      and (p.end is None or p.point is not None) and s.dimension, "a factor in {}D is at 'end = …'"),
-    ("quantities[stress_intensity].point", lambda s, p: not _at_an_end(s, p)
+    ("quantities[stress_intensity|energy_release_rate].point", lambda s, p: not _at_an_end(s, p)
      and (p.point is None or p.end is not None), "a factor in 3D is at 'point = …'"),
-    ("quantities[stress_intensity].cut",
+    ("quantities[stress_intensity|energy_release_rate].cut",
      lambda s, p: _cut(s, p.cut).kind == "arc" and _cut(s, p.cut).closed and p.cut,
      "'{}' is closed and has no end"),
-    ("quantities[stress_intensity].cut", _no_front,
+    ("quantities[stress_intensity|energy_release_rate].cut", _no_front,
      "factors in 3D are known along the fronts of round discs and of polygons"),
-    ("quantities[stress_intensity].point", _off_front,
+    ("quantities[stress_intensity|energy_release_rate].point", _off_front,
      "is {:.3g} m away from the front of '{}'"),
     ("quantities[*].name", lambda s, p: p.name in METRICS and p.name,
      "'{}' names an error; take another"),

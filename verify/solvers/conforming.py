@@ -16,7 +16,7 @@ from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
@@ -168,7 +168,7 @@ class ReferenceSolver:
         behind = any(cut.on_the_way for cut in scene.cuts)
         damped = behind or scene.analysis.kinematics == "linear"
         scheme = "generalised_alpha" if damped else "energy_momentum"
-        factors = any(isinstance(one, StressIntensityQuantity) for one in scene.quantities)
+        factors = any(isinstance(one, FractureQuantity) for one in scene.quantities)
         radius = _RADIUS_OF_JUMPS if behind or factors else _RADIUS
 
         def marching(level: int, size: float) -> Marching:

@@ -35,7 +35,7 @@ from verify.scene import (
     SweptCut,
     read_mesh,
 )
-from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.acceptance import FractureQuantity
 from verify.scene.tool_path import Cut
 from verify.solvers.runs import grid_of
 
@@ -126,11 +126,7 @@ def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
     That of the smallest domain, unless a hat along the front would lie between their nodes: it is
     two spacings wide, of which a quarter is left for nodes that are not evenly spaced.
     """
-    asked = [
-        q
-        for q in scene.quantities
-        if isinstance(q, StressIntensityQuantity) and q.point is not None
-    ]
+    asked = [q for q in scene.quantities if isinstance(q, FractureQuantity) and q.point is not None]
     found = [front_at(scene, one) for one in asked]
     return [
         (front, min(float(radii.min()), 1.5 * station_spacing(front) / _FRONT_SHARE))
