@@ -36,13 +36,11 @@ class MeshPatch(SimplexMesh):
         cells: Ints,
         nodes: Ints,
         local: Ints,
-        across: Ints,
     ) -> None:
         # the whole mesh has been checked; its scale of round-off holds here too
         for name, value in (
             ("points", points[nodes]),
             ("cells", local),
-            ("neighbours", across),
             ("extent", extent),
             ("whole_cells", cells),
             ("whole_nodes", nodes),
@@ -68,10 +66,8 @@ class PatchCutter:
     def patch(self, cells: Ints) -> MeshPatch:
         """Make the patch of these cells, given ascending."""
         mesh, nodes = self.mesh, self.nodes_of(cells)
-        local, others = np.searchsorted(nodes, mesh.cells[cells]), mesh.neighbours[cells]
-        place = np.minimum(np.searchsorted(cells, others), len(cells) - 1)
-        across = np.where(cells[place] == others, place, -1)
-        return MeshPatch(mesh.points, mesh.extent, cells, nodes, local, across)
+        local = np.searchsorted(nodes, mesh.cells[cells])
+        return MeshPatch(mesh.points, mesh.extent, cells, nodes, local)
 
 
 class StoredPieces(NamedTuple):

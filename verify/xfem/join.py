@@ -21,7 +21,7 @@ import numpy as np
 
 from verify.xfem.arrays import Bools, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
-from verify.xfem.mesh import SimplexMesh, connected, facets_of
+from verify.xfem.mesh import SimplexMesh, connected, facets_of, neighbours_across
 from verify.xfem.zero_points import ZeroPoints
 
 
@@ -57,22 +57,18 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     """
     near = np.zeros(len(mesh.points), dtype=bool)
     near[mesh.cells[partition.parent]] = True
-    patch = np.flatnonzero(near[mesh.cells].any(axis=1))
-    place = np.full(len(mesh.cells), -1)
-    place[patch] = np.arange(len(patch))
-    is_whole = np.ones(len(patch), dtype=bool)
-    is_whole[place[partition.parent]] = False
-    whole = np.flatnonzero(is_whole)
-    piece_cell = np.concatenate([place[partition.parent], whole])
+    patch = mesh.cells_at(near)
+    parent = np.searchsorted(patch, partition.parent)
+    whole = np.flatnonzero(np.bincount(parent, minlength=len(patch)) == 0)
+    piece_cell = np.concatenate([parent, whole])
     label = np.zeros((len(piece_cell), partition.label.shape[1]), dtype=np.int8)
     label[: len(solid)] = partition.label
     alive = np.concatenate([solid, np.ones(len(whole), dtype=bool)])
 
     # faces inside the patch, each once, from the cell with the smaller number
-    across = mesh.neighbours[patch]
-    here, opposite = np.nonzero(across > patch[:, None])
-    there = place[across[here, opposite]]
-    here, opposite, there = here[there >= 0], opposite[there >= 0], there[there >= 0]
+    across = neighbours_across(mesh.cells[patch])
+    here, opposite = np.nonzero(across > np.arange(len(patch))[:, None])
+    there = across[here, opposite]
     corners = mesh.dim + 1
     on_face = facets_of(np.arange(corners)[None])
     nodes = mesh.cells[patch[here, None], on_face[opposite]]

@@ -328,26 +328,29 @@ def cut_mesh(
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
-    # three numberings of pieces: `joined` has those of the partition, then the whole cells of the
-    # patch; `parent`, `label`, `share` those, then the rest of the cells; the result (`order`, and
-    # `number` back) those of them that are solid, by cell
-    rest = np.setdiff1d(np.arange(len(mesh.cells)), joined.cells, assume_unique=True)
-    parent = np.concatenate([joined.cells[joined.piece_cell], rest])
-    cells = np.concatenate([numbering[joined.group], mesh.cells[rest]])
-    whole = len(parent) - len(solid)
-    label = np.concatenate([partition.label, np.zeros((whole, len(cuts)), dtype=np.int8)])
-    share = np.concatenate([partition.fraction, np.ones(whole)])
-    order = np.flatnonzero(np.concatenate([solid, np.ones(whole, dtype=bool)]))
-    order = order[np.argsort(parent[order], kind="stable")]
-    number = np.full(len(parent), -1)
-    number[order] = np.arange(len(order))
+    # two numberings of pieces: `joined` has those of the partition, then the whole cells of the
+    # patch; the result, by cell, those of them that are solid, and the rest of the cells
+    rows = np.flatnonzero(np.pad(solid, (0, len(joined.group) - len(solid)), constant_values=True))
+    rows = rows[np.argsort(joined.piece_cell[rows], kind="stable")]
+    count = np.ones(len(mesh.cells), dtype=np.int64)
+    count[joined.cells] = np.bincount(joined.piece_cell[rows], minlength=len(joined.cells))
+    parent = np.repeat(np.arange(len(mesh.cells)), count)
+    in_patch = np.zeros(len(mesh.cells), dtype=bool)
+    in_patch[joined.cells] = True
+    number = np.full(len(joined.group), -1)
+    number[rows] = np.flatnonzero(in_patch[parent])
+    cells = mesh.cells[parent]
+    cells[number[rows]] = numbering[joined.group[rows]]
+    label, share = np.zeros((len(parent), len(cuts)), dtype=np.int8), np.ones(len(parent))
+    split = number[: len(solid)][solid]
+    label[split], share[split] = partition.label[solid], partition.fraction[solid]
     sub = partition.simplices
     return PhantomMesh(
         mesh=mesh,
-        cells=cells[order],
-        parent=parent[order],
-        fraction=share[order],
-        label=label[order],
+        cells=cells,
+        parent=parent,
+        fraction=share,
+        label=label,
         node_parent=node_parent,
         level_sets=partition.points.values[: len(mesh.points)],
         sub_cells=SubCells(

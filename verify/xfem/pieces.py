@@ -113,8 +113,10 @@ def split_cells(
             f"opened cells of shape {opened.shape}; expected ({len(mesh.cells)}, {len(cuts)})"
         )
     values, snapped = nodal_values(mesh, cuts)
-    plus = values[mesh.cells] >= 0.0
-    crossed = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
+    plus = values >= 0.0
+    first = plus[mesh.cells[:, 0]]
+    mixed = np.logical_or.reduce([plus[nodes] != first for nodes in mesh.cells.T[1:]])
+    crossed = np.flatnonzero(mixed.any(axis=1))
     sizes = np.zeros(len(mesh.cells))
     sizes[crossed] = mesh.longest_edges(crossed)
 
