@@ -344,8 +344,7 @@ class EmbeddedSurface:
     ) -> tuple[Ints, Ints, Floats, Sides]:
         """Divide facets by any number of cuts, as elements are."""
         local = np.searchsorted(nodes, self.facets[facets])
-        across = np.full(local.shape, -1)
-        patch = MeshPatch(self.points, self._cutter.mesh.extent, facets, nodes, local, across)
+        patch = MeshPatch(self.points, self._cutter.mesh.extent, facets, nodes, local)
         cuts = [
             _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
         ]
