@@ -18,6 +18,8 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 export NUMBA_NUM_THREADS ?= 1
+# Many short processes: one that may not keep what Python compiles compiles every module again.
+unexport PYTHONDONTWRITEBYTECODE
 # Nothing here opens a window.
 export MPLBACKEND ?= Agg
 export PYVISTA_OFF_SCREEN ?= true

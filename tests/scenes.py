@@ -1,8 +1,16 @@
 """Scenes that tests build: of each only what its claim needs is said."""
 
+from functools import cache
+
 from verify.errors import InputError
 from verify.runner.checking import check_scene
-from verify.scene import Scene
+from verify.scene import Scene, list_cases, load_scenes
+
+
+@cache
+def catalogue():
+    """Rows of every case of the project, by its name: read once in a process."""
+    return {name: load_scenes(path) for name, path in list_cases().items()}
 
 
 def box(upper, lower=None):

@@ -11,15 +11,16 @@ import time
 
 import pytest
 from command_line import run_here
+from scenes import catalogue
 
 from verify.cli import build_parser, main, progress
 from verify.cli.progress import Waiting, said_to_wait
 from verify.cli.run import of_one_solver, of_solvers
 from verify.cli.streams import print_line, printable_streams
-from verify.scene import list_cases, load_scene, load_scenes
+from verify.scene import list_cases, load_scene
 
 COMMANDS = ("list", "describe", "run", "report", "check", "schema")
-SCENES = {scene.name: scene for path in list_cases().values() for scene in load_scenes(path)}
+SCENES = {scene.name: scene for rows in catalogue().values() for scene in rows}
 # of a family the row in which most tables with a condition stand, and the base
 NAMES = [name for name in SCENES if "[" not in name or name.endswith(("=0.01]", "=0]"))]
 HEAVY = ("dolfinx", "gmsh", "pyvista", "vtk", "numba", "matplotlib", "scipy", "meshio", "petsc4py")

@@ -2,12 +2,13 @@
 
 import pytest
 from reference_scenes import needs_fenicsx
+from scenes import catalogue
 
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.judge.quantities import Measured
 from verify.judge.reference import known_quantity, size_of
-from verify.scene import list_cases, load_scene, load_scenes
+from verify.scene import load_scene
 from verify.solvers import find_solver
 
 # other kinds of gmsh's algorithms: Delaunay for frontal and back; Delaunay for HXT
@@ -18,8 +19,7 @@ OTHER_SIZES = {2: 0.83, 3: 1.15}
 
 
 def judged_by_meshes():
-    rows = {name: load_scenes(name) for name in list_cases()}
-    scenes = {name: of[0] for name, of in rows.items() if len(of) == 1}  # no families
+    scenes = {name: rows[0] for name, rows in catalogue().items() if len(rows) == 1}  # no families
     return [
         name
         for name, scene in scenes.items()

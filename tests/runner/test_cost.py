@@ -3,18 +3,18 @@
 import json
 
 import pytest
+from scenes import catalogue
 
 from verify.cli import main
 from verify.cli.run_text import suites_line
 from verify.runner.cost import case_cost, solver_costs
-from verify.scene import list_cases, load_scenes
 from verify.solvers.body_of_scene import background_mesh
 
 STRUCTURED = ["statics/f1_patch", "controls/hanging_bar", "cutting/hanging_block_quick"]
-SCENES = {name: load_scenes(name)[0] for name in [*STRUCTURED, "rotation/tissue_strip"]}
+SCENES = {name: rows[0] for name, rows in catalogue().items()}
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*STRUCTURED, "rotation/tissue_strip"])
 def test_unknowns_are_those_of_the_uncut_mesh(name):
     scene = SCENES[name]
     for row in solver_costs(scene, "xfem"):
@@ -24,17 +24,16 @@ def test_unknowns_are_those_of_the_uncut_mesh(name):
 
 def test_finer_levels_of_every_case_cost_more():
     """Every case that solvers are asked is estimated, whatever its body and its analysis."""
-    for name in list_cases():
-        for scene in load_scenes(name)[:1]:
-            if scene.played_only:
-                continue
-            for solver in ("xfem", "conforming", "reference"):
-                rows = solver_costs(scene, solver)
-                assert rows, name
-                for key in ("unknowns", "seconds", "memory"):
-                    found = [getattr(row, key) for row in rows]
-                    assert found == sorted(found), (name, solver, key)
-                    assert found[0] > 0
+    for name, scene in SCENES.items():
+        if scene.played_only:
+            continue
+        for solver in ("xfem", "conforming", "reference"):
+            rows = solver_costs(scene, solver)
+            assert rows, name
+            for key in ("unknowns", "seconds", "memory"):
+                found = [getattr(row, key) for row in rows]
+                assert found == sorted(found), (name, solver, key)
+                assert found[0] > 0
 
 
 def test_a_reference_level_has_the_unknowns_of_halved_elements():
@@ -44,7 +43,7 @@ def test_a_reference_level_has_the_unknowns_of_halved_elements():
 
 
 def test_a_step_of_the_reference_s_own_is_in_its_forecast():
-    scene = load_scenes("cutting/plate_crossed_quick")[0]
+    scene = SCENES["cutting/plate_crossed_quick"]
     assert 4 * scene.reference.time_step == scene.analysis.time_step
     levels = scene.reference.model_copy(update={"time_step": None})
     plain = scene.model_copy(update={"reference": levels})
@@ -64,12 +63,12 @@ def test_a_step_of_the_reference_s_own_is_in_its_forecast():
     ],
 )
 def test_unknowns_of_a_reference_lie_in_the_range_that_is_said(name, found):
-    for row, unknowns in zip(solver_costs(load_scenes(name)[0], "reference"), found, strict=True):
+    for row, unknowns in zip(solver_costs(SCENES[name], "reference"), found, strict=True):
         assert row.unknowns < unknowns < row.at_most
 
 
 def test_the_smallest_suite_comes_first():
-    every = [scene for name in list_cases() for scene in load_scenes(name)]
+    every = [scene for rows in catalogue().values() for scene in rows]
     costs = [(scene, case_cost(scene, ("xfem",))) for scene in every]
     said = suites_line(costs, jobs=2)
     assert said.index("-k demo") < said.index("--quick")

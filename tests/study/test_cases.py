@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scenes import catalogue
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
@@ -7,10 +8,10 @@ from verify.compare.hooke import hooke
 from verify.errors import InputError
 from verify.judge.reference import exact_reference
 from verify.runner.checking import check_scene
-from verify.scene import Scene, list_cases, load_scene, load_scenes
+from verify.scene import Scene, load_scene
 
-CASES = [name for name in list_cases() if name.startswith("statics/")]
-EXACT = [name for name in CASES if load_scene(name).exact is not None]
+CASES = [name for name in catalogue() if name.startswith("statics/")]
+EXACT = [name for name in CASES if catalogue()[name][0].exact is not None]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -67,7 +68,7 @@ def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field(name):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", list_cases())
+@pytest.mark.parametrize("name", catalogue())
 def test_no_case_is_refused_before_a_run(name):
-    for scene in load_scenes(name):
+    for scene in catalogue()[name]:
         check_scene(scene)
