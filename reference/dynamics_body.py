@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import nodes_on_part
-from reference.dynamics_release import Holds
+from reference.dynamics_cuts import TieForces
 from reference.large_strain import solve_large_strain
 from reference.law import law_of, mass_matrix
 from reference.linear_solvers import Kind
@@ -55,8 +55,8 @@ class MovingBody:
         Of all unknowns of the law: what of the cut is still closed.
     held : (h,) int array
         Unknowns with a prescribed motion, ascending: also those that are tied to such.
-    holds : Holds
-        Forces on what the cut has released.
+    tie_forces : TieForces
+        On what the cut has released.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class MovingBody:
             mark[one.place] = True
         self._own_held = np.flatnonzero(mark.ravel()).astype(np.int32)
         self.ties = TiedUnknowns(self.law.unknowns)
-        self.holds = Holds(space.node_points.shape)
+        self.tie_forces = TieForces(space.node_points.shape, len(scene.cuts))
         self._lasting: NDArray[np.int64] | None = None
         diagonal = self.mass.petsc.getDiagonal()
         self._mass_diagonal = space.everywhere(diagonal.array).ravel()
@@ -113,8 +113,8 @@ class MovingBody:
         self._holder = self._own_held[first[at]]
 
     def external(self, time: float) -> Array:
-        """Return the forces of all loads and holds at a time, N; after a jump there."""
-        total = self.weight + self.holds.at(time)
+        """Return the forces of all loads and ties at a time, N; after a jump there."""
+        total = self.weight + self.tie_forces.at(time).sum(axis=0)
         for forces, history in self._driven:
             total += factor_at(history, time) * forces
         for load in self._timed:

@@ -1,5 +1,12 @@
-"""Opening times of the facets of a mesh that conforms to all cuts; meshes before and after."""
+"""Openings of a mesh that conforms to all cuts: when, what holds on, meshes before and after.
 
+When facets open, a group of nodes that were tied falls into several. Each node is held on by the
+force r = M a − f that it was held by before (f: loads less internal and viscous forces), multiplied
+by what is not swept yet of the cut in its support. The sum over the group is zero, as its forces
+were in balance: momentum is kept, and no acceleration jumps.
+"""
+
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -14,6 +21,7 @@ from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Scene, ToolPathCut
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 _SAME = 1e-6  # of a facet: points that are one
 
 
@@ -30,18 +38,77 @@ class FacetOpenings(NamedTuple):
         Of the places of nodes on the cut; None where facets are released at once.
     place : (n,) int array
         Number of the place of each node.
+    cut : (f,) int array
+        Number of the cut that each facet is of.
     """
 
     times: Array
     passed: Array
     shares: SweptShares | None
-    place: NDArray[np.int64]
+    place: Numbers
+    cut: Numbers
+
+    def parted(
+        self, before: Numbers, after: Numbers, facing: Numbers, due: NDArray[np.bool_]
+    ) -> tuple[Numbers, Numbers]:
+        """Give the nodes of groups that have fallen apart, and the cut (k,) that has parted each.
+
+        Parameters
+        ----------
+        before, after : (n,) int array
+            The leader of each node's group.
+        facing : (f, q, 2) int array
+            Pairs of nodes that face each other across each facet.
+        due : (f, q) bool array
+            Which have just opened. Where those of several cuts have, it is the first.
+        """
+        pairs = np.unique(np.column_stack([before, after]), axis=0)
+        nodes = np.flatnonzero((np.bincount(pairs[:, 0], minlength=len(before)) > 1)[before])
+        cut = np.full(len(before), len(self.cut))
+        np.minimum.at(cut, before[facing[due][:, 0]], self.cut[np.nonzero(due)[0]])
+        return nodes, cut[before[nodes]]
+
+
+class Release(NamedTuple):
+    """Forces (k, d) on nodes (k,), N, their factors (k,) from 1 to 0 at a time, and the cuts."""
+
+    nodes: Numbers
+    forces: Array
+    factor: Callable[[float], Array]
+    cut: Numbers
+
+
+class TieForces:
+    """Forces on all that has been released of a body.
+
+    Parameters
+    ----------
+    shape : (n, d) tuple of int
+        Of nodal arrays.
+    cuts : int
+        Number of cuts.
+    """
+
+    def __init__(self, shape: tuple[int, int], cuts: int) -> None:
+        self._shape, self._releases = (cuts, *shape), list[Release]()
+
+    def add(self, release: Release, time: float) -> None:
+        """Add those of a release at a time, and drop those that have faded."""
+        self._releases = [one for one in self._releases if one.factor(time).any()]
+        self._releases.append(release)
+
+    def at(self, time: float) -> Array:
+        """Return the forces (cuts, n · d) at what each cut has released, at a time, N."""
+        total, shape = np.zeros(self._shape), self._shape
+        for nodes, forces, factor, cut in self._releases:
+            total[cut, nodes] += factor(time)[:, None] * forces
+        return total.reshape(len(total), shape[1] * shape[2])
 
 
 def facet_openings(
     scene: Scene,
     space: ConformingSpace,
-    facing: NDArray[np.int64],
+    facing: Numbers,
     swept: bool,
     delay: float = 0.0,
 ) -> FacetOpenings:
@@ -74,8 +141,9 @@ def facet_openings(
     _, place = np.unique(space.node_points, axis=0, return_inverse=True)
     shares = SweptShares(len(corners), by_node=True)
     times, passed = np.zeros((2, *facing.shape[:2]))
+    nearest = np.argmin(off, axis=0) if off else np.zeros(0, dtype=np.int64)
     for i, cut in enumerate(scene.cuts):
-        mine = np.argmin(off, axis=0) == i
+        mine = nearest == i
         if isinstance(cut, ToolPathCut):
             which, nodes = np.flatnonzero(mine), facing[mine, :, 0]
             shape = _weights(corners[mine], space.node_points[nodes])
@@ -85,7 +153,7 @@ def facet_openings(
         else:
             times[mine] = passed[mine] = cut.opens_at
     known = shares if swept and shares.used else None
-    return FacetOpenings(times if known else passed, passed, known, place.ravel())
+    return FacetOpenings(times if known else passed, passed, known, place.ravel(), nearest)
 
 
 def _passed_at(cut: ToolPathCut, delay: float, points: Array) -> Array:

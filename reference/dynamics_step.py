@@ -92,7 +92,7 @@ class StepForces:
     internal: Array
     viscous: Array
     inertia: Array
-    held: Array  # of the external ones, those on what the cut has released
+    tie: Array  # (cuts, k) of the external ones, those on what each cut has released
 
     @property
     def residual(self) -> Array:
@@ -125,7 +125,7 @@ class Stepper:
         self.solves = 0
         self._solver: NodalSolver | TiedSolver | None = None
         self._before = np.zeros(0)  # internal and viscous force at the start of the step
-        self._load = self._hold = np.zeros(0)
+        self._load = self._tie = np.zeros(0)
         self._travelled: Array | None = None  # in the last step
 
     def step(self, state: State) -> StepForces:
@@ -140,7 +140,7 @@ class Stepper:
         if not self.averaged:
             self._before = self._resisting(start.displacement, start.velocity)
         self._load = self._over_step(self.body.external, start.time)
-        self._hold = self._over_step(self.body.holds.at, start.time)
+        self._tie = self._over_step(self.body.tie_forces.at, start.time)
         a, forces = self._solved(start, self._first(start))
         state.displacement, state.velocity = self._end(start, a)
         state.acceleration, state.time = a, start.time + self.size
@@ -257,10 +257,10 @@ class Stepper:
             internal = body.law.averaged(start.displacement, u)
             middle = 0.5 * (start.displacement + u), 0.5 * (start.velocity + v)
             viscous = self._viscous(*middle)
-            return StepForces(external, internal, viscous, inertia, self._hold)
+            return StepForces(external, internal, viscous, inertia, self._tie)
         keep = 1 - scheme.alpha_f
         internal, viscous = keep * self._resisting(u, v) + scheme.alpha_f * self._before
-        return StepForces(external, internal, viscous, inertia, self._hold)
+        return StepForces(external, internal, viscous, inertia, self._tie)
 
     def _resisting(self, u: Array, v: Array) -> Array:
         """Return internal and viscous force (2, k)."""
@@ -313,12 +313,15 @@ class Ledger:
     ----------
     done : dict of str to float
         What was done since then by the names in `DONE`, J (in the plane per metre).
+    work_by_cut : (cuts,) array or float
+        Share of what each cut has released in ``cut_work``, J.
     turned : (1 or 3,) array or float
         Angular impulse since then of the forces on what the cut has released, N m s.
     """
 
     def __init__(self) -> None:
         self.done = dict.fromkeys(DONE, 0.0)
+        self.work_by_cut: Array | float = 0.0
         self.turned: Array | float = 0.0
         self._kinetic = self._strain = 0.0
 
@@ -340,11 +343,13 @@ class Ledger:
         kinetic, strain = _energies(body, state)
         slip = change @ forces.inertia - (kinetic - self._kinetic)
         done = self.done
-        done["work_of_loads"] += float(change @ (forces.external - body.weight - forces.held))
-        done["cut_work"] -= float(change @ forces.held)
+        tie = forces.tie.sum(axis=0)
+        done["work_of_loads"] += float(change @ (forces.external - body.weight - tie))
+        done["cut_work"] -= float(change @ tie)
+        self.work_by_cut = self.work_by_cut - forces.tie @ change
         d = body.space.dimension
         middle = 0.5 * (before.displacement + state.displacement).reshape(-1, d)
-        turning = _turning(body.space.node_points + middle, forces.held.reshape(-1, d))
+        turning = _turning(body.space.node_points + middle, tie.reshape(-1, d))
         self.turned = self.turned + (state.time - before.time) * turning
         done["work_of_supports"] += float(change @ reaction)
         done["damping"] += float(change @ forces.viscous)

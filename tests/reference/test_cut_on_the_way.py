@@ -211,12 +211,12 @@ def test_what_a_blade_lets_go_is_held_by_what_held_it(monkeypatch, kinematics, d
     jumps = []
     genuine = TiedMotion._release
 
-    def released(self, closed, time):
+    def released(self, due, time):
         body, d = self.body, self.space.dimension
         before = body.accelerations(self._unbalanced(self._later)).reshape(-1, d)
-        genuine(self, closed, time)
+        genuine(self, due, time)
         after = body.accelerations(self._unbalanced(self._later)).reshape(-1, d)
-        if not body.holds._holds[-1].factor(time).all():
+        if not body.tie_forces._releases[-1].factor(time).all():
             return  # swept within one step: held by nothing
         jumps.append([np.abs(after - before).max(), np.abs(before).max()])
 

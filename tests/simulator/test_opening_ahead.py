@@ -87,17 +87,18 @@ def test_accelerations_do_not_jump_at_an_opening_and_momentum_stays(kind, monkey
     session = Session(stage_with(mesh, [path], damping=damping if kind != "membrane" else
                                  RayleighDamping(0.3, 0.0)))  # fmt: skip
     thrown(session)
-    openings, jumps, scale, hold = [], [], [], played.hold_released
+    openings, jumps, scale, genuine = [], [], [], played.tie_forces
 
-    def watched(old, before, given, new, source, fading) -> None:
+    def watched(old, before, given, new, source, *more):
         was = acceleration(old, before)
-        hold(old, before, given, new, source, fading)
+        new.tie = genuine(old, before, given, new, source, *more)
         now = acceleration(new, session.state)
         openings.append(np.count_nonzero(np.bincount(source) > 1))
         jumps.append(np.abs(now - was[source]).max())
         scale.append(np.abs(was).max())
+        return new.tie
 
-    monkeypatch.setattr(played, "hold_released", watched)
+    monkeypatch.setattr(played, "tie_forces", watched)
     momentum = session.body.mass.apply(session.state.velocity).sum(axis=0)
     records = session.run()
     decay = (1.0 + 0.3 * STEP) ** -len(records)  # implicit Euler, damping of the mass

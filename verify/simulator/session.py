@@ -26,7 +26,12 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.release import TieForces, acceleration_at_corners, hold_released
+from verify.xfem.release import (
+    TieForces,
+    acceleration_at_corners,
+    parting_cuts,
+    tie_forces,
+)
 
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")
@@ -328,7 +333,9 @@ class Session:
                 source = np.append(np.arange(increment.nodes_before), increment.source)
                 fading = self._ways.fading(self.phantom.node_parent, self.stage.time_step)
                 acceleration = acceleration_at_corners(body, before)
-                hold_released(body, before, acceleration, self.body, source, fading)
+                self.body.tie = tie_forces(
+                    body, before, acceleration, self.body, source, fading, parting_cuts
+                )
         self._begin_account()
 
     def _begin_account(self) -> None:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.deformation import wave_speed
 from reference.dynamics_body import MovingBody
-from reference.dynamics_cuts import facet_openings, inherit, partly_opened
-from reference.dynamics_release import Hold, parted_nodes
+from reference.dynamics_cuts import Release, facet_openings, inherit, partly_opened
 from reference.dynamics_step import (
     Ledger,
     Scheme,
@@ -27,7 +26,7 @@ from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
-from verify.solvers.runs import Account, Record
+from verify.solvers.runs import Account, Record, work_of_blades
 from verify.solvers.timeline import blade_advance, march, step_sizes, timeline_of
 
 Array = NDArray[np.float64]
@@ -218,9 +217,10 @@ class TiedMotion:
         if linear and not self.begun and self.scheme.alpha_m != self.scheme.alpha_f:
             found.acceleration = self.body.accelerations(self._unbalanced(found.time))
         self.outputs.append(found)
-        energies = self.ledger.state(self.body, self.state)
-        turned = self.ledger.turned + 0.0 * momenta_of(self.body, self.state)[1]
-        self.account.enter(energies, self.ledger.done, *momenta_of(self.body, self.state), turned)
+        ledger, momenta = self.ledger, momenta_of(self.body, self.state)
+        done = ledger.done | work_of_blades(self.scene.cuts, ledger.work_by_cut)
+        energies = ledger.state(self.body, self.state)
+        self.account.enter(energies, done, *momenta, ledger.turned + 0.0 * momenta[1])
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""
@@ -262,22 +262,22 @@ class TiedMotion:
             if self.opening.shares is None or times is self.opening.passed:
                 self._tie(self.closed & ~due)
             else:
-                self._release(self.closed & ~due, time)
+                self._release(due, time)
         self.openings += 1
         return True
 
-    def _release(self, closed: NDArray[np.bool_], time: float) -> None:
-        """Untie all but what stays closed, and hold what is let go as it was held until now."""
+    def _release(self, due: NDArray[np.bool_], time: float) -> None:
+        """Untie what is due, and hold what is let go as it was held until now."""
         body, shares = self.body, self.opening.shares
         assert shares is not None
         before, acceleration = body.ties.leader, body.accelerations(self._unbalanced(self._later))
-        self._tie(closed)
-        nodes = parted_nodes(before, body.ties.leader)
+        self._tie(self.closed & ~due)
+        nodes, cut = self.opening.parted(before, body.ties.leader, self.facing, due)
         forces = body.mass @ acceleration - self._unbalanced(self._later)
         forces[body.held] = 0.0
         fading = shares.fading(self.opening.place[nodes], time, self.timeline.close)
-        hold = Hold(nodes, forces.reshape(-1, self.space.dimension)[nodes], fading.at)
-        body.holds.add(hold, time)
+        forces = forces.reshape(-1, self.space.dimension)[nodes]
+        body.tie_forces.add(Release(nodes, forces, fading.at, cut), time)
 
     def _tie(self, closed: NDArray[np.bool_]) -> None:
         self.closed = closed

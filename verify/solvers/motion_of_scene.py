@@ -16,7 +16,7 @@ from verify.scene.initial import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings
-from verify.solvers.runs import Account, Record
+from verify.solvers.runs import Account, Record, work_of_blades
 from verify.solvers.timeline import Timeline, blade_advance, march, step_sizes
 from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
@@ -28,9 +28,10 @@ from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.release import TieForces, acceleration_at_corners, hold_released
+from verify.xfem.release import TieForces, acceleration_at_corners, tie_forces
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 _NO_ROUND_OFF = 1e-6  # of a force
 _STAGE = {
     "load_work": "work_of_loads",
@@ -59,8 +60,16 @@ class StagedAccount(Account):
         self._removed = dict.fromkeys(("removed_energy", "removed_mass") if removal else (), 0.0)
         self._penalty: list[float] = []
 
-    def leave(self, ledger: EnergyBalance, instants: list[int]) -> None:
-        """Enter the rows of a stage that are asked for, and keep what it has done in all."""
+    def leave(self, ledger: EnergyBalance, instants: list[tuple[int, dict[str, float]]]) -> None:
+        """Enter the rows of a stage that are asked for, and keep what it has done in all.
+
+        Parameters
+        ----------
+        ledger : EnergyBalance
+            Of the stage.
+        instants : list of (int, dict)
+            Rows that are asked for, and what blades have taken until then, as `work_of_blades`.
+        """
 
         def done(k: int) -> dict[str, float]:
             found = {
@@ -69,10 +78,12 @@ class StagedAccount(Account):
             }
             return {**found, "projection": self._projection}
 
-        for k in instants:
+        for k, taken in instants:
             state = {n: float(getattr(ledger, n)[k]) for n in ("kinetic", "strain", "gravity")}
             momenta = ledger.momentum[k], ledger.angular_momentum[k]
-            self.enter(state, done(k), *momenta, self._turned + ledger.cut_turn[k], self._removed)
+            self.enter(
+                state, done(k) | taken, *momenta, self._turned + ledger.cut_turn[k], self._removed
+            )
             self._penalty.append(float(ledger.penalty[k]))
         self._done, self._turned = done(-1), self._turned + ledger.cut_turn[-1]
 
@@ -104,7 +115,7 @@ class StagedAccount(Account):
 
 
 # dof nodes and the time at which they are let go, to factors over time
-Fade = Callable[[NDArray[np.int64], float], Callable[[float], _Floats]]
+Fade = Callable[[_Ints, float], Callable[[float], _Floats]]
 
 
 class OpeningBody(Protocol):
@@ -142,11 +153,14 @@ class OpeningBody(Protocol):
     def inherited(self, old: PhantomMesh, state: MotionState, further: DynamicBody) -> MotionState:
         """Hand a state on to the body that is cut further."""
 
-    def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+    def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
         """Corner of an old body from which each corner of one that is cut further comes."""
 
     def fading(self, new: PhantomMesh) -> Fade | None:
         """Factors of the forces that hold released nodes of a body; None: all is let go at once."""
+
+    def parting(self, new: PhantomMesh, nodes: _Ints, parent: _Ints) -> _Ints:
+        """Cut that has parted each of some dof nodes, by the dof node that they were."""
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was changed in the body that was made last."""
@@ -209,11 +223,8 @@ class CutMotion:
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
         self._account = StagedAccount(opening.removal)
         self._outputs: list[_Output] = []
-        asked = opening.openings.asked  # as `Hold.cut` counts them: by when they open
-        self._blades = {k: c.name for k, c in enumerate(asked) if isinstance(c, ToolPathCut)}
-        self._by_cut = np.zeros(len(asked))  # energy that each cut has taken, J
-        self._by_cut_put_out: list[_Floats] = []
-        self._spread = 0.0  # as of `Hold`, the most
+        self._by_cut = np.zeros(len(opening.openings.asked))  # energy that each has taken, J
+        self._spread = 0.0  # as of `Release`, the most
         self._solves = 0
         start = -np.inf if closed_before else timeline.close
         body = self._made(start, passed=True)
@@ -272,16 +283,18 @@ class CutMotion:
         state = self.opening.inherited(old, self.state, further)
         new = further.force.phantom
         if (fade := self.opening.fading(new.corners)) is not None:
-            holds = hold_released(
+            tie = tie_forces(
                 self._at_corners(self.body),
                 self._state_at_corners(),
                 acceleration_at_corners(self.body, self.state),
                 self._at_corners(further),
                 self.opening.source(old, new),
                 fade,
+                self.opening.parting,
             )
-            further.tie = TieForces(new, holds) if holds else None
-            self._spread = max(self._spread, *(hold.spread for hold in holds), 0.0)
+            if tie is not None:
+                further.tie = TieForces(new, tie.releases)
+                self._spread = max(self._spread, *(one.spread for one in tie.releases))
         self._leave()
         self._account.open(self.body, self.state, further, state)
         self._take(further, state)
@@ -297,14 +310,14 @@ class CutMotion:
         linear = self.scene.analysis.kinematics == "linear"
         acceleration = acceleration_of(body, self.state) if linear and alone else None
         self._outputs.append(_Output(body.force.phantom, self.state.copy(), acceleration))
-        self._instants.append(self._taken)
-        self._by_cut_put_out.append(self._by_cut.copy())
+        taken = work_of_blades(self.opening.openings.asked, self._by_cut)
+        self._instants.append((self._taken, taken))
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""
         if size not in self._integrators:
             self._integrators[size] = self._integrator(size)
-        tie = self.body.tie if len(self._blades) > 1 else None  # one has all of `cut_work`
+        tie = self.body.tie if len(self._by_cut) > 1 else None  # one has all of `cut_work`
         before = self.state.displacement.copy() if tie is not None else self.state.displacement
         with self.record.timed("steps"):
             forces = self._integrators[size].step(self.state)
@@ -331,7 +344,7 @@ class CutMotion:
             return body
         made = body_in_motion(self.scene, *self.opening.inertia(phantom.corners), self.exact)
         if isinstance(body.tie, TieForces):
-            made.tie = TieForces(phantom.corners, body.tie.holds)
+            made.tie = TieForces(phantom.corners, body.tie.releases)
         return made
 
     def _state_at_corners(self) -> MotionState:
@@ -343,7 +356,7 @@ class CutMotion:
         """Go on with a body and its state."""
         self.body, self.state = body, state
         self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
-        self._instants, self._taken = list[int](), 0
+        self._instants, self._taken = list[tuple[int, dict[str, float]]](), 0
         mesh, marching = body.force.phantom.mesh, self.marching
         self._largest, self.record.notes["step from"] = largest_step(
             body,
@@ -389,20 +402,9 @@ class CutMotion:
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),
             "mass": self._mass(phantom),
-            "ledger": {**self._account.columns(), **self._work_by_cut()},
+            "ledger": self._account.columns(),
             "unknowns": phantom.node_points.size,
         }
-
-    def _work_by_cut(self) -> dict[str, _Floats]:
-        """Share (t,) of each of several blades in ``cut_work``, J.
-
-        None for meshes that are welded along a cut and opened: their pieces lie on no side of it.
-        """
-        sides = self.body.force.phantom.label.shape[1]
-        if len(self._blades) < 2 or sides < len(self._by_cut) or not self._by_cut.any():
-            return {}
-        table = np.array(self._by_cut_put_out)
-        return {f"cut_work_{name}": table[:, k] for k, name in self._blades.items()}
 
     def _mass(self, phantom: PhantomMesh) -> str | csr_array:
         """Mass of the corners of the body with all its cuts."""

@@ -26,8 +26,10 @@ from verify.xfem.linear_solvers import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
+from verify.xfem.release import parting_cuts
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 RULES = {
@@ -114,13 +116,17 @@ class XfemOpening:
                 f"further ({error}); slivers = 'keep' may help"
             ) from None
 
-    def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+    def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
         """Corner of an old body from which each corner of one that is cut further comes."""
         return ancestors(old, new)
 
     def fading(self, new: PhantomMesh) -> Fade | None:
         """Return the factors of the forces at dof nodes that are released."""
         return self._opened.fade(new.node_parent)
+
+    def parting(self, new: PhantomMesh, nodes: _Ints, parent: _Ints) -> _Ints:
+        """Cut that has parted each of some dof nodes, by the dof node that they were."""
+        return parting_cuts(new, nodes, parent)
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was done to ends of cuts and to slivers."""
@@ -183,7 +189,7 @@ class MethodOpening:
         self._method, self._parameters, self._inertia = method, parameters, inertia
         self._bodies: dict[int, CutBody] = {}  # by the identity of their mesh
         self._seams: Seams | None = None
-        self._place: NDArray[np.int64]
+        self._place: _Ints
         self._opened = Opened(np.empty(0), np.empty(0), None)
 
     def events(self) -> _Floats:
@@ -221,7 +227,7 @@ class MethodOpening:
         source = self.source(old, further.force.phantom)
         return MotionState(state.displacement[source], state.velocity[source], state.time)
 
-    def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+    def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
         """Dof node (N,) of an old body from which each of a new one comes, cell by cell."""
         if old is new:
             return np.arange(new.node_count)
@@ -244,6 +250,25 @@ class MethodOpening:
             place = np.empty(new.node_count, dtype=np.int64)
             place[new.cells] = self._place[self.final.phantom.cells]
         return self._opened.fade(place)
+
+    def parting(self, new: PhantomMesh, nodes: _Ints, parent: _Ints) -> _Ints:
+        """Cut that has parted each of some dof nodes, by the dof node that they were.
+
+        Of several seams at once it is the first cut of theirs.
+        """
+        if self._seams is None:
+            return parting_cuts(new, nodes, parent)
+        own, was = (
+            np.zeros(self.final.phantom.node_count, dtype=np.int64),
+            np.arange(new.node_count),
+        )
+        own[self.final.phantom.cells] = new.cells
+        was[nodes] = parent
+        one, other = own[self._seams.one], own[self._seams.other]
+        seam, corner = np.nonzero((one != other) & np.isin(one, nodes) & (was[one] == was[other]))
+        cut = np.full(new.node_count, len(self.openings.asked))
+        np.minimum.at(cut, was[one[seam, corner]], self._opened.cut[seam])
+        return cut[parent]
 
     def regularisations(self) -> list[Regularisation]:
         """Return nothing: what a method changed is said by its body."""

@@ -1,7 +1,7 @@
 """Cuts of a scene as level sets, and when those of a moving one have opened what of a mesh."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
@@ -100,12 +100,15 @@ class Opened:
         Of the nodes that are let go; None where all of them is released at once.
     close : float
         Times that differ by no more are one, s.
+    cut : (p,) int array or None
+        Number of the cut that each is of, where each is of one.
     """
 
     times: _Floats
     passed: _Floats
     shares: SweptShares | None
     close: float = 0.0
+    cut: _Ints | None = None
 
     def until(self, time: float, passed: bool = False) -> NDArray[np.bool_]:
         """Return which pieces are open at a time, or passed by then."""
@@ -210,7 +213,7 @@ class Openings:
                 simplices = CutSimplices(seams[mine], mine, node[mine], shape)
                 passage = shares.add(simplices, cut.passed_at)
                 times[mine], passed[mine] = passage.begins, passage.passed[mine, None]
-        return self._by_rule(times, passed, shares)
+        return replace(self._by_rule(times, passed, shares), cut=nearest)
 
     def _none_swept(self, pieces: int, by_node: bool) -> SweptShares:
         divisions = {"divisions": 1} if self.rule == "late" else {}

@@ -1,6 +1,6 @@
 """Record and account of a run of any own solver, and the cells that a scene asks for."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -113,6 +113,14 @@ _OF_SOME = ("cut_work", "projection", "cut_angular_impulse")
 _TAKEN = ("damping", "algorithmic", "cut_work", "projection", "removed_energy")
 
 
+def work_of_blades(cuts: Sequence[Any], by_cut: _Floats | float) -> dict[str, float]:
+    """Name what each of several blades has taken, J, of that of all cuts (cuts,); one has it all."""
+    blades = [cut.on_the_way for cut in cuts]
+    taken = zip(cuts, blades, np.zeros(len(cuts)) + by_cut, strict=True)
+    found = {f"cut_work_{cut.name}": float(work) for cut, blade, work in taken if blade}
+    return found if len(found) > 1 else {}
+
+
 class Account:
     """A row for every output, of whatever has moved."""
 
@@ -135,7 +143,8 @@ class Account:
         state : mapping
             Energies of the state by name, J.
         done : mapping
-            What was done since the start, J: by the names of `reference.dynamics_step.DONE`.
+            What was done since the start, J: by the names of `reference.dynamics_step.DONE`; and
+            `work_of_blades`.
         momentum, angular_momentum : (d,), (1 or 3,) array
             In kg m/s and kg m²/s.
         cut_angular_impulse : (1 or 3,) array

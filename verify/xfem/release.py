@@ -23,7 +23,7 @@ from verify.xfem.phantom import PhantomMesh
 
 
 @dataclass(frozen=True)
-class Hold:
+class Release:
     """Dead forces of one release.
 
     Attributes
@@ -47,7 +47,7 @@ class Hold:
     cut: Ints
     spread: float = 0.0
 
-    def handed_on(self, source: Ints, weights: Floats, time: float) -> "Hold | None":
+    def handed_on(self, source: Ints, weights: Floats, time: float) -> "Release | None":
         """Give the same of a body that is cut further; None if nothing is left of it.
 
         Where a node is parted its force is, in proportion to masses: any parts will do, as what
@@ -71,7 +71,7 @@ class Hold:
         row = place[source[nodes]]
         share = weights[nodes] / np.bincount(row, weights[nodes], len(left))[row]
         forces = share[:, None] * self.forces[row]
-        return Hold(nodes, forces, _Rows(self.factor, row), self.cut[row])
+        return Release(nodes, forces, _Rows(self.factor, row), self.cut[row])
 
 
 @dataclass(frozen=True)
@@ -93,23 +93,23 @@ class TieForces:
     ----------
     phantom : PhantomMesh
         Whose dof nodes they act on.
-    holds : tuple of Hold
+    releases : tuple of Release
     """
 
     phantom: PhantomMesh
-    holds: tuple[Hold, ...]
+    releases: tuple[Release, ...]
 
     def __call__(self, time: float) -> Floats:
         """Sum the forces at a time."""
         total = np.zeros((self.phantom.corners.node_count, self.phantom.mesh.space))
-        for hold in self.holds:
-            total[hold.nodes] += hold.factor(time)[:, None] * hold.forces
+        for one in self.releases:
+            total[one.nodes] += one.factor(time)[:, None] * one.forces
         return self.phantom.restrict(total)
 
     def still(self, time: float) -> "TieForces | None":
         """Give what holds anything at a time or later; None if nothing does."""
-        holds = tuple(hold for hold in self.holds if hold.factor(time).any())
-        return TieForces(self.phantom, holds) if holds else None
+        releases = tuple(one for one in self.releases if one.factor(time).any())
+        return TieForces(self.phantom, releases) if releases else None
 
     def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
         """Work (cuts,) in J that the forces of each cut take, as they are at a time.
@@ -124,9 +124,9 @@ class TieForces:
             Number of cuts.
         """
         taken, change = np.zeros(cuts), self.phantom.extend(change)
-        for hold in self.holds:
-            done = (change[hold.nodes] * hold.forces).sum(axis=1)
-            taken -= np.bincount(hold.cut, hold.factor(time) * done, cuts)
+        for one in self.releases:
+            done = (change[one.nodes] * one.forces).sum(axis=1)
+            taken -= np.bincount(one.cut, one.factor(time) * done, cuts)
         return taken
 
 
@@ -136,14 +136,15 @@ def acceleration_at_corners(body: DynamicBody, state: MotionState) -> Floats:
     return body.force.phantom.extend(found)
 
 
-def hold_released(
+def tie_forces(
     old: DynamicBody,
     state: MotionState,
     acceleration: Floats,
     new: DynamicBody,
     source: Ints,
     fading: Callable[[Ints, float], Callable[[float], Floats]],
-) -> tuple[Hold, ...]:
+    parting: Callable[[PhantomMesh, Ints, Ints], Ints],
+) -> TieForces | None:
     """Find the forces that hold what has been released from a body that is cut further.
 
     Parameters
@@ -155,33 +156,34 @@ def hold_released(
     acceleration : (N_old, d) float array
         `acceleration_at_corners` of it.
     new : DynamicBody
-        Of unknowns at all corners. Its tie forces are set.
+        Of unknowns at all corners, without tie forces yet.
     source : (N,) int array
         Old corner of each new one.
     fading : callable
         Given some new corners and the time, makes the factors of the forces that hold them.
+    parting : callable
+        Given the new mesh, some of its corners and the old ones that they were: the number of the
+        cut that has parted each; `parting_cuts` or what does the same.
 
     Returns
     -------
-    tuple of Hold
+    TieForces or None
         All that still hold the new body.
     """
-    time, weights = state.time, new.mass.weights
-    holds = old.tie.holds if isinstance(old.tie, TieForces) else ()
-    kept = [hold.handed_on(source, weights, time) for hold in holds]
-    carried = tuple(hold for hold in kept if hold is not None)
-    new.tie = TieForces(new.force.phantom, carried) if carried else None
+    time, weights, phantom = state.time, new.mass.weights, new.force.phantom
+    before = old.tie.releases if isinstance(old.tie, TieForces) else ()
+    kept = [one.handed_on(source, weights, time) for one in before]
+    releases = tuple(one for one in kept if one is not None)
     nodes = np.flatnonzero(np.bincount(source, minlength=old.shape[0])[source] > 1)
-    if not len(nodes):
-        return carried
-    inherited = MotionState(state.displacement[source], state.velocity[source], time)
-    forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
-    spread = _balance(forces, nodes, source, new.fixed | old.fixed[source], new.mass.weights)
-    forces[new.fixed] = 0.0
-    cut = _parting_cuts(new.force.phantom, nodes, source[nodes])
-    hold = Hold(nodes, forces[nodes], fading(nodes, time), cut, spread)
-    new.tie = TieForces(new.force.phantom, (*carried, hold))
-    return new.tie.holds
+    if len(nodes):
+        inherited = MotionState(state.displacement[source], state.velocity[source], time)
+        forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
+        forces -= TieForces(phantom, releases)(time)
+        spread = _balance(forces, nodes, source, new.fixed | old.fixed[source], weights)
+        forces[new.fixed] = 0.0
+        cut = parting(phantom, nodes, source[nodes])
+        releases += (Release(nodes, forces[nodes], fading(nodes, time), cut, spread),)
+    return TieForces(phantom, releases) if releases else None
 
 
 def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> float:
@@ -202,8 +204,8 @@ def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Fl
     return most / largest if largest > 0.0 else 0.0
 
 
-def _parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
-    """First cut (k,) that has some pieces of the nodes of a parent on one side, others beyond.
+def parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
+    """Find the first cut (k,) that has some pieces of the nodes of a parent on one side, others beyond.
 
     Where several cuts part them only together it is the first that any piece lies beside.
     """
