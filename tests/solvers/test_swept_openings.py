@@ -200,22 +200,20 @@ def test_what_is_let_go_keeps_its_momenta_but_for_the_couple_of_the_forces(tmp_p
         assert np.ptp(ledger[f"angular_momentum_{axis}"] - impulse) <= 1e-10 * size
 
 
+TIMES = {"first": [0.0, 0.12], "later": [0.16, 0.28]}
+DEEP = (0.6, [0.1, 0.2, 1.0])
 TWO_BLADES = {
     "plane, unstructured": (
         UNSTRUCTURED,
-        path_text([[-0.1, 0.21], [1.1, 0.31]], [0.0, 0.12], name="first"),
-        path_text([[1.1, 0.55], [-0.1, 0.47]], [0.16, 0.28], name="later"),
+        path_text([[-0.1, 0.21], [1.1, 0.31]], TIMES["first"], name="first"),
+        path_text([[1.1, 0.55], [-0.1, 0.47]], TIMES["later"], name="later"),
         ("bottom", [0.0, -0.02]),
         ("top", [0.0, 0.02]),
     ),
     "solid, crossed": (
         SOLID,
-        path_text(
-            [[-0.05, 0.13, -0.05], [0.45, 0.17, -0.05]], [0.0, 0.12], (0.6, [0.1, 0.2, 1.0]), "first"
-        ),
-        path_text(
-            [[0.17, -0.05, -0.05], [0.23, 0.35, -0.05]], [0.16, 0.28], (0.6, [0.1, 0.1, 1.0]), "later"
-        ),
+        path_text([[-0.05, 0.13, -0.05], [0.45, 0.17, -0.05]], TIMES["first"], DEEP, "first"),
+        path_text([[0.17, -0.05, -0.05], [0.23, 0.35, -0.05]], TIMES["later"], DEEP, "later"),
         ("left", [-0.01, -0.01, 0.0]),
         ("right", [0.01, 0.01, 0.0]),
     ),

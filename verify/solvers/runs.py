@@ -114,7 +114,7 @@ _TAKEN = ("damping", "algorithmic", "cut_work", "projection", "removed_energy")
 
 
 def work_of_blades(cuts: Sequence[Any], by_cut: _Floats | float) -> dict[str, float]:
-    """Name what each of several blades has taken, J, of that of all cuts (cuts,); one has it all."""
+    """Name what each of several blades has taken, J, of that of all cuts (cuts,)."""
     blades = [cut.on_the_way for cut in cuts]
     taken = zip(cuts, blades, np.zeros(len(cuts)) + by_cut, strict=True)
     found = {f"cut_work_{cut.name}": float(work) for cut, blade, work in taken if blade}

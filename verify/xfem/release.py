@@ -205,7 +205,7 @@ def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Fl
 
 
 def parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
-    """Find the first cut (k,) that has some pieces of the nodes of a parent on one side, others beyond.
+    """Find the first cut (k,) that has some pieces of a parent's nodes on one side, others beyond.
 
     Where several cuts part them only together it is the first that any piece lies beside.
     """
