@@ -256,16 +256,14 @@ class MethodOpening:
 
         Of several seams at once it is the first cut of theirs.
         """
-        if self._seams is None:
+        if self._seams is None or self._opened.cut is None:
             return parting_cuts(new, nodes, parent)
-        own, was = (
-            np.zeros(self.final.phantom.node_count, dtype=np.int64),
-            np.arange(new.node_count),
-        )
+        own = np.zeros(self.final.phantom.node_count, dtype=np.int64)
         own[self.final.phantom.cells] = new.cells
+        was = np.full(new.node_count, -1)
         was[nodes] = parent
         one, other = own[self._seams.one], own[self._seams.other]
-        seam, corner = np.nonzero((one != other) & np.isin(one, nodes) & (was[one] == was[other]))
+        seam, corner = np.nonzero((one != other) & (was[one] == was[other]) & (was[one] >= 0))
         cut = np.full(new.node_count, len(self.openings.asked))
         np.minimum.at(cut, was[one[seam, corner]], self._opened.cut[seam])
         return cut[parent]
