@@ -63,8 +63,9 @@ class SolverByCost(LinearSolver):
         self._blocks: Floats | None = None
         self._iterative = ConjugateGradients(pattern, block, tolerance, _MANY)
         self.is_iterative = pattern.node_count > _FEW_NODES
-        self._is_analysed = not self.is_iterative or not (solid and pattern.node_count >= _LARGE)
-        if self._is_analysed:
+        self._is_large = solid and pattern.node_count >= _LARGE
+        self._matrices, self._is_analysed = 0, False
+        if not self.is_iterative:
             self._analyse()
 
     @property
@@ -93,8 +94,10 @@ class SolverByCost(LinearSolver):
         self._iterative.limit = max(1, int(cost / (_ITERATION * self._pattern.node_count)))
 
     def factorize(self, blocks: Floats) -> None:
-        """Take the matrix; see `LinearSolver`."""
-        self._blocks = blocks
+        """Take the matrix; see `LinearSolver`. Whoever has only one is spared the analysis."""
+        self._blocks, self._matrices = blocks, self._matrices + 1
+        if self._matrices == 2 and not (self._is_analysed or self._is_large):
+            self._analyse()
         if self.is_iterative:
             self._iterative.factorize(blocks)
         else:

@@ -4,6 +4,7 @@ import csv
 import io
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +16,7 @@ _FORCES = ("driving_force", "resistance")  # on blades, as Session.blade_forces 
 
 if TYPE_CHECKING:
     from verify.scene import Scene
-    from verify.simulator import Stage, StepRecord
+    from verify.simulator import Session, Stage, StepRecord
     from verify.simulator.animation import Frame
     from verify.xfem.arrays import Floats
 
@@ -40,6 +41,14 @@ def play(
         Arg("look at the wound, F times as near (default: 1, the whole body)", "F", read=positive),
     ] = 1.0,
     records: Annotated[Path | None, Arg("write what every step cost and did", "CSV")] = None,
+    tolerance: Annotated[
+        float | None,
+        Arg(
+            "residual that iterations may leave of each step's load (default: 1e-10)",
+            "R",
+            read=positive,
+        ),
+    ] = None,
     as_json: Annotated[bool, Arg("print the summary as JSON", flags=("--json",))] = False,
 ) -> int:
     """Play a cutting scene as a simulator would, and show or draw it.
@@ -49,6 +58,7 @@ def play(
       verify play thesis/hand_straight --out hand.gif
       verify play thesis/square_dissected --out square.gif --records steps.csv
       verify play thesis/hand_straight            in a window, where there is a display
+      verify play my_case.toml --out a.gif --tolerance 1e-3      faster, and how far off
       verify play my_case.toml --window --stroke my_stroke.toml
 
     In a window the left mouse button is the scalpel; the stroke is written as a tool_path
@@ -64,6 +74,10 @@ def play(
         stage = stage_of(scene)
     except UnsupportedSceneError as reason:
         raise InputError(f"cannot be played: {reason}", str(scene.file or scene.name)) from None
+    if tolerance is not None:
+        if tolerance >= 1.0:
+            raise InputError(f"--tolerance {tolerance:g}: expected below 1")
+        stage = replace(stage, tolerance=tolerance)
     if window or (out is None and has_display):
         from verify.simulator.window import play_in_window
 
@@ -125,6 +139,7 @@ def _played(
         "elements": len(stage.mesh.cells),
         "split": int(session.cutter.body.split_cells.sum()),
         "unknowns": int(session.displacement.size),
+        "solver_error": _solver_error(session),
         "median_seconds": {
             **{phase: Spread.of(r.seconds[phase] for r in taken).median for phase in PHASES},
             "step": step.median,
@@ -151,6 +166,18 @@ def _played(
         ],
         "out": str(out) if out else None,
     }
+
+
+def _solver_error(session: "Session") -> float | None:
+    """How far iterations that end early have led astray, over the largest displacement."""
+    from verify.simulator import Session, Stage
+
+    if session.stage.tolerance <= Stage.tolerance:
+        return None
+    exact = Session(replace(session.stage, tolerance=Stage.tolerance), account=False)
+    exact.run()
+    off = exact.displacement - session.displacement
+    return float(abs(off).max() / abs(exact.displacement).max())
 
 
 def _draw(frames: "list[Frame]", stage: "Stage", scene: "Scene", out: Path, zoom: float) -> None:
@@ -211,6 +238,8 @@ def _words(summary: dict[str, Any]) -> str:
         f"{summary['inverted_elements']} elements and {summary['inverted_facets']} facets inside "
         f"out, {summary['stray_facets']} facets astray",
     ]
+    if (error := summary["solver_error"]) is not None:
+        lines.append(f"iterations that end early moved it by {error:.1e} of its displacement")
     lines += [
         f"blade of {cut['name']}: took {cut['cut_work']:.3g} J, driving force at most "
         f"{cut['largest_driving_force']:.3g} N over {1e3 * cut['smoothed_over']:.3g} mm of its way"

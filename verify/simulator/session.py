@@ -12,7 +12,6 @@ from time import perf_counter
 import numpy as np
 
 from verify.accelerated import FAST
-from verify.accelerated.cholesky import Cholesky
 from verify.compare.released import driving_force
 from verify.simulator.openings import KnownWays
 from verify.simulator.semi_progressive import SemiProgressiveCutter
@@ -23,6 +22,7 @@ from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
@@ -320,8 +320,10 @@ class Session:
             state.displacement = increment.inherit(state.displacement)
             state.velocity = increment.inherit(state.velocity)
             self._start = {hook: increment.inherit(at) for hook, at in self._start.items()}
-            dragged = self._grips.tool is not None
+            source = np.append(np.arange(increment.nodes_before), increment.source)
+            dragged, former = self._grips.tool is not None, self.integrator
             self._assemble()
+            self.integrator.follow(former, source)
         with self._timed("cutting"):
             self.surfaces.update(increment)
         if dragged:  # on the facets and unknowns that there are now
@@ -330,7 +332,6 @@ class Session:
                 self._collide()
         if self._ways is not None:
             with self._timed("assembly"):
-                source = np.append(np.arange(increment.nodes_before), increment.source)
                 fading = self._ways.fading(self.phantom.node_parent, self.stage.time_step)
                 acceleration = acceleration_at_corners(body, before)
                 self.body.tie = tie_forces(
@@ -355,8 +356,9 @@ class Session:
             stage, weights = self.stage, self.body.mass.weights
             grips = Grips(self.phantom, stage.holds, stage.hooks, weights, self._start, self._held)
             body, grips.tool = self.body.held_by(grips.supports), self._grips.tool
-            body.load = grips.force
-            self._follow(body, grips, self._solver)
+            body.load, former = grips.force, self.integrator
+            self._follow(body, grips, former.solver)
+            self.integrator.follow(former, np.arange(body.shape[0]))
         self._begin_account()
 
     def _assemble(self) -> None:
@@ -369,13 +371,11 @@ class Session:
         body = DynamicBody(force, mass, weight, grips.force, grips.supports, stage.damping)
         if force.has_one_pass:
             force.prepare(body.pattern)
-        held = body.fixed.all(axis=1)  # these need not be solved for
-        self._follow(body, grips, Cholesky(body.pattern, stage.mesh.space, held))
+        self._follow(body, grips, body.step_solver(stage.tolerance))
 
-    def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
+    def _follow(self, body: DynamicBody, grips: Grips, solver: LinearSolver) -> None:
         """Move with another body from now on."""
         self.body, self._grips, self.phantom = body, grips, body.force.phantom
-        self._solver = solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
 
     def _collide(self) -> int:

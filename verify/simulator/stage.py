@@ -125,6 +125,8 @@ class Stage:
         ``"late"``: when it has crossed them through.
     toughness : list of float or None
         Of the tissue along each stroke, J/m²; of a membrane times the thickness.
+    tolerance : float
+        Residual that iterations may leave of the right-hand side of a step.
     """
 
     mesh: SimplexMesh
@@ -143,6 +145,7 @@ class Stage:
     tool_force: float = 0.0
     opening: str = "swept"
     toughness: list[float | None] = field(default_factory=list)
+    tolerance: float = 1e-10
 
     @cached_property
     def smoothing(self) -> float:

@@ -7,7 +7,7 @@ that the step always has a solution.
 
 import numpy as np
 
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
@@ -120,6 +120,17 @@ class RealTimeEuler:
         self.solver.solve(self.load, self._change)
         self._changes.insert(0, self._changes.pop())
         self._changes[0][:] = self._change
+
+    def follow(self, other: "RealTimeEuler", source: Ints) -> None:
+        """Go on from the steps of a body before a cut: iterations start from where its would.
+
+        Parameters
+        ----------
+        other : RealTimeEuler
+        source : (N,) int array
+            Its dof node from which each one here descends.
+        """
+        self._changes = [change[source] for change in other._changes]
 
     def linearise(self, state: MotionState, whole: bool = True) -> Configuration | None:
         """Write M + hC + h²K, or its upper half, into `blocks`, the right-hand side into `load`.
