@@ -2,7 +2,7 @@
 
 import pytest
 
-from verify.solvers.motion_of_scene import StagedAccount
+from verify.solvers.motion_of_scene import StagedLedger
 from verify.xfem.energy_balance import BalanceRecorder
 
 
@@ -10,7 +10,7 @@ from verify.xfem.energy_balance import BalanceRecorder
 def openings(monkeypatch):
     """What the ledger says of the body before and after each opening, as it happens."""
     found = []
-    genuine = StagedAccount.open
+    genuine = StagedLedger.open
 
     def opened(self, body, state, further, inherited):
         rows = []
@@ -20,5 +20,5 @@ def openings(monkeypatch):
         found.append((state.time, rows))
         genuine(self, body, state, further, inherited)
 
-    monkeypatch.setattr(StagedAccount, "open", opened)
+    monkeypatch.setattr(StagedLedger, "open", opened)
     return found

@@ -202,6 +202,22 @@ class SweptShares:
         return free, times, values, first
 
 
+def swept_measure(times: Array, sizes: Array, time: float) -> float:
+    """Sum up to a time what is swept of simplices of given sizes (e,), m² (in the plane m).
+
+    Parameters
+    ----------
+    times : (e, k) array
+        When the blade is at their corners, s, ascending.
+    sizes : (e,) array
+    time : float
+    """
+    gone = times[:, -1] <= time
+    now = ~gone & (times[:, 0] < time)
+    left = _left(times[now], np.repeat(sizes[now, None], times.shape[1], axis=1), time)
+    return float(sizes[gone].sum() + sizes[now].sum() - left.sum())
+
+
 def _left(times: Array, values: Array, time: float) -> Array:
     """Integral (e,) of a linear function over what is not swept yet of simplices at a time.
 

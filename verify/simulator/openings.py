@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from verify.geometry.spatial import measures
-from verify.geometry.swept_shares import SweptShares
+from verify.geometry.swept_shares import SweptShares, swept_measure
 from verify.simulator.semi_progressive import SemiProgressiveCutter, Stroke
 from verify.solvers.openings_of_scene import sections
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import ToolPath
-
-_AT_ONCE = 1e-9  # s: what is swept in less is swept at once
 
 
 class KnownWays:
@@ -38,13 +36,13 @@ class KnownWays:
         gone.advance(np.inf)
         phantom = gone.phantom_mesh()
         self._shares, self._strokes = SweptShares(len(mesh.cells)), gone.strokes
-        self._opens, self._areas = [], []
+        self._opens, self._passed = [], []
         for k, path in enumerate(paths):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             cut, passed_at = sections(phantom, cells, k), _passes(path)
             self._opens.append(self._shares.add(cut, passed_at).let_go)
             times = passed_at(cut.points.reshape(-1, mesh.space)).reshape(cut.points.shape[:2])
-            self._areas.append(_swept(times, measures(cut.points)))
+            self._passed.append((np.sort(times), measures(cut.points)))
 
     def open(self, stroke: Stroke) -> None:
         """Let a stroke that has not begun open elements ahead of its blade."""
@@ -52,7 +50,7 @@ class KnownWays:
 
     def areas(self, time: float) -> Floats:
         """Area (strokes,) that each blade has swept in the body, m² (in the plane m)."""
-        return np.array([np.interp(time, *known) for known in self._areas])
+        return np.array([swept_measure(*passed, time) for passed in self._passed])
 
     def fading(
         self, place: Ints, step: float
@@ -67,17 +65,6 @@ class KnownWays:
             What opens in it is released at its start, s.
         """
         return lambda nodes, time: self._shares.fading(place[nodes], time, step).at
-
-
-def _swept(times: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Instants, and how much of simplices is swept until then, each at a constant rate."""
-    begin, end = times.min(axis=1), times.max(axis=1)
-    rate = size / np.maximum(end - begin, _AT_ONCE)
-    at = np.concatenate([begin, np.maximum(end, begin + _AT_ONCE), [-1.0]])
-    change = np.concatenate([rate, -rate, [0.0]])
-    order = np.argsort(at)
-    at, pace = at[order], np.cumsum(change[order])
-    return at, np.append(0.0, np.cumsum(pace[:-1] * np.diff(at)))
 
 
 def _passes(path: ToolPath) -> Callable[[Floats], Floats]:

@@ -26,7 +26,7 @@ from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
-from verify.solvers.runs import Account, Record, work_of_blades
+from verify.solvers.runs import LedgerRows, Record, work_of_blades
 from verify.solvers.timeline import blade_advance, march, step_sizes, timeline_of
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ class TiedMotion:
             self.opening = facet_openings(scene, space, self.facing, swept, marching.delay)
             self.closed = np.ones(self.opening.times.shape, dtype=bool)
             self.planned = self._plan()
-        self.ledger, self.account = Ledger(), Account()
+        self.ledger, self.rows = Ledger(), LedgerRows()
         self.steppers: dict[float, Stepper] = {}
         self.outputs: list[State] = []
         self.openings = 0
@@ -174,7 +174,7 @@ class TiedMotion:
             "velocity": self._over_time("velocity"),
             "acceleration": self._over_time("acceleration") if linear else None,
             "mass": CONSISTENT,
-            "ledger": self.account.columns(),
+            "ledger": self.rows.columns(),
             "unknowns": self.space.node_points.size,
         }
 
@@ -220,7 +220,7 @@ class TiedMotion:
         ledger, momenta = self.ledger, momenta_of(self.body, self.state)
         done = ledger.done | work_of_blades(self.scene.cuts, ledger.work_by_cut)
         energies = ledger.state(self.body, self.state)
-        self.account.enter(energies, done, *momenta, ledger.turned + 0.0 * momenta[1])
+        self.rows.enter(energies, done, *momenta, ledger.turned + 0.0 * momenta[1])
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""

@@ -21,7 +21,7 @@ from verify.solvers.body_of_scene import (
     material_of,
 )
 from verify.solvers.interface import check_choices
-from verify.solvers.motion_of_scene import CutMotion, Marching
+from verify.solvers.motion_of_scene import CutMotion, Integration
 from verify.solvers.opening_bodies import MethodOpening
 from verify.solvers.openings_of_scene import cuts_of, openings_of
 from verify.solvers.runs import Record, check_steps, repeated
@@ -116,11 +116,11 @@ class MethodSolver:
             rule = "late"
         check_steps(load_steps, step_factor)
         self._check(scene, scheme, parameters)
-        marching = Marching(scheme, step_factor, spectral_radius)
+        integration = Integration(scheme, step_factor, spectral_radius)
 
         def run(mesh: tuple[SimplexMesh, float], trial: bool) -> Solution:
             if scene.analysis.kind == "dynamic":
-                return self._moved(scene, *mesh, marching, rule, parameters, trial)
+                return self._moved(scene, *mesh, integration, rule, parameters, trial)
             return self._at_rest(scene, *mesh, load_steps, parameters)
 
         with errors_of_scene(scene):
@@ -159,7 +159,7 @@ class MethodSolver:
         scene: Scene,
         mesh: SimplexMesh,
         size: float,
-        marching: Marching,
+        integration: Integration,
         rule: str,
         parameters: dict[str, Any],
         trial: bool,
@@ -179,7 +179,7 @@ class MethodSolver:
         timeline = timeline_of(scene, kinks=False)
         openings = openings_of(scene, size, timeline, rule)
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-        motion = CutMotion(scene, timeline, opening, marching, exact_of(scene), record)
+        motion = CutMotion(scene, timeline, opening, integration, exact_of(scene), record)
         phantom, fields = motion.run(trial)
         record.regularisations += springs_left_out(forces[-1])
         self._say(record, opening.final)

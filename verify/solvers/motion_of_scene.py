@@ -16,7 +16,7 @@ from verify.scene.initial import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings
-from verify.solvers.runs import Account, Record, work_of_blades
+from verify.solvers.runs import LedgerRows, Record, work_of_blades
 from verify.solvers.timeline import Timeline, blade_advance, march, step_sizes
 from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
@@ -43,8 +43,8 @@ _STAGE = {
 }
 
 
-class StagedAccount(Account):
-    """Account over the stages between openings; work goes on from stage to stage.
+class StagedLedger(LedgerRows):
+    """Ledger over the stages between openings; work goes on from stage to stage.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class OpeningBody(Protocol):
 
 
 @dataclass(frozen=True)
-class Marching:
+class Integration:
     """How a motion is integrated: the parameters of a solver that concern it."""
 
     scheme: str
@@ -198,7 +198,7 @@ class CutMotion:
     scene : Scene
     timeline : Timeline
     opening : OpeningBody
-    marching : Marching
+    integration : Integration
     exact : object or None
         The exact solution that supports and loads may be taken from.
     record : Record
@@ -210,18 +210,18 @@ class CutMotion:
         scene: Scene,
         timeline: Timeline,
         opening: OpeningBody,
-        marching: Marching,
+        integration: Integration,
         exact: Any,
         record: Record,
     ) -> None:
         self.scene, self.timeline, self.opening = scene, timeline, opening
-        self.marching, self.exact, self.record = marching, exact, record
+        self.integration, self.exact, self.record = integration, exact, record
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
         with record.timed(opening.phase):
             self._events = opening.events()
         closed_before = isinstance(scene.initial, Equilibrium) and not starts_open(scene.initial)
-        self._account = StagedAccount(opening.removal)
+        self._ledger = StagedLedger(opening.removal)
         self._outputs: list[_Output] = []
         self._by_cut = np.zeros(len(opening.openings.asked))  # energy that each has taken, J
         self._spread = 0.0  # as of `Release`, the most
@@ -296,7 +296,7 @@ class CutMotion:
                 further.tie = TieForces(new, tie.releases)
                 self._spread = max(self._spread, *(one.spread for one in tie.releases))
         self._leave()
-        self._account.open(self.body, self.state, further, state)
+        self._ledger.open(self.body, self.state, further, state)
         self._take(further, state)
         return True
 
@@ -357,26 +357,26 @@ class CutMotion:
         self.body, self.state = body, state
         self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
         self._instants, self._taken = list[tuple[int, dict[str, float]]](), 0
-        mesh, marching = body.force.phantom.mesh, self.marching
+        mesh, integration = body.force.phantom.mesh, self.integration
         self._largest, self.record.notes["step from"] = largest_step(
             body,
             material_of(self.scene, mesh),
             density_of(self.scene, mesh),
-            marching.scheme,
-            marching.step_factor,
+            integration.scheme,
+            integration.step_factor,
             self.scene.analysis.time_step,
         )
 
     def _leave(self) -> None:
         """Enter what has happened to the body."""
-        self._account.leave(self._recorder.close(), self._instants)
+        self._ledger.leave(self._recorder.close(), self._instants)
         newton = [o for o in self._integrators.values() if isinstance(o, NewtonIntegrator)]
         self._solves += sum(one.solves for one in newton)
 
     def _integrator(self, size: float) -> Integrator:
-        scheme = self.marching.scheme
+        scheme = self.integration.scheme
         try:
-            return integrator_of(self.body, size, scheme, self.marching.spectral_radius)
+            return integrator_of(self.body, size, scheme, self.integration.spectral_radius)
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{scheme}': {error}") from None
 
@@ -402,7 +402,7 @@ class CutMotion:
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),
             "mass": self._mass(phantom),
-            "ledger": self._account.columns(),
+            "ledger": self._ledger.columns(),
             "unknowns": phantom.node_points.size,
         }
 
@@ -420,7 +420,7 @@ class CutMotion:
         if self._solves:
             record.iterations["newton"] = self._solves
         record.notes |= {
-            "scheme": self.marching.scheme,
+            "scheme": self.integration.scheme,
             "mass": self.opening.mass,
             "time step": step_sizes(sizes),
         }

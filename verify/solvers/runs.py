@@ -1,4 +1,4 @@
-"""Record and account of a run of any own solver, and the cells that a scene asks for."""
+"""Record and ledger of a run of any own solver, and the cells that a scene asks for."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.spatial import measures
 from verify.scene import Box, Rectangle, Scene, crossed_by_interfaces
 from verify.solution import Regularisation, Solution
 
@@ -121,8 +122,8 @@ def work_of_blades(cuts: Sequence[Any], by_cut: _Floats | float) -> dict[str, fl
     return found if len(found) > 1 else {}
 
 
-class Account:
-    """A row for every output, of whatever has moved."""
+class LedgerRows:
+    """Rows of the ledger, one for every output, of whatever has moved."""
 
     def __init__(self) -> None:
         self._rows: list[dict[str, float]] = []
@@ -200,8 +201,7 @@ def across_interfaces(
     crossed = crossed_by_interfaces(scene.material, points, cells)
     if not crossed.any():
         return []
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    measures = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0.0))
-    share = float(measures[crossed].sum() / measures.sum())
+    sizes = measures(points[cells])
+    share = float(sizes[crossed].sum() / sizes.sum())
     kind = "cell across an interface, of the material at its centroid"
     return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]

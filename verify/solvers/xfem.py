@@ -14,7 +14,7 @@ from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, errors_of_scene
 from verify.solvers.interface import check_choices
-from verify.solvers.motion_of_scene import CutMotion, Marching
+from verify.solvers.motion_of_scene import CutMotion, Integration
 from verify.solvers.opening_bodies import Cutting, XfemOpening
 from verify.solvers.openings_of_scene import cuts_of, openings_of, to_cut
 from verify.solvers.runs import Record, check_steps, repeated
@@ -63,15 +63,15 @@ class _Parameters:
         given = {name: getattr(self, name) for name in _CHOICES if getattr(self, name) is not None}
         check_choices(XfemSolver.name, _CHOICES, given)
         check_steps(self.load_steps, self.step_factor)
-        self.marching()  # it checks its own
+        self.integration()  # it checks its own
 
     def cutting(self) -> Cutting:
         """Return those of a body that is cut on its way."""
         return Cutting(self.tip, self.slivers, self.mass, _KERNELS[self.kernels])
 
-    def marching(self) -> Marching:
+    def integration(self) -> Integration:
         """Return those of the time integration."""
-        return Marching(self.scheme, self.step_factor, self.spectral_radius)
+        return Integration(self.scheme, self.step_factor, self.spectral_radius)
 
     def notes(self) -> dict[str, str]:
         """Say them, for the report."""
@@ -214,7 +214,7 @@ def _run(
         timeline = timeline_of(scene, kinks=False)
         openings = openings_of(scene, size, timeline, given.opening or scene.analysis.opening)
         opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
-        motion = CutMotion(scene, timeline, opening, given.marching(), exact, record)
+        motion = CutMotion(scene, timeline, opening, given.integration(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)
     with record.timed("enrichment"):
         phantom, record.regularisations = _cut(scene, mesh, size, exact, given)
