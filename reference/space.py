@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
-from reference.meshing.edge_splitting import mesh_edges
 from reference.meshing.opening import measures
+from verify.geometry.refinement import mesh_edges
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

@@ -1,7 +1,6 @@
 """Meshes: conforming to the cut with its nodes doubled, or unfitted background meshes."""
 
 from reference.meshing.conforming import conforming_mesh
-from reference.meshing.edge_splitting import refine_uniformly
 from reference.meshing.imprint import (
     imprint,
     imprint_polygons,
@@ -23,7 +22,6 @@ __all__ = [
     "imprint_facets",
     "imprint_polygons",
     "open_cut",
-    "refine_uniformly",
     "singular_points",
     "structured_tetrahedra",
     "structured_triangles",

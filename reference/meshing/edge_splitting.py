@@ -1,4 +1,4 @@
-"""Changes of a given simplicial mesh: edges split or halved, flat triangles flipped, rings refined.
+"""Changes of a given simplicial mesh: edges split, flat triangles flipped, rings refined.
 
 Every cell around an edge that is split is halved, none is left behind: whatever edges are asked
 for, in the plane or in space, the mesh stays conforming.
@@ -10,40 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.opening import doubled_nodes
-from reference.meshing.session import oriented
+from verify.geometry.nearest import nearest_parts
+from verify.geometry.refinement import mesh_edges
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
-# children by corners (single digits) and middles of edges; the octahedron that is left of a
-# tetrahedron is split along the diagonal 02–13 (J. Bey, Computing 55, 1995)
-_CHILDREN = {
-    2: ["0 01", "01 1"],
-    3: ["0 01 02", "01 1 12", "02 12 2", "01 12 02"],
-    4: [
-        "0 01 02 03",
-        "01 1 12 13",
-        "02 12 2 23",
-        "03 13 23 3",
-        "01 02 03 13",
-        "01 02 12 13",
-        "02 03 13 23",
-        "02 12 13 23",
-    ],
-}
+_EXPONENT = {2: 0.8, 3: 2 / 3}  # of element sizes around what is singular, see `Grading`
+_RADIUS = 1 / 8  # of the body: within that distance a given mesh is graded
+_SMALLEST = 1e-9  # of the radius of the grading: nearer, distances of file coordinates are noise
+_LONGEST = 1.5  # of the size that is asked for: the longest edge of a cell of that size
 _SHRINK = 0.25  # of one ring around a singular point to the next
 _SAME = 1e-10  # of the body's size: a node closer than that to a singular point is on it
 # area over the square of the longest edge, at most, of a flat triangle: an angle that no mesh
 # generator aims at, and at which splitting its edges would leave none that is not flat
 _FLAT = 1e-6
 _ROUNDS = 8  # flat triangles that lie on flat ones are flipped from the outside in
-
-
-def mesh_edges(simplices: Cells) -> Cells:
-    """Edges (e, 2) of simplices (m, k), each once, the smaller node first."""
-    pairs = np.concatenate([simplices[:, [i, j]] for i, j in _pairs(simplices.shape[1])])
-    pairs.sort(axis=1)
-    count = int(pairs.max(initial=0)) + 1
-    return np.column_stack(np.divmod(np.unique(pairs[:, 0] * count + pairs[:, 1]), count))
 
 
 def barycentric(corners: Array, x: Array) -> Array:
@@ -168,57 +149,6 @@ def _halves(simplices: Cells, edge: Cells, keys: Cells, number: Cells, count: in
     return np.concatenate([one, two])
 
 
-def refine_uniformly(
-    points: Array, cells: Cells, facets: Cells, times: int = 1
-) -> tuple[Array, Cells, Cells]:
-    """Halve all edges, once or several times.
-
-    All times in one call: the descendants of a tetrahedron have three shapes only if its corners
-    keep their order from level to level.
-
-    Parameters
-    ----------
-    points : (n, d) array
-    cells : (m, d + 1) array
-        Positively oriented.
-    facets : (f, d) array
-        Marked facets, refined with the cells.
-    times : int
-
-    Returns
-    -------
-    points : (…, d) array
-    cells : (2^(d·times) m, d + 1) array
-        Positively oriented.
-    facets : (2^((d−1)·times) f, d) array
-    """
-    for _ in range(times):
-        points, cells, facets = _refine(points, cells, facets)
-    return points, oriented(points, cells), facets
-
-
-def _refine(points: Array, cells: Cells, facets: Cells) -> tuple[Array, Cells, Cells]:
-    edges = mesh_edges(cells)
-    count = len(points)
-    keys = edges[:, 0] * count + edges[:, 1]
-    points = np.vstack([points, points[edges].mean(axis=1)])
-    return points, _children(cells, keys, count), _children(facets, keys, count)
-
-
-def _children(simplices: Cells, keys: Cells, count: int) -> Cells:
-    def node(name: str) -> Cells:
-        if len(name) == 1:
-            return simplices[:, int(name)]
-        ends = np.sort(simplices[:, [int(name[0]), int(name[1])]], axis=1)
-        return count + np.searchsorted(keys, ends[:, 0] * count + ends[:, 1])
-
-    parts = [
-        np.column_stack([node(name) for name in child.split()])
-        for child in _CHILDREN[simplices.shape[1]]
-    ]
-    return np.concatenate(parts)
-
-
 def shrink_to_points(
     points: Array, cells: Cells, facets: Cells, singular: Array, smallest: float
 ) -> tuple[Array, Cells, Cells]:
@@ -250,6 +180,96 @@ def shrink_to_points(
             places = points[node] + _SHRINK * (ends - points[node])
             points, cells, facets = split_edges(points, cells, facets, edges, places)
     return points, cells, facets
+
+
+def graded_to(
+    points: Array, cells: Cells, facets: Cells, lines: Array, size: float
+) -> tuple[Array, Cells, Cells]:
+    """Bisect cells until h(r) = size · (r/R)^β around singular points or lines.
+
+    R is an eighth of the body. Longest edges are halved, neighbours first where these have a
+    longer one (Rivara, Int. J. Num. Meth. Eng. 20, 1984), so shapes stay bounded. β is that of
+    `Grading`: 0.8 in the plane, ⅔ in space.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, d + 1) array
+    facets : (f, d) array
+        Marked facets, split with the cells.
+    lines : (s, 2, d) array
+        Segments at which a field is singular, m; in the plane without length.
+    size : float
+        Mean edge of the mesh, m.
+    """
+    if not len(lines):
+        return points, cells, facets
+    radius = _RADIUS * float(np.ptp(points, axis=0).max())
+    exponent = _EXPONENT[points.shape[1]]
+    smallest = radius * max(min(1.0, size / radius) ** (1 / (1 - exponent)), _SMALLEST)
+    away = nearest_parts(points, lines)[0]
+    while True:
+        near = away[cells].mean(axis=1)
+        wanted = np.maximum(size * (near / radius) ** exponent, smallest)
+        corners = points[cells]
+        longest = [
+            np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(cells.shape[1])
+        ]
+        large = (np.max(longest, axis=0) > _LONGEST * wanted) & (near < radius)
+        if not large.any():
+            return loosen_front(points, cells, facets)
+        edges, around = _longest_to_split(points, cells, large, away)
+        points, halved, facets = split_edges(
+            points, cells[around], facets, edges, points[edges].mean(axis=1)
+        )
+        cells = np.concatenate([cells[~around], halved])
+        away = np.append(away, nearest_parts(points[len(away) :], lines)[0])
+
+
+def _longest_to_split(
+    points: Array, cells: Cells, large: NDArray[np.bool_], away: Array
+) -> tuple[Cells, NDArray[np.bool_]]:
+    """Edges (e, 2) that are the longest of all cells around them, on the way to large cells.
+
+    And which cells (m,) were looked at: they hold all that have one of the edges. Nodes are `away`
+    (n,) from what is singular, m: the large cells are near it, and so is what has to be split.
+    """
+    near, reach = away[cells].min(axis=1), float(away[cells[large]].max())
+    while True:
+        reach *= 3.0
+        around = near <= reach
+        edges, chosen = _on_the_way(points, cells[around], large[around])
+        rim = np.zeros(len(points), dtype=bool)  # nodes of cells that are not looked at
+        rim[cells[~around]] = True
+        if not rim[edges[chosen[:, 0]]].all(axis=1).any():
+            return edges[chosen.all(axis=1)], around
+
+
+def _on_the_way(
+    points: Array, cells: Cells, asked: NDArray[np.bool_]
+) -> tuple[Cells, NDArray[np.bool_]]:
+    """All edges (e, 2); whether a cell to be halved has it, and whether it is the longest of all.
+
+    To halve a cell, one that has its longest edge but a longer one must be halved first.
+    """
+    edges, pairs, count = mesh_edges(cells), _pairs(cells.shape[1]), len(points)
+    own = np.column_stack([_keys_of(cells, i, j, count) for i, j in pairs])
+    number = np.searchsorted(edges[:, 0] * count + edges[:, 1], own)
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    rank = np.empty(len(edges), dtype=np.int64)  # edges as long as others differ by their number
+    rank[np.argsort(length, kind="stable")] = np.arange(len(edges))
+    longest = np.take_along_axis(number, rank[number].argmax(axis=1)[:, None], axis=1)[:, 0]
+    while True:
+        chosen = np.zeros(len(edges), dtype=bool)
+        chosen[longest[asked]] = True
+        reached = chosen[number].any(axis=1)
+        if (reached == asked).all():
+            break
+        asked = reached
+    ready = np.bincount(number.ravel(), minlength=len(edges)) == np.bincount(
+        longest, minlength=len(edges)
+    )
+    return edges, np.column_stack([chosen, ready])
 
 
 def flip_flat_cells(points: Array, cells: Cells, facets: Cells) -> Cells:

@@ -10,12 +10,12 @@ from itertools import pairwise, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.edge_splitting import barycentric, loosen_front, mesh_edges, split_edges
+from reference.meshing.edge_splitting import barycentric, loosen_front, split_edges
 from reference.meshing.opening import cell_facets, inner_facets
-from reference.meshing.session import oriented
 from verify.errors import InputError
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.refinement import mesh_edges, oriented
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]

@@ -1,4 +1,7 @@
-"""Lines where the part that a support or traction acts on ends, on a box and in a given mesh."""
+"""Lines where the part that a support or traction acts on ends, on a box and in a given mesh.
+
+Of a given mesh those too at which cuts end: what a graded reference is graded to.
+"""
 
 from itertools import product
 
@@ -6,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import split_edges
-from reference.meshing.opening import cell_facets
+from reference.meshing.opening import cell_facets, doubled_nodes
 from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Traction
 from verify.scene.parts import on_part, pieces_on_part, size_of
@@ -163,6 +166,42 @@ def split_at_part_ends(
             break
         points, cells, facets = split_edges(points, cells, facets, edges, places)
     return points, cells, facets
+
+
+def singular_lines(scene: Scene, points: Array, cells: Cells, facets: Cells) -> Array:
+    """Segments (s, 2, d) at which the field of a given mesh is singular, in the plane points, m.
+
+    There a cut ends inside the body, or a support ends on its boundary; not where an exact field
+    is prescribed, which is smooth there.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : (n, d) array
+    cells : (m, d + 1) array
+    facets : (f, d) array
+        Of the cuts.
+    """
+    d = points.shape[1]
+    rims, times = np.unique(_rims(facets), axis=0, return_counts=True)
+    opened = np.isin(rims, doubled_nodes(cells, facets)) if len(facets) else rims == -1
+    found = [rims[(times == 1) & ~opened.any(axis=1)]]
+    if not any(support.displacement == "exact" for support in scene.supports):
+        boundary = _boundary(cells)
+        held = np.zeros(len(boundary), dtype=bool)
+        for support in scene.supports:
+            held[pieces_on_part(scene.geometry, support.where, points[boundary]).facet] = True
+        rims, place = np.unique(_rims(boundary), axis=0, return_inverse=True)
+        count = np.bincount(place.ravel())
+        holding = np.bincount(place.ravel(), np.tile(held, d))
+        found.append(rims[(holding > 0) & (holding < count)])
+    return points[np.concatenate(found)[:, [0, -1]]]
+
+
+def _rims(facets: Cells) -> Cells:
+    """Edges of triangles, or ends of segments (f, k), of all facets in turn."""
+    k = facets.shape[1]
+    return np.sort(np.concatenate([np.delete(facets, i, axis=1) for i in range(k)]), axis=1)
 
 
 def _boundary(cells: Cells) -> Cells:

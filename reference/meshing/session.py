@@ -24,6 +24,7 @@ from reference.meshing.features import (
 from reference.meshing.interfaces import plane_interfaces
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.refinement import oriented
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import FractureQuantity
 from verify.scene.tool_path import Cut
@@ -328,16 +329,6 @@ def set_sizes(gmsh: ModuleType, fields: list[int], smallest: float, largest: flo
         gmsh.model.mesh.field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeMin", smallest)
     gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
-
-
-def oriented(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Swap two corners of each cell of negative volume; triangles in space stay as they are."""
-    if cells.shape[1] <= points.shape[1]:
-        return cells
-    negative = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0
-    cells = cells.copy()
-    cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
-    return cells
 
 
 def background_mesh(

@@ -10,11 +10,11 @@ from reference.meshing import (
     conforming_mesh,
     imprint_polygons,
     open_cut,
-    refine_uniformly,
     structured_tetrahedra,
     structured_triangles,
 )
-from reference.meshing.edge_splitting import mesh_edges, split_edges
+from reference.meshing.edge_splitting import split_edges
+from verify.geometry.refinement import mesh_edges, refine_uniformly
 from reference.meshing.opening import cell_facets
 from verify.errors import InputError, UnsupportedSceneError
 

@@ -144,8 +144,8 @@ def mesh_of_level(scene: Scene, level: int) -> tuple[float, float] | None:
     body = scene.geometry
     if isinstance(body, MeshFile):
         points, cells = read_mesh(scene)
-        extent = float(np.ptp(points, axis=0).max())
-        return float(len(points)), extent / len(cells) ** (1 / scene.cell_dimension)
+        size = float(np.ptp(points, axis=0).max()) / len(cells) ** (1 / scene.cell_dimension)
+        return len(points) * 2.0 ** (scene.cell_dimension * level), size / 2**level
     if not isinstance(body, Rectangle | Box | Polygon):
         return None
     if scene.mesh.cells is not None or isinstance(body, Rectangle | Box):
@@ -168,6 +168,7 @@ def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
     if isinstance(body, MeshFile):
         coarse = mesh_of_level(scene, 0)
         assert coarse is not None
+        level += scene.first_refinement
         nodes, size = coarse[0] * 2.0 ** (scene.cell_dimension * level), coarse[1] / 2**level
     elif isinstance(body, Rectangle | Box | Polygon):
         extent = volume_of(scene) ** (1 / scene.dimension)

@@ -274,7 +274,7 @@ class MeshLevels(Strict):
     pattern: Literal["structured", "unstructured", "given"] = Field(
         default="structured",
         description="structured: squares split along the rising diagonal (rectangles only); "
-        "given: the mesh file of the geometry, as it is",
+        "given: the mesh file of the geometry, as it is or refined",
     )
     sizes: Annotated[list[Positive], Field(min_length=1)] | None = Field(
         default=None, description="element sizes h, m"
@@ -282,12 +282,18 @@ class MeshLevels(Strict):
     cells: Annotated[list[CellCounts], Field(min_length=1)] | None = Field(
         default=None, description="structured: numbers of cells per direction"
     )
+    refine: int = Field(
+        strict=True, default=0, ge=0, le=6,
+        description="given: how often the mesh of the file is refined uniformly, each a level "
+        "more; a curved boundary stays as the file has it",
+    )  # fmt: skip
 
     rules: ClassVar[Rules] = (
         ("", lambda m: m.pattern == "given" and (m.sizes or m.cells),
          "a given mesh has neither sizes nor cells"),
         ("", lambda m: m.pattern != "given" and none_or_both("sizes", "cells")(m),
          "a mesh has either sizes or cells"),
+        ("", lambda m: m.refine and m.pattern != "given", "refine belongs to a given mesh"),
         ("", lambda m: m.cells and m.pattern == "unstructured",
          "cells belong to a structured mesh; give sizes"),
         ("", lambda m: not all(_finer(b, a) for a, b in pairwise(m.cells or [])),
@@ -299,7 +305,8 @@ class MeshLevels(Strict):
     @property
     def count(self) -> int:
         """Number of levels."""
-        return 1 if self.pattern == "given" else len(self.sizes or self.cells or [])
+        given = self.pattern == "given"
+        return 1 + self.refine if given else len(self.sizes or self.cells or [])
 
 
 class ReferenceLevels(Strict):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from verify.errors import InputError
+from verify.geometry.refinement import refine_uniformly
 from verify.json_files import deeper_than
 from verify.printable import one_line, words_of
 from verify.scene.acceptance import RatioCheck
@@ -221,8 +222,14 @@ def mesh_path(scene: Scene) -> Path:
     return scene.geometry.path
 
 
-def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read_mesh(scene: Scene, level: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Read nodes (n, d), m, and cells (m, k) of a scene whose geometry is a mesh file.
+
+    Parameters
+    ----------
+    scene : Scene
+    level : int
+        How often the mesh of the file is refined uniformly.
 
     Raises
     ------
@@ -231,7 +238,8 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """
     assert isinstance(scene.geometry, MeshFile)
     body = scene.geometry.body()
-    return body.points.copy(), body.cells.copy()
+    none = np.zeros((0, body.cells.shape[1] - 1), dtype=np.int64)
+    return refine_uniformly(body.points.copy(), body.cells.copy(), none, level)[:2]
 
 
 def scene_hash(scene: Scene) -> str:

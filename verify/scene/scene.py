@@ -235,6 +235,8 @@ RULES: Rules = (
     ("mesh.pattern",
      lambda s: isinstance(s.geometry, MeshFile | Skin) != (s.mesh.pattern == "given"),
      "'given' and a geometry of kind 'file' or 'skin' belong together"),
+    ("mesh.refine", lambda s: s.mesh.refine and isinstance(s.geometry, Skin),
+     "belongs to a geometry of kind 'file'; a skin brings its own mesh"),
     ("mesh.pattern", lambda s: s.mesh.pattern == "structured" and isinstance(s.geometry, Polygon),
      "only rectangles and boxes have structured meshes; use 'unstructured'"),
     ("supports", lambda s: not s.supports and _is_static(s), "a static scene needs at least one"),

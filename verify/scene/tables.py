@@ -150,6 +150,16 @@ class SceneTables(Strict):
         return self._file
 
     @property
+    def first_refinement(self) -> int:
+        """How often a given mesh is refined for level 0 of the reference.
+
+        Its finest level has nodes as close as the solvers on their finest: elements of second
+        degree have some on the middles of their edges.
+        """
+        asked = self.reference
+        return max(0, self.mesh.refine + 2 - asked.degree - (asked.levels - 1))
+
+    @property
     def dimension(self) -> int:
         """Space dimension, 2 or 3."""
         return self.geometry.dimension

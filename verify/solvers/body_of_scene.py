@@ -31,7 +31,7 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     mesh : SimplexMesh
     size : float
         Its element size h: the longer side of a structured mesh's rectangles, the size asked for
-        of an unstructured one, the mean edge of a given one, m.
+        of an unstructured one, the mean edge of a given one over 2^level, m.
 
     Raises
     ------
@@ -43,7 +43,8 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
         mesh = SimplexMesh(*read_mesh(scene))
-        return mesh, float(np.linalg.norm(mesh.edge_vectors, axis=2).mean())
+        size = float(np.linalg.norm(mesh.edge_vectors, axis=2).mean()) / 2**level
+        return SimplexMesh(*read_mesh(scene, level)) if level else mesh, size
     counts, size = grid_of(scene, level)
     if counts is not None:
         assert isinstance(geometry, Rectangle | Box)

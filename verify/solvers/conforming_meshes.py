@@ -17,14 +17,14 @@ from reference.meshing import (
     imprint_facets,
     imprint_polygons,
     open_cut,
-    refine_uniformly,
     singular_points,
     structured_tetrahedra,
     structured_triangles,
 )
-from reference.meshing.edge_splitting import mesh_edges
-from reference.meshing.part_ends import split_at_part_ends
+from reference.meshing.edge_splitting import graded_to
+from reference.meshing.part_ends import singular_lines, split_at_part_ends
 from verify.errors import InputError
+from verify.geometry.refinement import mesh_edges, refine_uniformly
 from verify.scene import (
     Box,
     MeshFile,
@@ -52,7 +52,7 @@ def structure(scene: Scene, level: int) -> tuple[Counts, float]:
     if isinstance(scene.geometry, MeshFile):
         points, cells = read_mesh(scene)
         edges = points[mesh_edges(cells)]
-        return None, float(np.linalg.norm(np.diff(edges, axis=1), axis=2).mean())
+        return None, float(np.linalg.norm(np.diff(edges, axis=1), axis=2).mean()) / 2**level
     return grid_of(scene, level)
 
 
@@ -69,7 +69,7 @@ def not_imprinted(scene: Scene) -> str | None:
 def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
     """Make the mesh of a level, imprinted or remeshed, that is the peer of an unfitted one."""
     if isinstance(scene.geometry, MeshFile) or (mesh == "imprinted" and not not_imprinted(scene)):
-        return open_cut(*_imprinted(scene, *structure(scene, level)))
+        return open_cut(*_imprinted(scene, level))
     counts, size = structure(scene, level)
     if counts is not None:
         # equal mean size: two equilateral triangles of this edge are a square of 1, and with it
@@ -85,14 +85,18 @@ def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
 
     A given mesh is refined uniformly after the cuts are imprinted, and edges split where supports
     and tractions end; so is the scene's own where the cut is what another solver realised on it.
-    Others are made anew, graded.
+    Others are made anew, graded. The finest level that a case asks for has nodes at least as close
+    as the solvers on their finest; of a mesh that is refined for them it is graded too.
     """
-    counts, size = structure(scene, 0)
-    realised = _realised(scene, counts, size)
+    realised = _realised(scene, 0)
     if realised is not None or isinstance(scene.geometry, MeshFile):
-        given = _imprinted(scene, counts, size) if realised is None else realised[:3]
+        given = _imprinted(scene, 0) if realised is None else realised[:3]
         given = split_at_part_ends(scene, *given)
-        return open_cut(*refine_uniformly(*given, times=level)), size / 2**level
+        times, size = level + scene.first_refinement, structure(scene, 0)[1]
+        fine = refine_uniformly(*given, times=times)
+        if scene.mesh.refine and realised is None and scene.cell_dimension == scene.dimension:
+            fine = graded_to(*fine, singular_lines(scene, *given), size / 2**times)
+        return open_cut(*fine), size / 2**times
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)
     return conforming_mesh(scene, grading), grading.size
@@ -141,11 +145,12 @@ def _way(scene: Scene, size: float) -> float | None:
     return size * _WAY[scene.dimension] if on_its_way else None
 
 
-def _background(scene: Scene, counts: Counts, size: float) -> tuple[Array, Cells]:
-    """Make the scene's own mesh without its cuts."""
+def _background(scene: Scene, level: int) -> tuple[Array, Cells]:
+    """Make the scene's own mesh of a level without its cuts."""
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
-        return read_mesh(scene)
+        return read_mesh(scene, level)
+    counts, size = structure(scene, level)
     if counts is None:
         assert isinstance(geometry, Rectangle | Polygon)
         return background_mesh(geometry.outline(), size)
@@ -156,28 +161,28 @@ def _background(scene: Scene, counts: Counts, size: float) -> tuple[Array, Cells
     return structured_triangles(geometry.lower, geometry.upper, (n, m))
 
 
-def _realised(scene: Scene, counts: Counts, size: float) -> Realised | None:
+def _realised(scene: Scene, level: int) -> Realised | None:
     """Imprint cuts that are triangles which fit the scene's own mesh, or give None."""
     triangles = [
         c.points for c in scene.final_cuts if isinstance(c, PolygonCut) and len(c.points) == 3
     ]
-    given = isinstance(scene.geometry, MeshFile) or counts is not None
+    given = isinstance(scene.geometry, MeshFile) or structure(scene, level)[0] is not None
     membrane = scene.cell_dimension < scene.dimension
     if membrane or not given or not triangles or len(triangles) < len(scene.final_cuts):
         return None
     try:
-        found = imprint_facets(*_background(scene, counts, size), np.array(triangles, dtype=float))
+        found = imprint_facets(*_background(scene, level), np.array(triangles, dtype=float))
     except InputError:  # they reach beyond the body
         return None
     return found if found.fitted else None
 
 
-def _imprinted(scene: Scene, counts: Counts, size: float) -> tuple[Array, Cells, Cells]:
-    """Imprint the cuts of the scene on its background mesh."""
-    realised = _realised(scene, counts, size)
+def _imprinted(scene: Scene, level: int) -> tuple[Array, Cells, Cells]:
+    """Imprint the cuts of the scene on its background mesh of a level."""
+    realised = _realised(scene, level)
     if realised is not None:
         return realised[:3]
-    points, cells = _background(scene, counts, size)
+    points, cells = _background(scene, level)
     if scene.dimension == 2:
         return imprint(
             points, cells, [c.vertices() for c in scene.final_cuts if c.kind == "polyline"]
