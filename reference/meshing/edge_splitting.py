@@ -18,7 +18,7 @@ Cells = NDArray[np.int64]
 _EXPONENT = {2: 0.8, 3: 2 / 3}  # of element sizes around what is singular, see `Grading`
 _RADIUS = 1 / 8  # of the body: within that distance a given mesh is graded
 _SMALLEST = 1e-9  # of the radius of the grading: nearer, distances of file coordinates are noise
-_LONGEST = 1.5  # of the size that is asked for: the longest edge of a cell of that size
+_LONGEST = {2: 1.5, 3: 2.0}  # longest edge of a cell over the mean edge, the size that is asked for
 _SHRINK = 0.25  # of one ring around a singular point to the next
 _SAME = 1e-10  # of the body's size: a node closer than that to a singular point is on it
 # area over the square of the longest edge, at most, of a flat triangle: an angle that no mesh
@@ -215,7 +215,7 @@ def graded_to(
         longest = [
             np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(cells.shape[1])
         ]
-        large = (np.max(longest, axis=0) > _LONGEST * wanted) & (near < radius)
+        large = (np.max(longest, axis=0) > _LONGEST[points.shape[1]] * wanted) & (near < radius)
         if not large.any():
             return loosen_front(points, cells, facets)
         edges, around = _longest_to_split(points, cells, large, away)

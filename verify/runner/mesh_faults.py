@@ -77,7 +77,7 @@ def body_notes(scene: Scene) -> list[str]:
     if not isinstance(scene.geometry, MeshFile):
         return []
     body, used = scene.geometry.body(), _used_groups(scene)
-    said = [f"of the mesh file, {note}" for note in body.notes]
+    said = _done_to_the_mesh(scene)
     for name, group in body.groups.items():
         parts = {**group.parts, **({0: body.points[body.cells[group.cells]]} if len(group.cells)
                                    else {})}  # fmt: skip
@@ -166,9 +166,20 @@ def mesh_notices(scene: Scene) -> list[Notice]:
     said = filter(None, [mesh_warning(scene), unit_warning(scene)])
     notices = [Notice(NoticeKind.WARNING, "mesh file", None, text) for text in said]
     if isinstance(scene.geometry, MeshFile):
-        notes = [f"of the mesh file, {note}" for note in scene.geometry.body().notes]
-        notices += [Notice(NoticeKind.ADEQUACY, "mesh file", None, note) for note in notes]
+        done = _done_to_the_mesh(scene)
+        notices += [Notice(NoticeKind.ADEQUACY, "mesh file", None, note) for note in done]
     return notices
+
+
+def _done_to_the_mesh(scene: Scene) -> list[str]:
+    assert isinstance(scene.geometry, MeshFile)
+    notes = list(scene.geometry.body().notes)
+    if times := scene.mesh.refine:
+        notes.append(
+            f"levels are refined uniformly up to {times} times; a curved boundary stays as the "
+            "file has it"
+        )
+    return [f"of the mesh file, {note}" for note in notes]
 
 
 def _at(point: Array) -> str:
