@@ -14,9 +14,9 @@ from reference.meshing import (
     structured_triangles,
 )
 from reference.meshing.edge_splitting import split_edges
-from verify.geometry.refinement import mesh_edges, refine_uniformly
 from reference.meshing.opening import cell_facets
 from verify.errors import InputError, UnsupportedSceneError
+from verify.geometry.refinement import mesh_edges, refine_uniformly
 
 UNIFORM = Grading(0.15, np.zeros((0, 3)))
 
