@@ -197,8 +197,8 @@ def _value(value: Any) -> str:
 
 def _mesh(scene: "Scene") -> str:
     if scene.mesh.pattern == "given":
-        levels = scene.mesh.count
-        return f"as given, {levels} levels by uniform refinement" if levels > 1 else "as given"
+        fine = f", {scene.mesh.count} levels by uniform refinement" if scene.mesh.refine else ""
+        return f"as given{fine}"
     levels = [_value(list(level)) for level in scene.mesh.cells or []]
     levels += [f"h = {size:g} m" for size in scene.mesh.sizes or []]
     return f"{scene.mesh.pattern}, {scene.mesh.count} levels: {', '.join(levels)}"
