@@ -53,6 +53,15 @@ def factor(**more):
     return [{"kind": "stress_intensity", "name": "K", **more}]
 
 
+def resultant(kind, **more):
+    return [{"kind": kind, "name": "R", "component": "x", **more}]
+
+
+def stress(**more):
+    return [{"kind": "stress", "name": "s", "point": [0.5, 0.5], "radius": 0.1, "component": "xx",
+             **more}]  # fmt: skip
+
+
 def part(**more):
     return [{"kind": "part", "name": "m", "point": [0.5, 0.9], **more}]
 
@@ -180,6 +189,20 @@ BROKEN = [
     ({"d": 3, "quantities": factor(end="end"), "cuts": [PATH3], "analysis": MOVES,
       "material": HEAVY3},
      "quantities[0].mode: III alone is measured behind the blade of a tool_path"),
+    ({"quantities": resultant("section", point=[0.0] * 3, normal=[1.0] * 3)},
+     "quantities[0].point: expected 2 coordinates"),
+    ({"quantities": resultant("reaction", where="boundary", of="moment", centre=[0.0] * 3)},
+     "quantities[0].centre: expected 2 coordinates"),
+    ({"quantities": resultant("reaction", where="boundary", component="z")},
+     "quantities[0].component: the force of a 2D scene has no such"),
+    ({"quantities": resultant("reaction", where="left")},
+     "quantities[0].where: no support holds 'left'; those of the case: boundary"),
+    ({"d": 3, **MEMBRANE, "material": THIN, "analysis": {"kinematics": "corotational"},
+      "quantities": resultant("section", point=[0.0] * 3, normal=[1.0] * 3)},
+     "quantities[0]: a membrane has no section across its thickness"),
+    ({"analysis": {"kinematics": "corotational"}, "quantities": stress()},
+     "quantities[0]: a mean stress is measured in linear kinematics"),
+    ({"quantities": stress(component="xz")}, "quantities[0].component: z in a 2D scene"),
     ({"d": 3, "quantities": factor(kind="energy_release_rate", end="end"), "cuts": [PATH3],
       "analysis": MOVES, "material": scenes.soft(3, density=1.0)},
      "quantities[0].cut: 'cut' is opened on the way; released_to_cut says what its blade takes"),
@@ -395,6 +418,11 @@ BROKEN_ALONE = [
     ({"material": {"young": 1.0, "poisson": 0.3, "plane": "strain",
       "regions": [{"where": "x > 0.5"}]}},
      "expected young, poisson or density of the region"),
+    ({"quantities": resultant("reaction", where="boundary", of="moment")},
+     "centre: it belongs to a moment, which needs one"),
+    ({"quantities": resultant("section", point=[0.0, 0.0], normal=[0.0, 0.0])}, "normal: is zero"),
+    ({"quantities": resultant("section", point=[0.0, 0.0], normal=[1.0, 0.0, 0.0])},
+     "normal: 3 components at a point of 2"),
     ({"quantities": [{"kind": "part", "name": "m", "of": "inertia"}]},
      "component: the inertia of a part needs one"),
     ({"quantities": [{"kind": "part", "name": "m", "of": "mass", "component": "x"}]},

@@ -4,6 +4,7 @@ A load f(x) φ(t) does the work ∫ φ dq with q = ∫ f·u. At the output times
 between them q is the cubic that they determine.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -75,26 +76,65 @@ def _worked(times: Array, history: object, place: Array, rate: Array) -> tuple[A
     return work, width
 
 
-def nodal_forces(scene: Scene, load: BodyForce | Traction, solution: Solution) -> Array:
-    """Consistent nodal forces (n, d) of a load without its factor, N."""
+def nodal_forces(
+    scene: Scene, load: BodyForce | Traction, solution: Solution, time: float = 0.0,
+    clip: Callable[[Pieces, Array], Pieces] | None = None,
+) -> Array:  # fmt: skip
+    """Consistent nodal forces (n, d) of a load at a time, s, without its factor, N.
+
+    Parameters
+    ----------
+    clip : callable, optional
+        Which pieces of simplices (q, k, d) count.
+    """
     if isinstance(load, BodyForce):
         nodes, k = solution.cells, solution.cell_dimension
         pieces = Pieces.whole(np.arange(len(nodes)), k + 1)
     else:
         nodes, k = boundary_nodes_of_facets(solution), solution.cell_dimension - 1
         pieces = pieces_on_part(scene.geometry, load.where, solution.points[nodes[:, : k + 1]])
-        nodes = nodes[pieces.facet]
+    if clip is not None:
+        pieces = clip(pieces, solution.points[nodes[:, : k + 1]])
+    thickness = scene.material.thickness or 1.0
+
+    def force(points: Array, *_: object) -> Array:
+        values = load.values(points.reshape(-1, solution.dimension), time)
+        return thickness * values.reshape(points.shape)
+
+    return spread(solution, nodes, k, pieces, force)
+
+
+def spread(
+    solution: Solution,
+    simplices: Ints,
+    k: int,
+    pieces: Pieces,
+    force: Callable[[Array, Array, Ints], Array],
+) -> Array:
+    """Consistent nodal forces (n, d) of a force per measure on pieces of simplices, N.
+
+    Parameters
+    ----------
+    solution : Solution
+    simplices : (q, j) int array
+        Their nodes, corners first.
+    k : int
+        Their dimension.
+    pieces : Pieces
+    force : callable
+        Values (m, p, d) at points (m, p, d) of m pieces, where the hats of nodes are (m, p, j), of
+        simplices (m,).
+    """
     place, share = simplex_rule(k, 4)
+    nodes = simplices[pieces.facet]
     within = place @ pieces.barycentric
     hats = shape_functions(within.reshape(-1, k + 1), k, solution.order)
     corners = solution.points[nodes[:, : k + 1]]
-    points = within @ corners
-    force = load.values(points.reshape(-1, solution.dimension)).reshape(points.shape)
-    thickness = scene.material.thickness or 1.0
-    weight = thickness * (measures(corners) * pieces.share)[:, None] * share
-    local = np.einsum("mq,mqn,mqd->mnd", weight, hats.reshape(*weight.shape, -1), force)
+    weight = (measures(corners) * pieces.share)[:, None] * share
+    hats = hats.reshape(*weight.shape, -1)
+    values = force(within @ corners, hats, pieces.facet)
     found = np.zeros_like(solution.points)
-    np.add.at(found, nodes, local)
+    np.add.at(found, nodes, np.einsum("mq,mqn,mqd->mnd", weight, hats, values))
     return found
 
 
@@ -151,6 +191,24 @@ class PrescribedNodes:
         return found
 
 
+def nodes_held(scene: Scene, solution: Solution, where: Sequence[str]) -> list[Ints]:
+    """Nodes (h,) of a solution that supports on parts hold, of each: all solvers follow one rule.
+
+    Raises
+    ------
+    InputError
+        If one holds no node.
+    """
+    facets = boundary_nodes_of_facets(solution)
+    own = np.unique(facets)
+    corners = solution.points[facets[:, : solution.cell_dimension]]
+    rows = np.searchsorted(own, facets), corners
+    return [
+        own[held_nodes(scene, one, solution.points[own], rows, f"supports[{i}].where")[0]]
+        for i, one in enumerate(where)
+    ]
+
+
 def prescribed_nodes(scene: Scene, solution: Solution) -> PrescribedNodes:
     """Find what the supports of a scene hold of a solution, by the rule that all solvers follow.
 
@@ -160,19 +218,16 @@ def prescribed_nodes(scene: Scene, solution: Solution) -> PrescribedNodes:
         If a support follows an exact field or jumps, holds no node, or if nodes that it holds are
         elsewhere.
     """
-    facets = boundary_nodes_of_facets(solution)
-    own = np.unique(facets)
-    corners = solution.points[facets[:, : solution.cell_dimension]]
-    rows = np.searchsorted(own, facets), corners
-    held = np.zeros(solution.points.shape, dtype=bool)
-    supports = []
-    for i, support in enumerate(scene.supports):
+    for support in scene.supports:
         if support.displacement == "exact":
             raise InputError("a support follows an exact field")
         if [t for t in jumps(support.history) if solution.times[0] < t <= solution.times[-1]]:
             raise InputError("a support jumps")
-        at, _ = held_nodes(scene, support.where, solution.points[own], rows, f"supports[{i}].where")
-        nodes, components = own[at], list(support.held(scene.dimension))
+    at = nodes_held(scene, solution, [support.where for support in scene.supports])
+    held = np.zeros(solution.points.shape, dtype=bool)
+    supports = []
+    for nodes, support in zip(at, scene.supports, strict=True):
+        components = list(support.held(scene.dimension))
         held[np.ix_(nodes, components)] = True
         motion = PrescribedMotion(support, solution.points[nodes], None, None)
         supports.append((nodes, components, motion))

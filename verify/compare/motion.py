@@ -12,7 +12,7 @@ from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import Field, SolutionField
 from verify.compare.realised import field_of
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -81,6 +81,22 @@ class Motion(Protocol):
     def afresh(self) -> "Motion":
         """Return the same motion, without what it remembers of points."""
         ...
+
+
+def step_at(solution: Solution, time: float | None) -> int:
+    """Give the number of the output time that is `time`, s; None is the last.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the solution has none there.
+    """
+    if time is None:
+        return len(solution.times) - 1
+    step = int(np.argmin(np.abs(solution.times - time)))
+    if abs(solution.times[step] - time) > _SAME_TIME * float(np.ptp(solution.times)):
+        raise UnsupportedSceneError(f"the solution has no field at {time:.6g} s")
+    return step
 
 
 class SolutionMotion:

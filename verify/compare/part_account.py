@@ -13,7 +13,7 @@ from verify.compare.hooke import Law
 from verify.compare.inertia import Part, boundary_nodes, part_of, separated_parts
 from verify.compare.locate import SolutionField
 from verify.compare.mass import Kinetic, density_of, kinetic
-from verify.compare.motion import SolutionMotion
+from verify.compare.motion import SolutionMotion, step_at
 from verify.compare.motion_account import (
     NO_VELOCITIES,
     SCHEME,
@@ -141,7 +141,6 @@ def motion_history(account: MotionAccount) -> dict[str, list[float]]:
     return found
 
 
-_SAME_TIME = 1e-9  # of the duration
 _UNITS = {
     "mass": "kg", "inertia": "kg m²", "linear_momentum": "N s", "angular_momentum": "N m s",
     "kinetic_energy": "J", "strain_energy": "J",
@@ -165,11 +164,7 @@ def part_quantity(
     if asked.of == "inertia":
         return float(part.inertia[_row(asked, len(part.inertia))])
     cells = part.cells
-    step = -1
-    if asked.time is not None:
-        step = int(np.argmin(np.abs(solution.times - asked.time)))
-        if abs(solution.times[step] - asked.time) > _SAME_TIME * float(np.ptp(solution.times)):
-            raise UnsupportedSceneError(f"the solution has no field at {asked.time:.6g} s")
+    step = step_at(solution, asked.time)
     if asked.of == "strain_energy":
         return float(cell_strain_energies(SolutionField(solution, step), law)[cells].sum())
     if solution.velocity is None:

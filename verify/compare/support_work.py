@@ -198,7 +198,8 @@ class _Work:
         for i, sign in ((0, 1.0), (-1, -1.0)):
             if self._is_knot(float([start, end][i])):
                 u, v = states[i]
-                taken = self._taken_up(v, self.nodes.velocities(prescribed[i]))
+                given = self.nodes.velocities(prescribed[i])
+                taken = taken_up(self.mass, self.nodes.follows, v, given)
                 done += sign * 0.5 * float(np.sum((taken + v) * (self.mass @ (taken - v))))
                 states[i] = u, taken
         follows = self.nodes.follows
@@ -265,16 +266,16 @@ class _Work:
             power += damping * viscous_power(test, moving, displacement, self.law)
         return power
 
-    def _taken_up(self, v: Array, velocities: Array) -> Array:
-        """Velocities (n, d) after held nodes take up given ones at once: no impulse elsewhere."""
-        held, change = self.nodes.follows, np.zeros_like(v)
-        change[held] = (velocities - v)[held]
-        if not change.any():
-            return v
-        for axis, own in enumerate(held.T):
-            if own.any() and not own.all():
-                coupled = self.mass[~own]
-                change[~own, axis] = cg(
-                    coupled[:, ~own], -(coupled[:, own] @ change[own, axis]), rtol=1e-12
-                )[0]
-        return v + change
+
+def taken_up(mass: csr_array, held: NDArray[np.bool_], rates: Array, given: Array) -> Array:
+    """Rates (n, d) after held nodes take up given ones at once: M × rates is the same elsewhere."""
+    change = np.where(held, given - rates, 0.0)
+    if not change.any():
+        return rates
+    for axis, own in enumerate(held.T):
+        if own.any() and not own.all():
+            coupled = mass[~own]
+            change[~own, axis] = cg(
+                coupled[:, ~own], -(coupled[:, own] @ change[own, axis]), rtol=1e-12
+            )[0]
+    return rates + change

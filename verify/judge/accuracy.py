@@ -380,7 +380,7 @@ def _time_note(history: History, reference: Reference) -> dict[str, str]:
 
 def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
     """Rates of every error, and of every quantity that is not exact on some level."""
-    fields = {q.name for q in scene.quantities if q.kind in ("displacement", "opening")}
+    fields = {q.name for q in scene.quantities if q.kind in ("displacement", "opening", "stress")}
     names = [*ERROR_NAMES, *(q.name for q in scene.quantities)]
     rates = []
     for solver in dict.fromkeys(record.solver for record in records):

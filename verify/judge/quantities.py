@@ -5,6 +5,7 @@ accident: it depends on where in its cell the point lies. Around the point the s
 all its values. Its root mean square there has no accidents, and falls in order.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplices import points_in, simplices
 from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError
+from verify.judge.resultants import WeakForm, mean_stress, reaction, section
 from verify.judge.stress_intensity import Found, solution_intensity
 from verify.scene import Scene
 from verify.scene.acceptance import (
@@ -31,7 +33,10 @@ from verify.scene.acceptance import (
     OpeningQuantity,
     PartQuantity,
     Quantity,
+    ReactionQuantity,
+    SectionQuantity,
     StressIntensityQuantity,
+    StressQuantity,
 )
 from verify.solution import Solution
 
@@ -47,7 +52,7 @@ class Measured:
     body : Body or SolidBody
     law : Law
     scene : Scene, optional
-        Only stress-intensity factors and numbers of parts need it.
+        Displacements, openings, energies and stresses do not need it.
     cut : RealisedCut, optional
         Says where its field is continued across that.
     """
@@ -60,6 +65,13 @@ class Measured:
         self.cut = cut
         self._factors: Found = {}
         self.motion = SolutionMotion(solution, body, continued=True if cut is None else cut)
+
+    @cached_property
+    def weak_form(self) -> WeakForm:
+        """Forces at its nodes."""
+        if self.scene is None:
+            raise UnsupportedSceneError("a reaction or section needs the scene")
+        return WeakForm(self.scene, self.solution, self.law)
 
     def continued(self, everywhere: bool) -> SolutionMotion:
         """Field over time with continuation across all of the realised cut, or without any."""
@@ -112,6 +124,12 @@ class Measured:
             if self.scene is None:
                 raise UnsupportedSceneError("a number of a part needs the scene")
             return part_quantity(self.scene, self.solution, self.motion, self.law, asked)
+        if isinstance(asked, ReactionQuantity):
+            return reaction(self.weak_form, asked)
+        if isinstance(asked, SectionQuantity):
+            return section(self.weak_form, asked)
+        if isinstance(asked, StressQuantity):
+            return mean_stress(self.motion.at(asked.time), self.law, asked)
         if isinstance(asked, MaximumDisplacementQuantity):
             u = self.motion.nodal(asked.time)
             return float(np.linalg.norm(u, axis=1).max())
@@ -137,6 +155,10 @@ def unit_of(asked: Quantity, dimension: int) -> str:
         return part_unit(asked, dimension)
     if isinstance(asked, FractureQuantity):
         return "J/m²" if asked.column < 0 else "Pa √m"
+    if isinstance(asked, ReactionQuantity | SectionQuantity):
+        return ("N" if asked.of == "force" else "N m") + ("/m" if dimension == 2 else "")
+    if isinstance(asked, StressQuantity):
+        return "Pa"
     if asked.kind == "strain_energy":
         return "J/m" if dimension == 2 else "J"
     return "m"

@@ -30,6 +30,7 @@ from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.quantities import Measured, field_quantity, local_difference
 from verify.judge.rates import ROUND_OFF, counted_order, cut_on_the_way, error_fall
+from verify.judge.resultants import mean_stress, scale_of
 from verify.judge.richardson import (
     Extrapolation,
     extrapolate,
@@ -48,6 +49,9 @@ from verify.scene.acceptance import (
     OpeningQuantity,
     PartQuantity,
     Quantity,
+    ReactionQuantity,
+    SectionQuantity,
+    StressQuantity,
 )
 from verify.solution import Solution
 
@@ -143,8 +147,10 @@ def _exact_quantity(
 ) -> tuple[float, float] | None:
     end = scene.analysis.duration
     motion = ExactMotion(exact, end)
-    if isinstance(asked, PartQuantity):
-        return None  # which parts there are is known of meshes only
+    if isinstance(asked, PartQuantity | ReactionQuantity | SectionQuantity):
+        return None  # parts, and what supports hold, are known of meshes only
+    if isinstance(asked, StressQuantity):
+        return mean_stress(motion.at(asked.time), law, asked), 0.0
     if isinstance(asked, FractureQuantity):
         stated = exact_intensity(scene, field_at(exact, asked.time or end), asked)
         return None if stated is None else (stated, 0.0)
@@ -351,6 +357,8 @@ def _round_off(asked: Quantity, measured: Measured) -> float:
     moved = float(np.abs(u).max(initial=0.0))
     if isinstance(asked, DisplacementQuantity | OpeningQuantity):
         return 1e-13 * moved
+    if isinstance(asked, ReactionQuantity | SectionQuantity | StressQuantity):
+        return scale_of(measured.weak_form, asked)
     if asked.kind == "strain_energy":
         strain = 1e-10 * moved / float(np.ptp(points, axis=0).max())
         stiffness = np.max(measured.law.lame) + 2 * np.max(measured.law.shear)

@@ -2,6 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from verify.scene.strict import (
@@ -116,6 +118,70 @@ class PartQuantity(Strict):
     )  # fmt: skip
 
 
+class _ResultantQuantity(Strict):
+    name: Line
+    of: Literal["force", "moment"] = "force"
+    component: Literal["x", "y", "z"] = Field(description="in 2D a moment is about z")
+    time: Time = None
+
+    @property
+    def about(self) -> tuple[float, ...] | list[float] | None:
+        """Point that a moment is about, m."""
+        raise NotImplementedError
+
+    def direction(self, dimension: int) -> NDArray[np.float64]:
+        """Return the unit vector (d,) of a force, or the axis of a moment."""
+        return np.eye(3)["xyz".index(self.component)][: 3 if self.of == "moment" else dimension]
+
+
+class ReactionQuantity(_ResultantQuantity):
+    """Force or moment of a support on the body, N or N m (2D: per metre of thickness)."""
+
+    kind: Literal["reaction"]
+    where: Line = Field(description="the part that a support of the case holds, as it says it")
+    centre: Vector | None = Field(default=None, description="that a moment is about, m")
+
+    rules: ClassVar[Rules] = (
+        ("centre", lambda p: (p.of == "moment") != (p.centre is not None),
+         "it belongs to a moment, which needs one"),
+    )  # fmt: skip
+
+    @property
+    def about(self) -> tuple[float, ...] | list[float] | None:
+        """Point that a moment is about, m."""
+        return self.centre
+
+
+class SectionQuantity(_ResultantQuantity):
+    """Force or moment in a section: of what lies beyond it on the rest (2D: per metre)."""
+
+    kind: Literal["section"]
+    point: Vector = Field(description="of the plane, m; a moment is about it")
+    normal: Vector = Field(description="points beyond it; tension along it is positive")
+
+    rules: ClassVar[Rules] = (
+        ("normal", lambda p: not any(p.normal), "is zero"),
+        ("normal", lambda p: len(p.normal) != len(p.point) and (len(p.normal), len(p.point)),
+         "{} components at a point of {}"),
+    )  # fmt: skip
+
+    @property
+    def about(self) -> tuple[float, ...] | list[float] | None:
+        """Point that a moment is about, m."""
+        return self.point
+
+
+class StressQuantity(Strict):
+    """Mean of a stress component over a small ball of the body, Pa."""
+
+    kind: Literal["stress"]
+    name: Line
+    point: Vector = Field(description="centre of the ball, m")
+    radius: Positive = Field(description="m; the ball lies in the body and on one side of all cuts")
+    component: Literal["xx", "yy", "zz", "xy", "xz", "yz"]
+    time: Time = None
+
+
 class FractureQuantity(Strict):
     """What is asked for at an end of a plane cut, or at a point of a front."""
 
@@ -172,6 +238,9 @@ Quantity = Annotated[
     | MaximumDisplacementQuantity
     | OpeningQuantity
     | PartQuantity
+    | ReactionQuantity
+    | SectionQuantity
+    | StressQuantity
     | EnergyReleaseQuantity
     | StressIntensityQuantity,
     Field(discriminator="kind"),

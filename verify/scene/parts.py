@@ -153,7 +153,7 @@ def _of_formula(where: str, k: int, d: int, facets: bytes, every: bytes) -> Piec
     largest = np.inf if is_affine(where) else _LARGEST[k] * size
     for sides in comparisons(where, d):
         pieces, values = _refined(pieces, corners, sides, size, largest)
-        pieces = _clipped(pieces, values)
+        pieces = clipped(pieces, values)
     points = _off_ridges(pieces.places(corners), boundary, size)
     # only along its normal is a facet on a part that it does not meet, so that x < 0 is a face
     away = _TOLERANCE * size * _normal_projections(corners)[pieces.facet]
@@ -201,7 +201,7 @@ def _refined(
     return sum(done[1:], done[0]), np.concatenate(found)
 
 
-def _clipped(pieces: Pieces, values: Array) -> Pieces:
+def clipped(pieces: Pieces, values: Array) -> Pieces:
     """Divide simplices along the zeros of functions that are affine on each (r, k)."""
     pairs = np.array(list(combinations(range(values.shape[1]), 2)))
     done: list[Pieces] = []

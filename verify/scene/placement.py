@@ -14,7 +14,7 @@ from verify.errors import InputError
 from verify.geometry.nearest import distance_to_outline, distance_to_pieces
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
-from verify.scene.acceptance import FractureQuantity
+from verify.scene.acceptance import FractureQuantity, SectionQuantity, StressQuantity
 from verify.scene.cuts import ArcCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle
 from verify.scene.parts import held_facets, on_part, pieces_on_part
@@ -27,6 +27,7 @@ Ints = NDArray[np.int64]
 _TOLERANCE = 1e-9  # of the size of what is compared
 _ON_CUT = 1e-3  # of the body: the cut that a point is held against is triangulated
 _SAMPLES = 2**16  # of the body: a region of less than about 1e-4 of it may be missed
+_TURNS, _RINGS = {2: 256, 3: 48}, 24  # points on a circle, and circles of a sphere
 # steps of an additive recurrence that fills a square or a cube evenly (Roberts 2018)
 _STEPS = {2: (0.75487766625, 0.56984029100), 3: (0.81917251340, 0.67104360670, 0.54970047790)}
 
@@ -266,6 +267,19 @@ def _common_arc(a: ArcCut, b: ArcCut) -> float:
 
 
 # ----------------------------------------------------------------------------------------- points
+def on_unit_sphere(d: int) -> tuple[Array, Array]:
+    """Points (n, d) evenly on the unit circle or sphere and weights (n,) that sum to 1.
+
+    Evenly spaced around an axis and of Gauss-Legendre along it: opposite ones are both there.
+    """
+    heights, weights = np.polynomial.legendre.leggauss(_RINGS) if d == 3 else np.array([[0.0], [2]])
+    turn = 2.0 * np.pi * np.arange(_TURNS[d]) / _TURNS[d]
+    wide = np.sqrt(1.0 - heights**2)[:, None]
+    across = [np.ravel(wide * np.cos(turn)), np.ravel(wide * np.sin(turn))]
+    points = np.column_stack([*across, *[np.repeat(heights, _TURNS[d])] * (d - 2)])
+    return points, np.repeat(0.5 * weights, _TURNS[d]) / _TURNS[d]
+
+
 def misplaced_point(
     scene: SceneTables, size: float | None = None, holds: Callable[[Array], bool] | None = None
 ) -> str | None:
@@ -283,12 +297,19 @@ def misplaced_point(
             cut = next(cut for cut in _known(scene) if cut.name == asked.cut)
             place = f"quantities[{i}].at: {asked.at} of cut '{asked.cut}' is at"
             point = point_along(cut.vertices(), asked.at or 0.0)
-        if point is None or isinstance(asked, FractureQuantity):
+        if point is None or isinstance(asked, FractureQuantity | SectionQuantity):
             continue
         at = np.array(point, dtype=float)
         where = f"{place} ({', '.join(f'{x:.6g}' for x in at)})"
-        if not (holds(at) if holds else scene.geometry.holds(at[None], _TOLERANCE * size)[0]):
+        ball = [at]
+        if isinstance(asked, StressQuantity):
+            where += f" as the centre of a ball of {asked.radius:.4g} m"
+            ball += list(at + (1 - _TOLERANCE) * asked.radius * on_unit_sphere(len(at))[0])
+        near = _TOLERANCE * size
+        if not all(holds(x) if holds else scene.geometry.holds(x[None], near)[0] for x in ball):
             return f"{where}, which is not in the body"
+        if len(ball) > 1 and np.ptp(scene.material.number_at(np.array(ball))):
+            return f"{where}, in which materials differ; expected one"
         if found := _at_a_cut(scene, asked, at, size):
             return f"{where} {found}"
     return None
@@ -305,6 +326,10 @@ def _at_a_cut(scene: SceneTables, asked: Any, point: Array, size: float) -> str 
         off = away.get(asked.cut, 0.0) if scene.dimension == 3 else 0.0
         return f"is {off:.3g} m away from cut '{asked.cut}'" if off > _ON_CUT * size else None
     for name, off in away.items():
+        if isinstance(asked, StressQuantity):
+            if off < asked.radius:
+                return f"is {off:.4g} m away from cut '{name}'; expected more than the radius"
+            continue
         if off <= _TOLERANCE * size and asked.kind == "part":
             return f"lies on cut '{name}', between two parts"
         if off <= _TOLERANCE * size:

@@ -162,6 +162,11 @@ def _axis_in_plane(part: Any) -> tuple[str, str] | None:
     return None if part.component in (None, *axes) else (part.of, " or ".join(axes))
 
 
+def _not_held(scene: SceneTables, asked: Any) -> tuple[str, str] | None:
+    known = dict.fromkeys(support.where for support in scene.supports)
+    return None if asked.where in known else (asked.where, ", ".join(known) or "none")
+
+
 def _no_output(scene: SceneTables, time: float | None) -> tuple[float] | None:
     if time is None or scene.analysis.duration is None:
         return None
@@ -302,6 +307,18 @@ RULES: Rules = (
     ("cuts", lambda s: _twice(s.cuts), "names must differ, got {}"),
     ("quantities", lambda s: _twice(s.quantities), "names must differ, got {}"),
     ("quantities[displacement].point", _point_elsewhere, "expected {} coordinates"),
+    ("quantities[section|stress].point", _point_elsewhere, "expected {} coordinates"),
+    ("quantities[reaction].centre", lambda s, p: p.centre and len(p.centre) != s.dimension
+     and s.dimension, "expected {} coordinates"),
+    ("quantities[reaction|section].component", lambda s, p: s.dimension == 2
+     and (p.component == "z") != (p.of == "moment") and p.of, "the {} of a 2D scene has no such"),
+    ("quantities[reaction].where", _not_held, "no support holds '{}'; those of the case: {}"),
+    ("quantities[section|stress]", lambda s, p: _is_membrane(s) and p.kind,
+     "a membrane has no {} across its thickness"),
+    ("quantities[stress]", lambda s, p: s.analysis.kinematics != "linear",
+     "a mean stress is measured in linear kinematics"),
+    ("quantities[stress].component",
+     lambda s, p: s.dimension == 2 and "z" in p.component, "z in a 2D scene"),
     ("quantities[displacement].component",
      lambda s, p: "xyz".index(p.component) >= s.dimension, "z in a 2D scene"),
     ("quantities[part].point", _point_elsewhere, "expected {} coordinates"),
@@ -312,7 +329,8 @@ RULES: Rules = (
      "the {} of a part needs material.density"),
     ("quantities[part]", lambda s, p: p.of in OF_MOVING_PARTS and _is_static(s) and p.of,
      "{} belongs to a dynamic analysis"),
-    ("quantities[part].time", lambda s, p: _no_output(s, p.time), "{:g} s is no output time"),
+    ("quantities[part|reaction|section].time", lambda s, p: _no_output(s, p.time),
+     "{:g} s is no output time"),
     ("quantities[opening].cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
     ("quantities[opening].at",
      lambda s, p: s.dimension == 2 and (p.at is None or p.point is not None),

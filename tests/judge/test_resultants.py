@@ -1,0 +1,301 @@
+"""Reactions, section forces and mean stresses: against equilibrium, and closed forms."""
+
+import numpy as np
+import pytest
+import scenes
+
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.errors import UnsupportedSceneError
+from verify.judge.quantities import Measured, unit_of
+from verify.judge.reference import conforming_reference
+from verify.scene import load_scene
+from verify.solution import Solution
+from verify.solvers import find_solver
+
+
+def reaction(name, where, component, **more):
+    return {"kind": "reaction", "name": name, "where": where, "component": component, **more}
+
+
+def moment(name, where, component, centre):
+    return reaction(name, where, component, of="moment", centre=centre)
+
+
+def section(name, point, normal, component, **more):
+    return {"kind": "section", "name": name, "point": point, "normal": normal,
+            "component": component, **more}  # fmt: skip
+
+
+def stress(point, radius, component="xx", **more):
+    return {"kind": "stress", "name": f"s_{component}", "point": point, "radius": radius,
+            "component": component, **more}  # fmt: skip
+
+
+def measured(scene, solver="xfem", level=0, solution=None):
+    solution = solution or find_solver(solver).solve(scene, level, repetitions=0)
+    return Measured(solution, body_of(scene), law_of(scene), scene)
+
+
+def values(scene, solver="xfem", level=0, solution=None):
+    one = measured(scene, solver, level, solution)
+    return {asked.name: one.quantity(asked) for asked in scene.quantities}
+
+
+# a cut in general position, two supports of which one slides and is displaced, all kinds of loads
+PLANE = {
+    "cuts": [{"kind": "polyline", "points": [[0.31, 0.47], [0.66, 0.81]]}],
+    "material": scenes.soft(2, density=1.0),
+    "supports": [
+        {"where": "left", "displacement": [0.0, 0.0]},
+        {"where": "right", "displacement": [0.1], "components": ["x"]},
+    ],
+    "loads": [
+        {"kind": "traction", "where": "top", "traction": ["0.3 * x", "0.2 + x"]},
+        {"kind": "body_force", "force": [0.1, "-0.4 * y"]},
+        {"kind": "gravity", "acceleration": [0.3, -1.0]},
+        {"kind": "cut_faces", "pressure": 0.07},
+    ],
+}
+# ∫0.3x, ∫(0.2 + x); 0.1, −0.2; 0.3, −1; and about (0.2, 0.1): r × f of each
+LOAD = np.array([0.15 + 0.1 + 0.3, 0.7 - 0.2 - 1.0])
+MOMENT = (0.1 + 1 / 3 - 0.2 * 0.7 - 0.9 * 0.15) + (-0.2 * 0.3 - 0.4 * 0.1) + (-0.3 - 0.4 * 0.3)
+MESHES = {"regular": {"cells": [[9, 8]]}, "free": {"pattern": "unstructured", "sizes": [0.11]}}
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("solver", ["xfem", "conforming", "subdivision"])
+@pytest.mark.parametrize("mesh", MESHES)
+def test_reactions_balance_loads_and_sections_what_lies_beside_them(solver, mesh):
+    about = [0.2, 0.1]
+    asked = [reaction(f"{at[0]}{c}", at, c) for at in ("left", "right") for c in "xy"]
+    asked += [moment(f"{at[0]}m", at, "z", about) for at in ("left", "right")]
+    plane = ([0.1, 0.5], [1.0, 0.2])  # x + y/5 = 1/5: the left of it is a triangle of 1/10
+    asked += [section(f"s{c}", *plane, c) for c in "xy"] + [section("sm", *plane, "z", of="moment")]
+    scene = scenes.scene(**PLANE, mesh=MESHES[mesh], quantities=asked)
+    found = values(scene, solver)
+    assert found["lx"] + found["rx"] == pytest.approx(-LOAD[0], abs=1e-12)
+    assert found["ry"] == 0.0  # it slides
+    assert found["ly"] == pytest.approx(-LOAD[1], abs=1e-12)
+    assert found["lm"] + found["rm"] == pytest.approx(-MOMENT, abs=1e-12)
+    # gravity and the uniform force on the triangle; ∫y = 1/30: and about (0.1, 0.5), ∫ r × f
+    corner = np.array([0.1 * 0.4, -0.4 / 30 - 0.1])
+    assert found["sx"] == pytest.approx(-found["lx"] - corner[0], abs=1e-12)
+    assert found["sy"] == pytest.approx(-found["ly"] - corner[1], abs=1e-12)
+    # centroid (1/15, 1/3), ∫xy over it = 1/600, ∫x = 1/150
+    about_point = (1 / 15 - 0.1) * -0.1 - (1 / 3 - 0.5) * 0.04 - 0.4 * (1 / 600 - 0.1 / 30)
+    left = found["lm"] + 0.1 * found["ly"] + 0.4 * found["lx"]
+    assert found["sm"] == pytest.approx(-left - about_point, abs=1e-12)
+    assert [unit_of(asked, 2) for asked in scene.quantities[3:5]] == ["N/m", "N m/m"]
+
+
+SOLID = {
+    "cuts": [{"kind": "polygon", "points": [[0.35, -0.1, 0.4], [0.78, -0.1, 0.55],
+                                            [0.78, 1.1, 0.65], [0.35, 1.1, 0.5]]}],
+    "material": scenes.soft(3, density=2.0),
+    # in the middle of a face, and a face that slides
+    "supports": [
+        {"where": "x < 1e-9 and hypot(y - 0.55, z - 0.45) < 0.2", "displacement": [0.0] * 3},
+        {"where": "right", "displacement": [0.05], "components": ["x"]},
+    ],
+    "loads": [
+        {"kind": "gravity", "acceleration": [0.1, -0.2, -1.0]},
+        {"kind": "traction", "where": "top", "traction": [0.0, "0.3 * x", 0.2]},
+    ],
+}  # fmt: skip
+
+
+def test_reactions_of_a_cut_block_balance_its_loads_in_space():
+    where = [one["where"] for one in SOLID["supports"]]
+    asked = [reaction(f"{i}{c}", at, c) for i, at in enumerate(where) for c in "xyz"]
+    origin = [0.0, 0.0, 0.0]
+    asked += [moment(f"{i}m{c}", at, c, origin) for i, at in enumerate(where) for c in "xyz"]
+    plane = ([0.9, 0.5, 0.93], [0.1, 0.1, 1.0])  # over the cut
+    asked += [section(f"s{c}", *plane, c) for c in "yz"]
+    scene = scenes.scene(d=3, **SOLID, mesh={"cells": [[5, 6, 7]]}, quantities=asked)
+    found = values(scene)
+    total = [found[f"0{c}"] + found[f"1{c}"] for c in "xyz"]
+    assert total == pytest.approx([-0.2, 0.4 - 0.15, 2.0 - 0.2], abs=1e-12)
+    # weight at (½, ½, ½), ∫ r × t on the top: (½·0.2 − 0.15, −½·0.2, ∫0.3x²)
+    weight = np.cross([0.5] * 3, [0.2, -0.4, -2.0])
+    turned = [found[f"0m{c}"] + found[f"1m{c}"] for c in "xyz"]
+    assert turned == pytest.approx(-weight - [0.1 - 0.15, -0.1, 0.1], abs=1e-12)
+    # 0.1 x + 0.1 y + z > 1.07: a wedge of V = ∫∫(0.1 x + 0.1 y − 0.07) where positive, which
+    # nothing holds along y and z; of the top it has all but the triangle x + y < 0.7
+    volume = 0.1 - 0.07 + 0.1 * 0.7**3 / 6
+    assert found["sz"] == pytest.approx(0.2 * (1 - 0.7**2 / 2) - 2.0 * volume, abs=1e-12)
+    assert found["sy"] == pytest.approx(0.3 * (0.5 - 0.7**3 / 6) - 0.4 * volume, abs=1e-12)
+
+
+def test_a_reaction_of_a_body_that_turns_far_balances_loads_where_it_has_come_to():
+    supports = [{"where": "left", "displacement": [0.0, 0.0]}]
+    asked = [reaction("y", "left", "y"), moment("m", "left", "z", [0.0, 0.1]),
+             section("s", [0.31, 0.1], [1.0, 0.3], "y")]  # fmt: skip
+    scene = scenes.scene(
+        geometry=scenes.box([1.0, 0.2]), mesh={"cells": [[15, 3]]}, supports=supports,
+        loads=[{"kind": "gravity", "acceleration": [0.0, -0.02]}],
+        material=scenes.soft(2, density=1.0), analysis={"kinematics": "corotational"},
+        cuts=[{"kind": "polyline", "points": [[0.47, -0.1], [0.55, 0.11]]}], quantities=asked,
+    )  # fmt: skip
+    solution = find_solver("xfem").solve(scene, 0, repetitions=0)
+    found = values(scene, solution=solution)
+    places = solution.points + solution.displacement[-1]
+    corners = places[solution.cells].mean(axis=1)
+    area = np.abs(np.linalg.det(np.diff(solution.points[solution.cells], axis=1))) / 2
+    assert np.abs(solution.displacement).max() > 0.2
+    assert found["y"] == pytest.approx(0.02 * 0.2, rel=1e-7)
+    assert found["m"] == pytest.approx(0.02 * float(area @ corners[:, 0]), rel=1e-7)
+    # beyond the plane 0.2 (1 − 0.31) of the body, as it goes through (0.31, 0.1), the middle
+    assert found["s"] == pytest.approx(-0.02 * 0.2 * 0.69, rel=1e-6)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("solver", ["xfem", "reference"])
+def test_a_reaction_in_motion_has_the_inertia_in_it(solver):
+    """Supports that move: what both bear is the rate of the momentum, less the loads."""
+    swing = {"displacement": ["0.05 * sin(4 * t)", "0.02 * t * t"]}
+    asked = [reaction(f"{i}{c}", at, c, time=0.3)
+             for i, at in enumerate(("left", "right")) for c in "xy"]  # fmt: skip
+    asked += [section(f"s{c}", [0.12, 0.5], [1.0, 0.1], c, time=0.3) for c in "xy"]
+    scene = scenes.scene(
+        **PLANE | {"supports": [{"where": "left", **swing}, PLANE["supports"][1]],
+                   "loads": PLANE["loads"][1:3],
+                   "material": scenes.soft(2, density=3.0)},
+        mesh=MESHES["regular"], quantities=asked, reference={"size": 0.4},
+        analysis={"kind": "dynamic", "duration": 0.4, "time_step": 0.02, "outputs": 5,
+                  "damping": [0.2, 0.01]},
+    )  # fmt: skip
+    one = measured(scene, solver)
+    found = {asked.name: one.quantity(asked) for asked in scene.quantities}
+    solution, step = one.solution, 3
+    rate = one.weak_form.rates(step)
+    left = solution.points[:, 0] == 0.0
+    known = rate[left] - 0.2 * solution.velocity[step][left]
+    assert known == pytest.approx(np.tile([-0.8 * np.sin(1.2), 0.04], (left.sum(), 1)), rel=1e-4)
+    total = np.asarray((one.weak_form.mass @ rate).sum(axis=0))
+    load = np.array([0.1 + 0.9, -0.2 - 3.0])
+    assert [found["0x"] + found["1x"], found["0y"] + found["1y"]] == pytest.approx(
+        total - load, abs=1e-8
+    )
+    assert np.abs(total).min() > 0.05
+
+
+def hanging(solver, level, radius):
+    """A bar without lateral contraction: its stress is that of the weight below."""
+    content = load_scene("controls/hanging_bar").model_dump(mode="json", by_alias=True)
+    content |= {"acceptance": [], "quantities": [
+        reaction("R", "top", "z"), moment("M", "top", "y", [0.0, 0.0, 0.3]),
+        section("N", [0.02, 0.02, 0.11], [0.0, 0.0, 1.0], "z"),
+        stress([0.026, 0.021, 0.172], radius, "zz"), stress([0.026, 0.021, 0.172], radius, "xz"),
+    ]}  # fmt: skip
+    return values(scenes.Scene.model_validate(content), solver, level)
+
+
+def test_a_hanging_bar_bears_its_weight_and_the_weight_below():
+    """Reactions, moments and sections to round-off, stresses to (h/L)²; A = 2e-3, ρg = 9800."""
+    found = hanging("xfem", 1, 0.019)
+    assert found["R"] == pytest.approx(9800 * 6e-4, rel=1e-10)
+    # the weight acts at x = 0.025: R about the y axis is −x R_z
+    assert found["M"] == pytest.approx(-9800 * 6e-4 * 0.025, rel=1e-9)
+    assert found["N"] == pytest.approx(9800 * 2e-3 * 0.11, rel=1e-10)
+    assert found["s_zz"] == pytest.approx(9800 * 0.172, rel=0.01)
+    assert abs(found["s_xz"]) < 0.01 * 9800 * 0.172
+
+
+def test_a_mean_stress_is_smooth_in_h_where_one_at_a_point_is_not():
+    """Sinusoidal displacement on meshes of any size: errors of the mean fall with h²."""
+    worst = {}
+    for n in (12, 13, 24, 25, 48, 49):
+        scene = scenes.scene(mesh={"cells": [[n, n]]}, quantities=[stress([0.44, 0.57], 0.17)])
+        mesh = find_solver("conforming").solve(scene, 0, repetitions=0)
+        x, y = mesh.points.T
+        u = np.column_stack([np.sin(3 * x + y), 0.0 * x])
+        found = values(scene, solution=Solution(mesh.points, mesh.cells, u[None]))["s_xx"]
+        # 3 cos(3 x + y) in the disc: its mean is that at the centre times 2 J₁(k r)/(k r)
+        kr = np.sqrt(10) * 0.17
+        mean = 2 * (kr / 2 - kr**3 / 16 + kr**5 / 384 - kr**7 / 18432) / kr
+        lame, shear = 0.3 / 1.3 / 0.4, 1 / 2.6
+        exact = (lame + 2 * shear) * 3 * np.cos(3 * 0.44 + 0.57) * mean
+        worst[n] = abs(found / exact - 1)
+    assert worst[12] < 0.02
+    for coarse, fine in ((12, 24), (13, 25), (24, 48), (25, 49)):
+        assert worst[fine] < worst[coarse] / 2.5
+
+
+def test_the_stress_of_a_patch_is_exact_on_both_sides_of_an_inclined_cut():
+    content = load_scene("statics/f1_patch").model_dump(mode="json", by_alias=True)
+    places = {"above": [0.3, 0.7], "below": [0.66, 0.31]}
+    content |= {"acceptance": [], "quantities": [
+        stress(at, 0.19, c) | {"name": f"{side} {c}"}
+        for side, at in places.items() for c in ("xx", "yy", "xy")
+    ]}  # fmt: skip
+    scene = scenes.Scene.model_validate(content)
+    found = values(scene)
+    along = np.array([3.0, 1.0]) / np.sqrt(10)  # free of traction: σ = E/(1 − ν²) e t ⊗ t
+    for side, strain in (("above", 0.1), ("below", -0.05)):
+        sigma = strain / 0.91 * np.outer(along, along)
+        got = [found[f"{side} {c}"] for c in ("xx", "yy", "xy")]
+        assert got == pytest.approx([sigma[0, 0], sigma[1, 1], sigma[0, 1]], abs=1e-12)
+
+
+def test_the_interval_of_a_reaction_holds_the_value_of_far_finer_meshes():
+    """A clamp has singular corners: the order is that of the energy, not 2."""
+    asked = [reaction("R", "left", "x"), section("N", [0.9, 0.5], [1.0, 0.0], "x"),
+             stress([0.2, 0.2], 0.15)]  # fmt: skip
+    scene = scenes.scene(
+        PLANE["cuts"], supports=[PLANE["supports"][0],
+                                 {"where": "right", "displacement": [0.1, 0.05]}],
+        mesh={"cells": [[n, n] for n in (8, 16, 32, 128)]}, quantities=asked,
+    )  # fmt: skip
+    levels = {k: find_solver("conforming").solve(scene, k, repetitions=0) for k in range(4)}
+    fine = values(scene, solution=levels.pop(3))
+    known = conforming_reference(scene, levels, body_of(scene), law_of(scene), 1 / 32).quantities
+    for name, (value, width) in known.items():
+        assert abs(value - fine[name]) <= width < 0.1 * abs(value), name
+    assert known["R"][0] == pytest.approx(-known["N"][0], rel=1e-9)
+
+
+@pytest.mark.fenicsx
+def test_a_solution_with_a_pressure_balances_too():
+    asked = [reaction(c, "bottom", c) for c in "xy"]
+    scene = scenes.scene(
+        PLANE["cuts"], material=scenes.soft(2, density=1.0) | {"poisson": 0.4995},
+        supports=[{"where": "bottom", "displacement": [0.0, 0.0]}], loads=PLANE["loads"][:3],
+        quantities=asked, reference={"size": 0.4},
+    )  # fmt: skip
+    found = values(scene, "reference")
+    assert [found["x"], found["y"]] == pytest.approx(list(-LOAD), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "asked, reason",
+    [
+        (section("s", [0.5, 0.6], [1.0, 0.0], "x"), "elements that a cut meets"),
+        (section("s", [1.5, 0.6], [1.0, 0.0], "x"), "misses the body"),
+        (section("s", [0.0, 0.2], [0.3, 1.0], "y"), r"meets a support near \(0.0"),
+    ],
+)
+def test_a_section_that_means_nothing_is_refused(asked, reason):
+    scene = scenes.scene(**PLANE, mesh=MESHES["regular"], quantities=[asked])
+    with pytest.raises(UnsupportedSceneError, match=reason):
+        values(scene)
+
+
+@pytest.mark.parametrize(
+    "asked, reason",
+    [
+        (stress([0.5, 0.9], 0.2), "not in the body"),
+        (stress([0.31, 0.6], 0.1), r"is 0.0932\d* m away from cut 'cut'; expected more"),
+        (stress([0.7, 0.2], 0.1), "materials differ"),
+        (stress([0.7, 0.2], 0.1, "xz"), "z in a 2D scene"),
+        (reaction("R", "bottom", "x"), "no support holds 'bottom'; those of the case: left, right"),
+        (reaction("R", "left", "x", of="moment"), "centre: it belongs to a moment"),
+        (reaction("R", "left", "z"), "the force of a 2D scene has no such"),
+        (section("s", [0.1, 0.2], [0.0, 0.0], "x"), "normal: is zero"),
+    ],
+)
+def test_what_no_solution_can_have_is_refused_beforehand(asked, reason):
+    stiff = {"regions": [{"where": "x > 0.75", "young": 3.0}]}
+    changes = {"material": scenes.soft(2, density=1.0, **stiff), "quantities": [asked]}
+    with pytest.raises(ValueError, match=reason):
+        scenes.scene(**PLANE | changes)
