@@ -9,6 +9,7 @@ D is what the scheme itself dissipates (negative: produces). What the step leave
 free unknowns is kept apart: if it is not round-off, the sum of all is not constant.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -361,6 +362,36 @@ class Ledger:
         """Energies of the state that was entered last, J."""
         gravity = -float(body.weight @ state.displacement)
         return {"kinetic": self._kinetic, "strain": self._strain, "gravity": gravity}
+
+
+class ShortWaves:
+    """Kinetic energy of motions of periods up to 4h/c at the end, c the speed of shear waves.
+
+    That of the velocity less its mean over the last such period, averaged over that period: what
+    `verify.compare.released` measures where output times are dense, of every step.
+    """
+
+    def __init__(self, body: MovingBody, size: float) -> None:
+        material = body.scene.material
+        assert material.density is not None
+        shear = material.young / (2 * (1 + material.poisson))
+        self.body, self.period = body, 4.0 * size / float(np.sqrt(shear / material.density))
+        self._recent: deque[tuple[float, Array]] = deque()
+
+    def enter(self, state: State) -> None:
+        """Take the velocity at the end of a step, and forget those of earlier periods."""
+        self._recent.append((state.time, state.velocity))
+        while self._recent[0][0] <= state.time - self.period * (1 - 1e-9):
+            self._recent.popleft()
+
+    def found(self) -> dict[str, float]:
+        """Return it as ``short_wave_energy``, J; nothing where steps are longer than h/c."""
+        velocities = np.array([velocity for _, velocity in self._recent])
+        if len(velocities) < 4:
+            return {}
+        fast = velocities - velocities.mean(axis=0)
+        energy = sum(0.5 * float(one @ (self.body.mass @ one)) for one in fast)
+        return {"short_wave_energy": energy / len(fast)}
 
 
 def momenta_of(body: MovingBody, state: State) -> tuple[Array, Array]:

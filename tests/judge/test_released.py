@@ -128,6 +128,31 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most
         assert values["released_to_kinetic"] > 0.3 * 0.36
 
 
+def test_a_solver_that_knows_every_step_tells_its_short_waves_whatever_the_outputs():
+    """The same from outputs at every step, and nothing but that from two outputs."""
+    pytest.importorskip("dolfinx_solver")
+    cut = {"kind": "tool_path", "points": [[-0.1, 0.36], [1.1, 0.53]], "speed": 2.5}
+    scene = scenes.scene(
+        [cut],
+        mesh={"cells": [[4, 4]]},
+        material=scenes.soft(density=1.0, young=10.0),
+        analysis={"kind": "dynamic", "duration": 0.6, "time_step": 0.02, "outputs": 31},
+        initial={"kind": "equilibrium"},
+        supports=[
+            {"where": "bottom", "displacement": [0.0, 0.0]},
+            {"where": "top", "displacement": [0.0, 0.02]},
+        ],
+    )
+    apart = {"analysis": scene.analysis.model_copy(update={"outputs": 2})}
+    found = find_solver("conforming").solve(scene, 0, 0)
+    sparse = find_solver("conforming").solve(scene.model_copy(update=apart), 0, 0)
+    period = 4 * found.size / np.sqrt(10.0 / 2 / (1 + scene.material.poisson))
+    expected = short_wave_energy(found, float(period), 1.0)
+    assert expected > 1e-4 * found.ledger["strain"][0]
+    for one in (found, sparse):
+        assert one.quantities["short_wave_energy"] == pytest.approx(expected, rel=1e-6)
+
+
 def test_what_the_forces_at_a_cut_take_is_told_from_the_scheme():
     """Swept openings, the trapezoidal rule: 0.7 of G at least, by the table of the theory page.
 

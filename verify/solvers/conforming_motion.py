@@ -13,6 +13,7 @@ from reference.dynamics_cuts import Release, facet_openings, inherit, partly_ope
 from reference.dynamics_step import (
     Ledger,
     Scheme,
+    ShortWaves,
     State,
     Stepper,
     generalised_alpha,
@@ -127,6 +128,8 @@ class TiedMotion:
             self.closed = np.ones(self.opening.times.shape, dtype=bool)
             self.planned = self._plan()
         self.ledger, self.rows = Ledger(), LedgerRows()
+        blades = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+        self.waves = ShortWaves(self.body, marching.element) if blades else None
         self.steppers: dict[float, Stepper] = {}
         self.outputs: list[State] = []
         self.openings = 0
@@ -164,7 +167,7 @@ class TiedMotion:
             "time step": step_sizes(sizes),
             "unknowns": self.unknowns,
         }
-        if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
+        if self.waves is not None:
             record.notes["openings"] = str(self.openings)
             record.notes |= blade_advance(self.scene, sizes, marching.element)
         linear = self.scene.analysis.kinematics == "linear"
@@ -175,6 +178,7 @@ class TiedMotion:
             "acceleration": self._over_time("acceleration") if linear else None,
             "mass": CONSISTENT,
             "ledger": self.rows.columns(),
+            "quantities": self.waves.found() if self.waves is not None else {},
             "unknowns": self.space.node_points.size,
         }
 
@@ -235,6 +239,8 @@ class TiedMotion:
             forces = self.steppers[size].step(self.state)
         with self.record.timed("accounting"):
             self.ledger.record(self.body, before, self.state, forces)
+            if self.waves is not None:
+                self.waves.enter(self.state)
 
     def _plan(self) -> bool:
         """Choose between one factorisation with all that is ever tied, and one per opening.
