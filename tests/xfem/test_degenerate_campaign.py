@@ -71,9 +71,13 @@ def cut_one_body(dim: int, seed: int) -> int:
 # two that are 1e-28 apart, and the surface 1/288 off (3107); a piece
 # that had no volume, and was left out, had 3e-44 of its cell when it was divided further (20428);
 # a cell with a piece left out beside one that got new unknowns (103); a piece left to the half of
-# its neighbour that a later cut had separated from it (in the plane: 196)
-FAILED_IN_SPACE = (103, 308, 394, 497, 2013, 2236, 3107, 5136, 9125, 20073, 20428, 20869, 21414)
-FAILED_ONCE = [(2, 147), (2, 196), (2, 1823)] + [(3, seed) for seed in FAILED_IN_SPACE]
+# its neighbour that a later cut had separated from it (in the plane: 196); facets on the two sides
+# of a face that differ, with a piece of round-off size gone to another (1130, 3025); a whole cell
+# beside one whose piece had taken another (2124); a vote on the side of an unknown that ends in a
+# tie, but for the order of the sum (4086)
+IN_THE_PLANE = (147, 196, 1130, 1823, 2124, 4086)
+IN_SPACE = (103, 308, 394, 497, 2013, 2236, 3025, 3107, 5136, 9125, 20073, 20428, 20869, 21414)
+FAILED_ONCE = [(2, seed) for seed in IN_THE_PLANE] + [(3, seed) for seed in IN_SPACE]
 
 
 @pytest.mark.parametrize(("dim", "seed"), FAILED_ONCE)

@@ -178,55 +178,45 @@ def _beyond(piece, cell, opposite, body, parts, orientation, out, count):
 
 
 @njit(cache=True)
-def _share(x, vertices, which):
-    """Give the determinant of vertices (d, d), barycentric, with x in place of one of them."""
-    v = vertices.copy()
-    if which >= 0:
-        v[which] = x
-    if len(v) == 2:
-        return v[0, 0] * v[1, 1] - v[0, 1] * v[1, 0]
-    return (
-        v[0, 0] * (v[1, 1] * v[2, 2] - v[1, 2] * v[2, 1])
-        - v[0, 1] * (v[1, 0] * v[2, 2] - v[1, 2] * v[2, 0])
-        + v[0, 2] * (v[1, 0] * v[2, 1] - v[1, 1] * v[2, 0])
-    )
+def _whole_facet(cell, across, body, parts):
+    """Give the simplex of the cell across of which their whole face is one facet, or -1."""
+    for t in range(parts.sub_range[across, 0], parts.sub_range[across, 1]):
+        for other in range(body.cells.shape[1]):
+            face = _face_of(parts.sub_barycentric[t], other)
+            if face >= 0 and body.neighbours[across, face] == cell:
+                if _is_whole(parts.sub_points[t], other, body.cells[across]):
+                    return t
+    return -1
 
 
 @njit(cache=True)
-def _beyond_centroid(barycentric, skip, cell, across, body, parts):
-    """Give the simplex of the cell across at the centroid of a facet on their face, or -1.
+def _is_parted(cell, across, body, parts):
+    """Whether pieces that move otherwise meet in facets that one side of a face has alone.
 
-    A cut that ends between two cells may have divided one of them since: their facets differ.
+    A cut that ends between two cells may have divided one of them since, and pieces of round-off
+    size go with others: then the facets differ. Where so, both sides show all that have no equal
+    (else a part that one side hides would be larger than what the other does, and the surface
+    would have a gap); where all of them move together, none.
     """
-    sub_range, sub_barycentric = parts.sub_range, parts.sub_barycentric
-    cells, neighbours, corners = body.cells, body.neighbours, body.cells.shape[1]
-    best, found = -np.inf, -1
-    x, vertices = np.empty(corners - 1), np.empty((corners - 1, corners - 1))
-    for t in range(sub_range[across, 0], sub_range[across, 1]):
-        for other in range(corners):
-            face = _face_of(sub_barycentric[t], other)
-            if face < 0 or neighbours[across, face] != cell:
+    sub_range, sub_piece, sub_points, sub_barycentric, _ = parts
+    own, beyond = sub_range[cell], sub_range[across]
+    for s in range(own[0], own[1]):
+        for skip in range(sub_points.shape[1]):
+            face = _face_of(sub_barycentric[s], skip)
+            if face < 0 or body.neighbours[cell, face] != across:
                 continue
-            column = 0
-            for j in range(corners):
-                if j == face:
-                    continue
-                row, x[column] = 0, 0.0
-                for k in range(corners):
-                    if k != other:
-                        vertices[row, column] = sub_barycentric[t, k, j]
-                        row += 1
-                    for b in range(corners):
-                        if k != skip and cells[cell, b] == cells[across, j]:
-                            x[column] += barycentric[k, b] / (corners - 1)
-                column += 1
-            whole, least = _share(x, vertices, -1), np.inf
-            for k in range(corners - 1):
-                if whole != 0.0:
-                    least = min(least, _share(x, vertices, k) / whole)
-            if whole != 0.0 and least > best:
-                best, found = least, t
-    return found
+            if _find_facet(s, skip, beyond[0], beyond[1], sub_points) >= 0:
+                continue
+            for t in range(beyond[0], beyond[1]):
+                for other in range(sub_points.shape[1]):
+                    back = _face_of(sub_barycentric[t], other)
+                    if back < 0 or body.neighbours[across, back] != cell:
+                        continue
+                    if _find_facet(t, other, own[0], own[1], sub_points) >= 0:
+                        continue
+                    if not _meets(sub_piece[s], sub_piece[t], cell, across, face, body):
+                        return True
+    return False
 
 
 @njit(inline="always")
@@ -288,9 +278,13 @@ def _expose_split(cell, body, parts, orientation, shared, out, count):
                 begin_across, end_across = sub_range[across, 0], sub_range[across, 1]
                 same = _find_facet(s, skip, begin_across, end_across, sub_points)
                 whole = _is_whole(sub_points[s], skip, body.cells[cell])
+                parted = False
                 if same < 0 and not whole:
-                    same = _beyond_centroid(sub_barycentric[s], skip, cell, across, body, parts)
-                if same < 0 or _meets(piece, sub_piece[same], cell, across, face, body):
+                    same = _whole_facet(cell, across, body, parts)
+                    parted = same < 0 and _is_parted(cell, across, body, parts)
+                if not parted and (
+                    same < 0 or _meets(piece, sub_piece[same], cell, across, face, body)
+                ):
                     if whole:
                         count = _beyond(piece, cell, face, body, parts, orientation, out, count)
                     continue

@@ -220,8 +220,9 @@ class GrowingBody:
         shares_edge = division.at_changed_cells[patch.cells].sum(axis=1) > 1
         moved = patch.whole_cells[is_moved]
         # a piece that was left out has the unknowns of another: it does not move with its neighbour
-        around = self.mesh.neighbours[moved].ravel()
-        around = around[(around >= 0) & (self._dropped[around] > 0)]
+        around = self.mesh.neighbours[moved]
+        apart = (self._dropped[around] > 0) | (self._dropped[moved] > 0)[:, None]
+        around = around[(around >= 0) & apart]
         touched = np.concatenate([patch.whole_cells[is_moved | (shares_edge & beside)], around])
         return Increment(cells, distinct(touched), moved, before, self._source)
 

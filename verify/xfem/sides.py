@@ -10,6 +10,9 @@ import numpy as np
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 
 
+_TIE = 1e-12  # of all shares: a vote as close as that is none, whatever the order of the sum
+
+
 def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats) -> Sides:
     """Sides (p, cuts) of the cuts on which pieces lie.
 
@@ -42,7 +45,7 @@ def node_sides(
 
     1. all labelled pieces of the dof node are on one side: that;
     2. it is of the node's own material, and the node is not on the cut: the side of the node;
-    3. its pieces in split cells lie on one side by the larger share: that. So a dof node beyond
+    3. its pieces in split cells lie on one side by the larger share, beyond round-off: that. So a dof node beyond
        another cut lies where its pieces do, not where its node is;
     4. else the side of the node, plus on the cut.
 
@@ -68,6 +71,7 @@ def node_sides(
         above, below = (_at_any(cells[sign * label[:, cut] > 0], len(side)) for sign in (1, -1))
         weight = np.repeat(share[voters] * piece_side[voters, cut], cells.shape[1])
         vote = np.bincount(nodes, weight, minlength=len(node_parent))
+        vote[np.abs(vote) <= _TIE * np.bincount(nodes, np.abs(weight), len(node_parent))] = 0.0
         level = level_sets[node_parent, cut]
         # a node exactly on the cut has its material where its pieces are
         told = np.where((vote == 0.0) | (own & (level != 0.0)), level, vote)
