@@ -183,9 +183,10 @@ def _whole_facet(cell, across, body, parts):
     for t in range(parts.sub_range[across, 0], parts.sub_range[across, 1]):
         for other in range(body.cells.shape[1]):
             face = _face_of(parts.sub_barycentric[t], other)
-            if face >= 0 and body.neighbours[across, face] == cell:
-                if _is_whole(parts.sub_points[t], other, body.cells[across]):
-                    return t
+            if face < 0 or body.neighbours[across, face] != cell:
+                continue
+            if _is_whole(parts.sub_points[t], other, body.cells[across]):
+                return t
     return -1
 
 

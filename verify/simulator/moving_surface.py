@@ -213,7 +213,8 @@ class BodySurface:
             return
         self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         boundary = np.unique(mesh.boundary_facets[:, 0])
-        self._cover(np.union1d(boundary, split), split)
+        beside = mesh.neighbours[split]
+        self._cover(np.unique(np.concatenate([boundary, split, beside[beside >= 0]])), split)
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""

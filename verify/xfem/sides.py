@@ -9,7 +9,6 @@ import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 
-
 _TIE = 1e-12  # of all shares: a vote as close as that is none, whatever the order of the sum
 
 
@@ -45,8 +44,8 @@ def node_sides(
 
     1. all labelled pieces of the dof node are on one side: that;
     2. it is of the node's own material, and the node is not on the cut: the side of the node;
-    3. its pieces in split cells lie on one side by the larger share, beyond round-off: that. So a dof node beyond
-       another cut lies where its pieces do, not where its node is;
+    3. its pieces in split cells lie on one side by the larger share, beyond round-off: that. So a
+       dof node beyond another cut lies where its pieces do, not where its node is;
     4. else the side of the node, plus on the cut.
 
     Parameters
