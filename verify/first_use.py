@@ -26,7 +26,8 @@ from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.calibration import compile_times
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
-from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
+from verify.compare.field_kernels import evaluate_linear, evaluate_quadratic, squares, strain_squares
+from verify.compare.locate_kernels import find_cells
 from verify.compare.overlap import OverlapSearch
 from verify.compare.sides import distance_to_segments
 from verify.compare.simplices import simplices
@@ -149,6 +150,8 @@ def _comparison() -> None:
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
+        squares(points)
+        strain_squares(np.zeros((1, mesh.space, mesh.space)))
         distance_to_segments(points, np.stack([points, points], axis=1))
     sheet = _flat_membrane()
     still = np.zeros((1, *sheet.points.shape))

@@ -15,7 +15,7 @@ matter of the field that is asked; the rest is in the integration error.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -52,6 +52,11 @@ class Rule:
     points: Array
     weights: Array
     frames: Array | None = None
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest distance of two of the points along an axis, m."""
+        return max(float(np.ptp(column)) for column in self.points.T)
 
     def gradient(self, field: Field) -> Array:
         """Gradient (n, d, d) of a field at the points; of a membrane (n, 3, 2), see `in_frames`."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
 from verify.compare.cut_rule import CutRule, cut_rule, membrane_cut_rule, surface_rule
+from verify.compare.field_kernels import squares
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
@@ -129,12 +130,12 @@ def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squa
     law = law.at(rule.points)
     expected = rule.gradient(reference)
     difference = rule.gradient(field) - expected
-    squares = Squares(2 * law.error_density(difference, expected), 2 * law.energy_density(expected))
+    found = Squares(2 * law.error_density(difference, expected), 2 * law.energy_density(expected))
     some = rule.points[:: 1 + len(rule.points) // _LOOKED_AT]
     moved = np.abs(reference.displacement(some, some)).max(initial=0.0)
-    slope = moved / np.ptp(rule.points, axis=0).max() if len(rule.points) else 0.0
-    cancels = 2 * law.shear * (np.einsum("nij,nij->n", expected, expected) + slope**2)
-    return squares.above(_NOTHING, rule.weights @ cancels, rule.weights)
+    slope = moved / rule.extent if len(rule.points) else 0.0
+    cancels = 2 * law.shear * (squares(expected) + slope**2)
+    return found.above(_NOTHING, rule.weights @ cancels, rule.weights)
 
 
 def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None = None) -> Squares:
@@ -167,7 +168,7 @@ def _of_jumps(found: Array, expected: Array, reference: Field, rule: CutRule) ->
 
 
 def _squares(found: Array, expected: Array) -> Squares:
-    return Squares(*(np.einsum("ni,ni->n", v, v) for v in (found - expected, expected)))
+    return Squares(squares(found - expected), squares(expected))
 
 
 # spacings over the wanted one, without small common multiples

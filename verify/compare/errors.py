@@ -159,17 +159,18 @@ class Rules:
         have the same integrands, which are evaluated once.
         """
         found: dict[str, list[ErrorNorm]] = {name: [] for name in names}
-        for measure in dict.fromkeys(ERRORS[name].measure for name in found):
-            alike = [name for name in found if ERRORS[name].measure is measure]
-            place = "cut" if ERRORS[alike[0]].where == "cut" else "body"
-            for k, rule in enumerate(self._rules[place][:count]):
-                squares = measure(field, reference, rule, law)
-                for name in alike:
-                    metric = ERRORS[name]
-                    found[name].append(
-                        squares.largest() if metric.largest
-                        else squares.norm(self._weights[metric.where][k], rule.weights)
-                    )  # fmt: skip
+        measures = dict.fromkeys((m.measure, m.where == "cut") for m in map(ERRORS.get, found) if m)
+        for place, family in self._rules.items():
+            for k, rule in enumerate(family[:count]):
+                for measure in (one for one, on_cut in measures if on_cut == (place == "cut")):
+                    squares = measure(field, reference, rule, law)
+                    for name in found:
+                        metric = ERRORS[name]
+                        if metric.measure is measure:
+                            found[name].append(
+                                squares.largest() if metric.largest
+                                else squares.norm(self._weights[metric.where][k], rule.weights)
+                            )  # fmt: skip
         return found
 
 

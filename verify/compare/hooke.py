@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.field_kernels import strain_squares
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import in_frames, triangle_frames
 from verify.scene import Material, Scene
@@ -52,11 +53,8 @@ class Hooke:
 
     def energy_density(self, gradient: Array) -> Array:
         """½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
-        d = gradient.shape[1]
-        normal = [gradient[:, i, i] for i in range(d)]
-        sheared = [gradient[:, i, j] + gradient[:, j, i] for i in range(d) for j in range(i)]
-        square = sum(e * e for e in normal) + 0.5 * sum(e * e for e in sheared)
-        return np.asarray(0.5 * self.lame * sum(normal) ** 2 + self.shear * square)
+        trace2, square = strain_squares(gradient)
+        return np.asarray(0.5 * self.lame * trace2 + self.shear * square)
 
     def power_density(self, gradient: Array, rate: Array) -> Array:
         """Power (n,) in W/m³ of the stress of displacement gradients on velocity gradients."""

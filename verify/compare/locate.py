@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
+from verify.compare.field_kernels import evaluate_linear, evaluate_quadratic
 from verify.compare.locate_kernels import (
-    evaluate_linear,
-    evaluate_quadratic,
     find_cells,
     nearest_triangles,
     no_sides,

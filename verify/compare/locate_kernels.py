@@ -1,4 +1,4 @@
-"""Kernels: find the cell that holds a point or is nearest to it, and evaluate a P1 or P2 field."""
+"""Kernels: find the cell that holds a point or is nearest to it."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def _axes(dimension: int) -> tuple[int, ...]:
+def axes_of(dimension: int) -> tuple[int, ...]:
     """Return the axes of space as kernels take them: loops over a tuple are unrolled."""
     return tuple(range(dimension))
 
@@ -221,7 +221,7 @@ def find_cells(
     some = directions if len(directions) == len(points) else points
     _find_cells(
         points, some, some is directions, wanted, searched, sides, tolerance, nearest,
-        _axes(points.shape[1]), found,
+        axes_of(points.shape[1]), found,
     )  # fmt: skip
     return found
 
@@ -250,73 +250,6 @@ def _find_cells(
                 break
             wish = either
         found[i] = cell
-
-
-def evaluate_linear(
-    points: Floats, found: Ints, origins: Floats, values: Floats, slopes: Floats
-) -> Floats:
-    """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
-    result = np.empty(points.shape)
-    _evaluate_linear(points, found, origins, values, slopes, _axes(points.shape[1]), result)
-    return result
-
-
-@njit(cache=True)
-def _evaluate_linear(points, found, origins, values, slopes, axes, result):
-    d = len(axes)
-    for i in range(points.shape[0]):
-        cell = found[i]
-        for c in range(d):
-            value = values[cell, c]
-            for a in range(d):
-                value += slopes[cell, c, a] * (points[i, a] - origins[cell, a])
-            result[i, c] = value
-
-
-def evaluate_quadratic(
-    points: Floats, found: Ints, nodes: Ints, values: Floats, corners: Floats, gradients: Floats
-) -> tuple[Floats, Floats]:
-    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
-    n, d = points.shape
-    u, grad = np.empty((n, d)), np.empty((n, d, d))
-    axes, vertices = _axes(d), _axes(corners.shape[1])  # a triangle in space has three of each
-    _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad)
-    return u, grad
-
-
-@njit(cache=True)
-def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad):
-    d, count = len(axes), len(vertices)
-    weight, slope = np.empty(count), np.empty(d)
-    for i in range(points.shape[0]):
-        cell = found[i]
-        for k in range(count):
-            weight[k] = 0.0
-            for a in range(d):
-                from_facet = points[i, a] - corners[cell, (k + 1) % count, a]
-                weight[k] += gradients[cell, k, a] * from_facet
-        for c in range(d):
-            u[i, c] = 0.0
-            for a in range(d):
-                grad[i, c, a] = 0.0
-        for k in range(count * (count + 1) // 2):
-            if k < count:
-                shape, factor = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
-                for a in range(d):
-                    slope[a] = factor * gradients[cell, k, a]
-            else:  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
-                edge = k - count
-                p = edge if edge < 3 else edge - 3
-                q = (edge + 1) % 3 if edge < 3 else 3
-                shape = 4.0 * weight[p] * weight[q]
-                for a in range(d):
-                    both = weight[p] * gradients[cell, q, a] + weight[q] * gradients[cell, p, a]
-                    slope[a] = 4.0 * both
-            for c in range(d):
-                value = values[nodes[cell, k], c]
-                u[i, c] += shape * value
-                for a in range(d):
-                    grad[i, c, a] += slope[a] * value
 
 
 @njit(cache=True)

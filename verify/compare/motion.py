@@ -3,6 +3,8 @@
 Between two output times a solution is linear in time: nothing else is known of it.
 """
 
+from collections.abc import Callable
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,6 +37,11 @@ class Sampled:
         self._field, self._found = field, {} if found is None else found
         self._kept: dict[tuple[int, int, str], tuple[Array, Array | None, Array]] = {}
 
+    @property
+    def size(self) -> int:
+        """Bytes of the values that are kept."""
+        return sum(values.nbytes for *_, values in self._kept.values())
+
     def cells(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
         """Cells (n,) of a solution that hold `points` (n, d), on the side of `near`."""
         assert isinstance(self._field, SolutionField)
@@ -65,6 +72,23 @@ class Sampled:
 
 
 _SAME_TIME = 1e-9  # of the duration: two output times this close are one
+# Bytes of values of a reference over the times of one level: kept, they are evaluated once for all
+# solvers; beyond, the newest time gives way to the next.
+_ROOM = 3 * 10**8
+
+
+class _Times:
+    """Fields at times, with what each remembers of points."""
+
+    def __init__(self, room: int = 0) -> None:
+        self._room, self._fields = room, dict[float | None, Sampled]()
+
+    def at(self, time: float | None, make: Callable[[], Sampled]) -> Sampled:
+        if time not in self._fields:
+            if sum(field.size for field in self._fields.values()) >= self._room and self._fields:
+                self._fields.popitem()
+            self._fields[time] = make()
+        return self._fields[time]
 
 
 class Motion(Protocol):
@@ -79,7 +103,7 @@ class Motion(Protocol):
         ...
 
     def afresh(self) -> "Motion":
-        """Return the same motion, without what it remembers of points."""
+        """Return the same motion, which forgets what was asked and remembers what will be."""
         ...
 
 
@@ -121,7 +145,7 @@ class SolutionMotion:
         self.solution = solution
         self._field = field_of(solution, body, deviation=deviation, continued=continued)
         self._found: _Found = {}
-        self._last: tuple[float, Sampled] | None = None
+        self._times = _Times()
 
     @property
     def off_surface(self) -> float:
@@ -129,10 +153,9 @@ class SolutionMotion:
         return getattr(self._field, "off_surface", 0.0)
 
     def afresh(self) -> "SolutionMotion":
-        """Return the same motion, without what it remembers of points."""
-        other = object.__new__(SolutionMotion)
-        other.solution, other._field = self.solution, self._field
-        other._found, other._last = {}, None
+        """Return the same motion, which forgets what was asked and remembers what will be."""
+        other = copy(self)
+        other._found, other._times = {}, _Times(_ROOM)
         return other
 
     def known_at(self, time: float) -> bool:
@@ -160,10 +183,9 @@ class SolutionMotion:
         """
         times = self.solution.times
         when = float(times[-1] if time is None else time)
-        if self._last is None or self._last[0] != when:
-            field = self._field.with_nodal(self.nodal(when))
-            self._last = when, Sampled(field, self._found)
-        return self._last[1]
+        return self._times.at(
+            when, lambda: Sampled(self._field.with_nodal(self.nodal(when)), self._found)
+        )
 
     def nodal(self, time: float | None = None) -> Array:
         """Nodal displacements (n, d) in m at a time in s; None is the last.
@@ -202,11 +224,13 @@ class ExactMotion:
 
     def __init__(self, exact: Any, end: float | None = None) -> None:
         self._exact, self._end = exact, end
-        self._last: tuple[float | None, Sampled] | None = None
+        self._times = _Times()
 
     def afresh(self) -> "ExactMotion":
-        """Return the same motion, without what it remembers of points."""
-        return ExactMotion(self._exact, self._end)
+        """Return the same motion, which forgets what was asked and remembers what will be."""
+        other = copy(self)
+        other._times = _Times(_ROOM)
+        return other
 
     def known_at(self, time: float) -> bool:
         """Whether the field is known: always."""
@@ -215,9 +239,7 @@ class ExactMotion:
     def at(self, time: float | None = None) -> Field:
         """Field at a time in s; None is its last or only one."""
         time = self._end if time is None else time
-        if self._last is None or self._last[0] != time:
-            self._last = time, Sampled(field_at(self._exact, time))
-        return self._last[1]
+        return self._times.at(time, lambda: Sampled(field_at(self._exact, time)))
 
 
 def field_at(exact: Any, time: float | None) -> Any:
