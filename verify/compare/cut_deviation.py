@@ -21,7 +21,7 @@ from verify.compare.error_norm import cut_rules
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
-from verify.compare.simplices import heights, points_in, simplices
+from verify.compare.simplices import cells_of, heights, points_in
 from verify.compare.solid import SolidBody
 from verify.geometry.curves import Arc
 from verify.records import CutRecord
@@ -218,7 +218,7 @@ def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, A
 
 def _element(solution: Solution, facets: Array) -> float:
     """Largest longest edge of the cells within their own diameter of the facets, or of all, m."""
-    corners = simplices(solution.points, solution.cells).corners
+    corners = cells_of(solution).corners
     longest = np.max(
         [np.linalg.norm(corners - np.roll(corners, k, axis=1), axis=2).max(axis=1)
          for k in range(1, corners.shape[1])], axis=0,

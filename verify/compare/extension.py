@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
 from verify.compare.mass import assembled
-from verify.compare.simplices import EDGES, simplex_rule, simplices
+from verify.compare.simplices import EDGES, cells_of, simplex_rule
 from verify.errors import InputError
 from verify.solution import Solution
 
@@ -113,7 +113,7 @@ class Extension:
         """∫ ∇N_i·∇N_j of the places."""
         solution = self.solution
         k, nodes = solution.cell_dimension, self._places[solution.cells]
-        shape = simplices(solution.points, solution.cells)
+        shape = cells_of(solution)
         local = np.zeros((*nodes.shape, nodes.shape[1]))
         for at, weight in zip(*simplex_rule(k, solution.order), strict=True):
             slopes = _slopes(at, shape.gradients, solution.order)

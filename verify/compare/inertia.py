@@ -23,7 +23,7 @@ from verify.compare.mass import (
     lumping_range,
     nodal_weights,
 )
-from verify.compare.simplices import simplices
+from verify.compare.simplices import cells_of
 from verify.handed_over import CONSISTENT
 from verify.solution import Solution
 
@@ -75,7 +75,7 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
     link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel())))
     link = link.tocsr()
     _, label = connected_components(link @ link.T, directed=False)
-    shape = simplices(solution.points, solution.cells)
+    shape = cells_of(solution)
     order = np.argsort(label, kind="stable")
     starts = np.flatnonzero(np.diff(label[order])) + 1
     mass = density * shape.volume
@@ -90,7 +90,7 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
 
 def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
     """Mass and inertia of given cells (c,), connected or not."""
-    shape = simplices(solution.points, solution.cells)
+    shape = cells_of(solution)
     return _part(cells, shape.corners, density * shape.volume)
 
 
@@ -260,7 +260,7 @@ def _off(solution: Solution, own: Array, weights: Array, parts: Sequence[Part]) 
 
 def _outside(solution: Solution, energy: Array, whole: Kinetic) -> str:
     """Why kinetic energies are not those of any lumping, if they are not."""
-    corners = simplices(solution.points, solution.cells).corners
+    corners = cells_of(solution).corners
     largest = float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).max())
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     low, high = lumping_range(solution.cell_dimension, solution.order)

@@ -11,14 +11,21 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.cell_tree import build_cell_tree
+from verify.compare.cell_tree import SearchedCells, build_cell_tree
 from verify.compare.field_kernels import evaluate_linear, evaluate_quadratic
 from verify.compare.locate_kernels import (
     find_cells,
     nearest_triangles,
     no_sides,
 )
-from verify.compare.simplices import simplices, straight_or_raise, triangle_frames
+from verify.compare.simplices import (
+    Simplices,
+    cells_of,
+    kept_with,
+    simplices,
+    straight_or_raise,
+    triangle_frames,
+)
 from verify.errors import InputError
 from verify.solution import Solution
 
@@ -38,6 +45,28 @@ class Field(Protocol):
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Displacement gradient (n, d, d), ``[:, i, j]`` = ∂u_i/∂x_j, at `points` (n, d)."""
         ...
+
+
+@kept_with
+def _checked(solution: Solution) -> Simplices:
+    """Return the cells of a solution that can be evaluated."""
+    if solution.order == 2:
+        straight_or_raise(solution.points, solution.cells)
+    if not np.isfinite(solution.points).all():
+        raise InputError("a solution has nodes whose coordinates are not finite")
+    if cells_of(solution).degenerate.all():
+        raise InputError("all cells of a solution are without volume")
+    return cells_of(solution)
+
+
+@kept_with
+def _searched(solution: Solution) -> SearchedCells:
+    """Return the cells of a solution in a tree, those without volume left out."""
+    shape = cells_of(solution)
+    lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
+    lower[shape.degenerate] = np.nan
+    tree = build_cell_tree(lower, upper, surface=solution.cell_dimension < solution.dimension)
+    return tree.over(shape.corners, shape.normals)
 
 
 class SolutionField:
@@ -64,25 +93,13 @@ class SolutionField:
     def __init__(self, solution: Solution, step: int = -1) -> None:
         self.solution = solution
         self._cells = np.ascontiguousarray(solution.cells)
-        if solution.order == 2:
-            straight_or_raise(solution.points, self._cells)
-        if not np.isfinite(solution.points).all():
-            raise InputError("a solution has nodes whose coordinates are not finite")
-        shape = simplices(solution.points, self._cells)
-        if shape.degenerate.all():
-            raise InputError("all cells of a solution are without volume")
-        self.shape = shape
-        self.degenerate_cells = int(shape.degenerate.sum())
-        lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
-        lower[shape.degenerate] = np.nan
-        membrane = solution.cell_dimension < solution.dimension
-        tree = build_cell_tree(lower, upper, surface=membrane)
-        self._searched = tree.over(shape.corners, shape.normals)
-        self._centres = self._searched.centres
+        self.shape = _checked(solution)
+        self.degenerate_cells = int(self.shape.degenerate.sum())
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
-        self._origin = np.ascontiguousarray(shape.corners[:, 0])
+        self._origin = np.ascontiguousarray(self.shape.corners[:, 0])
+        membrane = solution.cell_dimension < solution.dimension
         self._across = (
-            np.ascontiguousarray(triangle_frames(shape.corners)[:, 2]) if membrane else None
+            np.ascontiguousarray(triangle_frames(self.shape.corners)[:, 2]) if membrane else None
         )
         self._sides = no_sides(self._cells)
         self._set_nodal(solution.displacement[step])
@@ -95,6 +112,14 @@ class SolutionField:
             self._slope = np.einsum(
                 "mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:]
             )
+
+    @property
+    def _searched(self) -> SearchedCells:
+        return _searched(self.solution)
+
+    @property
+    def _centres(self) -> Array:
+        return self._searched.centres
 
     @property
     def nodal(self) -> Array:

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
-from verify.compare.simplices import EDGES, simplex_rule, simplices
+from verify.compare.simplices import EDGES, cells_of, simplex_rule, simplices
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
@@ -59,7 +59,7 @@ def density_of(scene: Scene, solution: Solution) -> float | Array:
     thickness = material.thickness or 1.0
     if material.is_uniform:
         return thickness * (material.density or 0.0)
-    shape = simplices(solution.points, solution.cells)
+    shape = cells_of(solution)
     return thickness * np.nan_to_num(material.at(shape.corners.mean(axis=1)).density)
 
 
@@ -185,7 +185,7 @@ def nodal_weights(solution: Solution, density: float | Array) -> Array:
     """Integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
     k = solution.cell_dimension
     shares = _consistent(k, solution.order).sum(axis=1)
-    mass = (density * simplices(solution.points, solution.cells).volume)[:, None] * shares
+    mass = (density * cells_of(solution).volume)[:, None] * shares
     return np.bincount(solution.cells.ravel(), mass.ravel(), minlength=len(solution.points))
 
 

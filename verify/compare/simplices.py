@@ -8,15 +8,17 @@ its ends. Volumes add up to round-off.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from itertools import combinations, pairwise
 from math import factorial
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
+from verify.solution import Solution
 
 Array = NDArray[np.float64]
 
@@ -86,6 +88,27 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
     gradients[degenerate], normals[degenerate] = 0.0, 0.0
     volume = np.maximum(determinant, 0.0) / factorial(count - 1)
     return Simplices(corners, volume, gradients, normals, degenerate)
+
+
+def kept_with[T](make: Callable[[Solution], T]) -> Callable[[Solution], T]:
+    """Let a function remember what it made of a solution as long as that lives."""
+    made: dict[int, T] = {}
+
+    @wraps(make)
+    def remembered(solution: Solution) -> T:
+        key = id(solution)
+        if key not in made:
+            made[key] = make(solution)
+            finalize(solution, made.pop, key)
+        return made[key]
+
+    return remembered
+
+
+@kept_with
+def cells_of(solution: Solution) -> Simplices:
+    """Geometry of the cells of a solution."""
+    return simplices(solution.points, solution.cells)
 
 
 def triangle_frames(corners: Array) -> Array:

@@ -26,7 +26,7 @@ from verify.compare.part_account import (
     part_records,
 )
 from verify.compare.released import blade_forces, released_metrics
-from verify.compare.simplices import simplices, straight_or_raise
+from verify.compare.simplices import cells_of, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
@@ -234,7 +234,7 @@ def _unfit(scene: Scene, solution: Solution) -> str:
     )
     if given != wanted:
         return f"{given}; expected {wanted}"
-    if simplices(solution.points, solution.cells).degenerate.all():
+    if cells_of(solution).degenerate.all():
         return "all its cells are without volume"
     if solution.order == 2:
         try:

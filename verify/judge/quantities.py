@@ -20,7 +20,7 @@ from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
 from verify.compare.part_account import part_quantity, part_unit
-from verify.compare.simplices import points_in, simplices
+from verify.compare.simplices import cells_of, points_in, simplices
 from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError
 from verify.judge.resultants import WeakForm, mean_stress, reaction, section
@@ -88,7 +88,7 @@ class Measured:
     @property
     def coverage(self) -> float:
         """Volume of the cells over that of the body: 1, or something is missing or twice there."""
-        shape = simplices(self.solution.points, self.solution.cells)
+        shape = cells_of(self.solution)
         return float(shape.volume.sum()) / self.body.measure
 
     @property

@@ -25,7 +25,7 @@ from verify.compare.errors import (
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
-from verify.compare.simplices import simplices
+from verify.compare.simplices import cells_of
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.quantities import Measured, field_quantity, local_difference
@@ -117,7 +117,7 @@ def compared_size(solution: Solution, body: AnyBody) -> float:
 def _sizes_of_cells(solution: Solution) -> tuple[float, float]:
     """Sizes of the mean and of the largest cell: of the legs of a right simplex of its volume."""
     d = solution.cell_dimension
-    volume = simplices(solution.points, solution.cells).volume
+    volume = cells_of(solution).volume
     mean, largest = float(volume.sum()) / len(volume), float(volume.max())
     return (factorial(d) * mean) ** (1 / d), (factorial(d) * largest) ** (1 / d)
 
