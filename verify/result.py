@@ -239,6 +239,8 @@ class VerdictRecord:
     def badge(self) -> str:
         """What stands beside the verdict where the reference is not clearly better than judged."""
         share = self.reference_share
+        if share == inf:
+            return "reference: not known as well as the error"
         return f"reference: {share:.2g} of the error" if share and share > SUFFICIENT else ""
 
     @property

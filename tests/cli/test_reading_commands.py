@@ -50,6 +50,16 @@ def test_list_names_every_case_with_its_title(capsys):
     }
 
 
+def test_list_wraps_at_the_width_of_the_terminal(capsys, monkeypatch):
+    assert main(["list"]) == 0
+    whole = capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", "70")
+    assert main(["list"]) == 0
+    wrapped = capsys.readouterr().out
+    assert max(map(len, wrapped.splitlines())) <= 70 < max(map(len, whole.splitlines()))
+    assert wrapped.split() == whole.split()  # and no word is lost or broken
+
+
 @pytest.mark.parametrize("case", NAMES)
 def test_describe_says_the_requirement_and_every_check(case, capsys):
     assert main(["describe", case]) == 0

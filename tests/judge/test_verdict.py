@@ -80,6 +80,9 @@ def test_a_verdict_counts_the_uncertainty_of_the_divisor():
         (BOUND, [solve(0, 0.02, 2e-3)], 0.1, ""),
         (BOUND, [solve(0, 0.9, 0.9), solve(1, 0.02, 0.001)], 0.05, ""),  # on the finest level
         (BOUND, [solve(0, 1e-14, 1e-13)], None, ""),  # round-off
+        # what levels differ by at round-off, times its safety factor, is round-off; 1e-8 is not
+        (BOUND, [solve(0, 2.5e-13, 3.3e-10)], None, ""),
+        (BOUND, [solve(0, 2.5e-13, 1e-8)], inf, "reference: not known as well as the error"),
         (ENERGY, energy(1.02, 0.01), 0.5, "reference: 0.5 of the error"),
         (STATED, energy(1.0, 0.01), None, ""),  # no reference judges
         ({"check": "ratio", "at_most": 2.0},

@@ -1,5 +1,6 @@
 """Commands that look: cases, the answer of a case file, a finished run, the installation."""
 
+import shutil
 import sys
 import textwrap
 from collections import Counter
@@ -16,6 +17,10 @@ from verify.printable import one_line
 if TYPE_CHECKING:
     from verify.runner.selection import Options
     from verify.scene import Scene
+
+
+_UNWRAPPED = 10_000  # columns of what is no terminal: one line per case, for grep
+_AS_IT_IS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
 def list_(
@@ -41,9 +46,12 @@ def list_(
         print("no case matches" if expression else "no cases")
         return 0
     width = max(len(row["name"]) for row in rows)
+    columns = shutil.get_terminal_size((_UNWRAPPED, 1)).columns
     for row in rows:
         tags = f"  [{', '.join(row['tags'])}]" if row.get("tags") else ""
-        print(f"{row['name']:<{width}}  {row['title']}{tags}")
+        line = f"{row['name']:<{width}}  {row['title']}{tags}"
+        indent = " " * (width + 2 if columns >= 2 * width else 4)
+        print("\n".join(textwrap.wrap(line, columns, subsequent_indent=indent, **_AS_IT_IS)))
     return 0
 
 

@@ -135,7 +135,7 @@ def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squa
     moved = np.abs(reference.displacement(some, some)).max(initial=0.0)
     slope = moved / rule.extent if len(rule.points) else 0.0
     cancels = 2 * law.shear * (squares(expected) + slope**2)
-    return found.above(_NOTHING, rule.weights @ cancels, rule.weights)
+    return found.above(_NOTHING, float(rule.weights @ cancels), rule.weights)
 
 
 def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None = None) -> Squares:

@@ -12,6 +12,9 @@ from verify.scene.acceptance import OVERLAP
 ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
 
 _ROUND_OFF = 1e-10  # relative: an error that small is none, and needs no reference to say so
+# Relative: a half-width that small is none. It is the difference of two levels, each off by
+# round-off, times a safety factor of up to three.
+_NO_WIDTH = 10 * _ROUND_OFF
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ def quotient_half_width(part: float, width: float, whole: float, whole_width: fl
 def reference_share(metric: Metric) -> float | None:
     """Half-width of the reference over the error that it judges.
 
-    None where no reference judges, and where error and half-width are round-off.
+    None where no reference judges, and where error and half-width are round-off. Infinite where
+    only the error is: nothing is divided by round-off.
     """
     if not metric.source or metric.name in ACCOUNT:
         return None
@@ -71,6 +75,6 @@ def reference_share(metric: Metric) -> float | None:
     # measured values may be numpy's, whose comparisons JSON cannot hold
     error = float(abs(metric.value - (metric.reference or 0.0)))
     width = float(metric.uncertainty)
-    if not max(error, width) > _ROUND_OFF * scale:
-        return None
-    return width / error if error > 0.0 else inf
+    if error > _ROUND_OFF * scale:
+        return width / error
+    return inf if width > _NO_WIDTH * scale else None
