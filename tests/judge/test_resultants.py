@@ -89,6 +89,20 @@ def test_reactions_balance_loads_and_sections_what_lies_beside_them(solver, mesh
     assert [unit_of(asked, 2) for asked in scene.quantities[3:5]] == ["N/m", "N m/m"]
 
 
+@pytest.mark.parametrize("solver, n, off", [("conforming", 8, 1e-12), ("xfem", 8, 2e-3),
+                                             ("xfem", 32, 5e-4)])  # fmt: skip
+def test_a_clamp_that_is_cut_through_bears_the_load(solver, n, off):
+    """To round-off where elements end at the cut; else to (h/δ)² of what decays over δ = √2/4."""
+    scene = scenes.scene(
+        [{"kind": "polyline", "points": [[-0.1, 0.37], [0.62, 0.61]]}],
+        material=PLANE["material"], supports=PLANE["supports"][:1],
+        loads=PLANE["loads"][:3], mesh={"cells": [[n, n]]},
+        quantities=[reaction("x", "left", "x"), reaction("y", "left", "y"),
+                    moment("m", "left", "z", [0.2, 0.1])],
+    )  # fmt: skip
+    assert list(values(scene, solver).values()) == pytest.approx([*-LOAD, -MOMENT], abs=off)
+
+
 SOLID = {
     "cuts": [{"kind": "polygon", "points": [[0.35, -0.1, 0.4], [0.78, -0.1, 0.55],
                                             [0.78, 1.1, 0.65], [0.35, 1.1, 0.5]]}],

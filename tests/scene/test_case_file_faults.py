@@ -57,6 +57,7 @@ FAULTS = {
     "no limit": ("at_most = 0.1", "", "acceptance[0].at_most: missing"),
     "point on the cut": ("point = [0.5, 0.0]", "point = [0.2, 1.0]", "lies on cut 'cut', where"),
     "opening outside": ("at = 0.2", "at = 0.1", "(-0.04, 1), which is not in the body"),
+    "force at a point": ('"gravity"', '"point_force"', "infinite energy: give the traction on the"),
     "wrong schema": ("schema = 1", "schema = 2", "schema: expected 1, got 2"),
     "not TOML": ("[mesh]", "[mesh", "not valid TOML"),
 }  # fmt: skip
@@ -147,6 +148,7 @@ def test_an_inequality_that_holds_a_node_within_round_off_is_accepted(tmp_path, 
         # a point that is no node of the first mesh
         ("hypot(x - 0.375, y) < 1e-7", "right", "no node of the boundary lies in"),
         ("left", "x > 0.999999 and y > 0.999999", "loads[0].where: no facet"),
+        ("left", "x > 0.999999 and y > 0.999999", "or on an edge has an infinite energy: give"),
     ],
 )
 def test_an_inequality_that_holds_no_node_or_facet_is_named(tmp_path, held, loaded, said):

@@ -4,7 +4,8 @@ A reaction is the residual of the weak form, r = M (a + Î± v) + f(u) + f_v(v) âˆ
 rigid motion of the nodes that a support holds. It is conjugate to the work of the support, so that
 all reactions balance the loads to round-off where a solution is in equilibrium with every motion of
 its nodes. A motion of the nodes that are held alone ends in one layer of elements, so it is the
-stress there that counts and not what is known of the loads elsewhere.
+stress there that counts and not what is known of the loads elsewhere. Where a cut meets that layer
+the motion ends smoothly farther away.
 
 The force in a section is that of a rigid motion of all nodes on one side of it. What the loads do
 on the layer of elements that the section runs through is integrated up to the section.
@@ -44,6 +45,7 @@ from verify.solution import Solution
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+_REACH = 0.25  # of the body's diagonal
 _MOMENT = 1e-6  # of the duration: over which accelerations of supports are taken
 
 
@@ -76,6 +78,20 @@ class WeakForm:
         parts = separated_parts(self.solution, density)
         whole = kinetic(self.solution, density)
         return inertia_of(self.solution, density, whole, parts).matrix
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the body, m."""
+        return float(np.linalg.norm(np.ptp(self.solution.points, axis=0)))
+
+    @cached_property
+    def on_cut(self) -> Bools:
+        """Whether nodes (n,) are on the realised cut."""
+        points, facets = self.solution.points, self.solution.cut_facets
+        if not facets.size:
+            return np.zeros(len(points), dtype=bool)
+        away = cKDTree(facets.reshape(-1, points.shape[1])).query(points)[0]
+        return np.asarray(away <= 10 * ROUND_OFF * self.size)
 
     def internal(self, step: int, w: Array) -> float:
         """Power of the stresses of an output time on nodal velocities w (n, d), W."""
@@ -198,11 +214,28 @@ def reaction(form: WeakForm, asked: ReactionQuantity) -> float:
     step = step_at(form.solution, asked.time)
     owners = _owners(form)
     own = [i for i, one in enumerate(form.scene.supports) if one.where == asked.where]
-    w = np.where(np.isin(owners, own), form.rigid(asked, step), 0.0)
+    w = _extended(form, np.isin(owners, own), owners >= 0) * form.rigid(asked, step)
     force, rates = -form.loads(step), form.rates(step)
     if rates is not None:
         force += form.mass @ rates
     return form.internal(step, w) + float(np.sum(force * w))
+
+
+def _extended(form: WeakForm, own: Bools, held: Bools) -> Array:
+    """Extend 1 (n, d) at components of nodes that a support holds: by 0, or smoothly.
+
+    Where a cut meets the elements in which it would fall to 0, that is no test function of solvers
+    whose elements go on beyond a cut. There it ends as smoothly as the body is large.
+    """
+    found, solution = own.astype(float), form.solution
+    nodes = own.any(axis=1)
+    layer = np.unique(solution.cells[nodes[solution.cells].any(axis=1)])
+    if not form.on_cut[layer].any():
+        return found
+    away = cKDTree(solution.points[nodes]).query(solution.points)[0]
+    share = np.minimum(away / (_REACH * form.size), 1.0)
+    smooth = (1.0 - share) ** 2 * (1.0 + 2.0 * share)
+    return np.where(held, found, smooth[:, None])
 
 
 def _owners(form: WeakForm) -> NDArray[np.int64]:
@@ -259,12 +292,11 @@ def section(form: WeakForm, asked: SectionQuantity) -> float:
         `reaction`.
     """
     solution, step = form.solution, step_at(form.solution, asked.time)
-    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     normal = np.asarray(asked.normal) / np.linalg.norm(asked.normal)
-    side = _Side(np.asarray(asked.point, dtype=float), normal, 10 * ROUND_OFF * size)
+    side = _Side(np.asarray(asked.point, dtype=float), normal, 10 * ROUND_OFF * form.size)
     beyond = side.level(solution.points) > 0.0
     rigid = form.rigid(asked, step)
-    _check_section(form, beyond, rigid, size)
+    _check_section(form, beyond, rigid)
     w = np.where(beyond[:, None], rigid, 0.0)
     found = form.internal(step, w) - float(np.sum(form.loads(step) * w))
     found += float(np.sum(form.loads(step, side) * rigid))
@@ -275,20 +307,17 @@ def section(form: WeakForm, asked: SectionQuantity) -> float:
     return found
 
 
-def _check_section(form: WeakForm, beyond: Bools, rigid: Array, size: float) -> None:
+def _check_section(form: WeakForm, beyond: Bools, rigid: Array) -> None:
     """Refuse a section that misses the body, or meets a cut or a support that bears on `rigid`."""
     solution = form.solution
     sides = beyond[solution.cells]
     crossed = solution.cells[sides.any(axis=1) & ~sides.all(axis=1)]
     if not len(crossed):
         raise UnsupportedSceneError("the plane of the section misses the body")
-    if len(solution.cut_facets):
-        cut = cKDTree(solution.cut_facets.reshape(-1, solution.dimension))
-        near = cut.query(solution.points[np.unique(crossed)])[0].min()
-        if near <= 10 * ROUND_OFF * size:
-            raise UnsupportedSceneError(
-                "the section runs through elements that a cut meets; expected uncut material"
-            )
+    if form.on_cut[crossed].any():
+        raise UnsupportedSceneError(
+            "the section runs through elements that a cut meets; expected uncut material"
+        )
     bears = (_owners(form) >= 0) & (np.abs(rigid) > ROUND_OFF * np.abs(rigid).max())
     for held in np.moveaxis(bears[crossed], 2, 0):
         both = (held & beyond[crossed]).any(axis=1) & (held & ~beyond[crossed]).any(axis=1)

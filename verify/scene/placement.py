@@ -19,6 +19,7 @@ from verify.scene.cuts import ArcCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle
 from verify.scene.parts import held_facets, on_part, pieces_on_part
 from verify.scene.physics import Traction
+from verify.scene.strict import NO_POINT_LOADS
 from verify.scene.tables import SceneTables
 
 Array = NDArray[np.float64]
@@ -142,15 +143,15 @@ def _without_facets(scene: SceneTables, facets: Array, where_it_is: str) -> str 
     """Which part has nothing of facets (k, corners, d), and for a support no node."""
     points = facets.reshape(-1, scene.dimension)
     for key, where, area in _inequalities(scene):
+        touched = on_part(scene.geometry, where, points, float(np.ptp(points, axis=0).max()))
         if area:
             acts = len(pieces_on_part(scene.geometry, where, facets).facet) > 0
         else:
-            size = float(np.ptp(points, axis=0).max())
-            touched = on_part(scene.geometry, where, points, size)
             acts = bool(touched.any() or held_facets(scene.geometry, where, facets).held.any())
         if not acts:
             what = "facet" if area else "node"
-            return f"{key}: no {what} of the boundary lies in '{where}'{where_it_is}"
+            hint = NO_POINT_LOADS if area and touched.any() else ""
+            return f"{key}: no {what} of the boundary lies in '{where}'{where_it_is}{hint}"
     return None
 
 

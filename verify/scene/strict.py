@@ -101,6 +101,12 @@ class Strict(BaseModel):
 
 # ------------------------------------------------------------------------------ messages
 _FEW, _SHOWN = 30, 3
+#: why there is no kind of load that acts on less than an area, in the plane than a length
+NO_POINT_LOADS = (
+    "; a force at a point or on an edge has an infinite energy: give the traction on the part that "
+    "it acts on"
+)
+_HINTS = {"loads": NO_POINT_LOADS}  # by the list
 # what pydantic expected, by the type of its error
 _WANTED = {
     "float_type": "a finite number",
@@ -170,7 +176,8 @@ def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> 
             return f"{key}.{tag}: missing{_tags(found, schema)}"
         case "union_tag_invalid":
             tag = found["ctx"]["discriminator"].strip("'")
-            return f"{key}.{tag}: no '{found['ctx']['tag']}'{_tags(found, schema)}"
+            hint = _HINTS.get(key.split("[")[0], "")
+            return f"{key}.{tag}: no '{found['ctx']['tag']}'{_tags(found, schema)}{hint}"
         case "value_error":
             message = found["msg"].removeprefix("Value error, ")
             return f"{key}: {message}" if key else message
