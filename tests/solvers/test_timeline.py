@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import scene
 
-from verify.solvers.timeline import march, step_sizes, timeline_of
+from verify.solvers.timeline import march, notes_of_steps, timeline_of
 
 OFF = 1e-10  # s, of a motion of one second: less than what steps added up are off by
 
@@ -82,7 +82,8 @@ def test_steps_between_stops_are_equal_and_no_larger_than_asked_for():
     assert sizes == {0.175: 2, 0.65 / 3: 3}
     np.testing.assert_allclose(body.times("step"), [0.175] * 2 + [0.65 / 3] * 3, rtol=1e-13)
     assert body.times("output") == pytest.approx([0.0, 1.0])
-    assert step_sizes(sizes) == "0.175 s … 0.216667 s"
+    notes = notes_of_steps(scene(), sizes, "", "", 1.0)
+    assert notes["time step"] == "0.175 s … 0.216667 s"
 
 
 def test_halvings_halve_also_the_steps_that_stops_cut_short():

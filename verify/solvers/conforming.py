@@ -291,21 +291,14 @@ def _stability(finite: LargeStrainSolve) -> str:
     return f"{said}; an unstable state of {finite.dismissed:.6g} J on another path was left"
 
 
-def _specks(mesh: ConformingMesh) -> list[Regularisation]:
-    """State the parts of round-off size that were left joined to a neighbour."""
-    if not len(mesh.specks):
-        return []
-    kind = "loose part of round-off size joined to its neighbour"
-    largest = float(mesh.specks.max())
-    return [Regularisation(kind, len(mesh.specks), largest, "volume fraction of the body")]
-
-
 def _solution(
     scene: Scene, space: ConformingSpace, record: Record, fields: dict[str, Any], size: float
 ) -> Solution:
     mesh = space.mesh
+    kind = "loose part of round-off size joined to its neighbour"
+    largest = float(mesh.specks.max(initial=0.0))
     record.regularisations += [
-        *_specks(mesh),
+        Regularisation(kind, len(mesh.specks), largest, "volume fraction of the body"),
         *support_ends(scene, space, size),
         *across_interfaces(scene, mesh.points, mesh.cells),
     ]

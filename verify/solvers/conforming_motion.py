@@ -28,7 +28,7 @@ from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.initial import starts_open
 from verify.solvers.runs import LedgerRows, Record, work_of_blades
-from verify.solvers.timeline import blade_advance, march, step_sizes, timeline_of
+from verify.solvers.timeline import march, notes_of_steps, timeline_of
 
 Array = NDArray[np.float64]
 _JUST = 1e-12  # of the duration: loads are taken that much later, after a jump
@@ -161,15 +161,10 @@ class TiedMotion:
             stepper.close()
         newton = sum(stepper.solves for stepper in self.steppers.values())
         record.iterations |= {"steps": sizes.total(), "newton": newton}
-        record.notes |= {
-            "scheme": marching.name,
-            "mass": CONSISTENT,
-            "time step": step_sizes(sizes),
-            "unknowns": self.unknowns,
-        }
+        steps = notes_of_steps(self.scene, sizes, marching.name, CONSISTENT, marching.element)
+        record.notes |= {**steps, "unknowns": self.unknowns}
         if self.waves is not None:
             record.notes["openings"] = str(self.openings)
-            record.notes |= blade_advance(self.scene, sizes, marching.element)
         linear = self.scene.analysis.kinematics == "linear"
         return {
             "times": self.timeline.outputs[: len(self.outputs)],

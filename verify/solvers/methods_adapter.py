@@ -181,7 +181,7 @@ class MethodSolver:
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
         motion = CutMotion(scene, timeline, opening, integration, exact_of(scene), record)
         phantom, fields = motion.run(trial)
-        record.regularisations += springs_left_out(forces[-1])
+        record.regularisations.append(springs_left_out(forces[-1]))
         self._say(record, opening.final)
         return solution_on(scene, record, phantom, fields, size, opening.final.conforming)
 

@@ -17,7 +17,7 @@ from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings
 from verify.solvers.runs import LedgerRows, Record, work_of_blades
-from verify.solvers.timeline import Timeline, blade_advance, march, step_sizes
+from verify.solvers.timeline import Timeline, march, notes_of_steps
 from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.body import DynamicBody, Integrator, MotionState
@@ -419,14 +419,10 @@ class CutMotion:
         record.iterations["steps"] = sizes.total()
         if self._solves:
             record.iterations["newton"] = self._solves
-        record.notes |= {
-            "scheme": self.integration.scheme,
-            "mass": self.opening.mass,
-            "time step": step_sizes(sizes),
-        }
+        scheme, size = self.integration.scheme, self.opening.openings.size
+        record.notes |= notes_of_steps(self.scene, sizes, scheme, self.opening.mass, size)
         if any(isinstance(cut, ToolPathCut) for cut in self.scene.cuts):
             record.notes["a tool path opens"] = self.opening.rule
-            record.notes |= blade_advance(self.scene, sizes, self.opening.openings.size)
         if self._spread > _NO_ROUND_OFF:
             record.notes["jump of accelerations"] = (
                 f"loads or masses are shared out anew at openings: up to {self._spread:.1%} of the "

@@ -62,7 +62,7 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
     nodes = with_tip_nodes(mesh, cuts)
     kind, largest = "end of a cut made a node", float(nodes.moved.max(initial=0.0))
     said = Regularisation(kind, len(nodes.moved), largest, "m")
-    return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said] if len(nodes.moved) else [])
+    return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said])
 
 
 def _cut(cut: Any, size: float) -> Cut:

@@ -26,6 +26,7 @@ class Record:
         Wall seconds of each phase.
     iterations : dict of str to int
     regularisations : list of Regularisation
+        Those of nothing (a count of 0) are left out.
     notes : dict of str to str
     """
 
@@ -49,7 +50,7 @@ class Record:
             **fields,
             timings={phase: [seconds] for phase, seconds in self.timings.items()},
             iterations=self.iterations,
-            regularisations=self.regularisations,
+            regularisations=[one for one in self.regularisations if one.count],
             notes=self.notes,
         )
 
@@ -199,8 +200,6 @@ def across_interfaces(
     if scene.material.is_uniform:
         return []
     crossed = crossed_by_interfaces(scene.material, points, cells)
-    if not crossed.any():
-        return []
     sizes = measures(points[cells])
     share = float(sizes[crossed].sum() / sizes.sum())
     kind = "cell across an interface, of the material at its centroid"

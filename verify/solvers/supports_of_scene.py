@@ -95,7 +95,7 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     is a mere point or line, it holds the unknowns whose material reaches there.
     """
     parts, corners = _boundary_parts(phantom), _own_corners(phantom)
-    own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.nodes))
+    own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.boundary.nodes))
     found = []
     for i, support in enumerate(scene.supports):
         mark = np.zeros(phantom.node_count, dtype=bool)
@@ -144,11 +144,6 @@ class _BoundaryParts:
     facet: _Ints
     unknowns: _Ints
     diameter: _Floats
-
-    @property
-    def nodes(self) -> _Ints:
-        """Nodes of the boundary of the uncut mesh."""
-        return self.boundary.nodes
 
 
 def _boundary_parts(phantom: PhantomMesh) -> _BoundaryParts:

@@ -165,20 +165,20 @@ def _step_between(
             mover.begin()
 
 
-def blade_advance(scene: Scene, sizes: Collection[float], element: float) -> dict[str, str]:
-    """Note how far the fastest blade of a scene goes in the longest step, in elements (m).
+def notes_of_steps(
+    scene: Scene, sizes: Collection[float], scheme: str, mass: str, element: float
+) -> dict[str, str]:
+    """Say by what steps a motion was integrated: scheme, mass, smallest and largest step.
 
-    More than half an element is late by that much, whatever the rule.
+    And how far the fastest blade goes in the longest step, in elements (m). More than half of one
+    is late by that much, whatever the rule.
     """
-    speeds = [cut.top_speed for cut in scene.cuts if isinstance(cut, ToolPathCut)]
-    if not speeds or not sizes:
-        return {}
-    share = max(speeds) * max(sizes) / element
-    late = "; more than half of one: openings are late" if share > 0.5 * (1 + 1e-9) else ""
-    return {"blade advance in a step": f"{share:.2g} of an element{late}"}
-
-
-def step_sizes(sizes: Collection[float]) -> str:
-    """Say the smallest and the largest of some steps."""
     ends = (min(sizes), max(sizes)) if sizes else ()
-    return " … ".join(dict.fromkeys(f"{size:.6g} s" for size in ends)) or "none"
+    steps = " … ".join(dict.fromkeys(f"{size:.6g} s" for size in ends)) or "none"
+    notes = {"scheme": scheme, "mass": mass, "time step": steps}
+    speeds = [cut.top_speed for cut in scene.cuts if isinstance(cut, ToolPathCut)]
+    if speeds and sizes:
+        share = max(speeds) * max(sizes) / element
+        late = "; more than half of one: openings are late" if share > 0.5 * (1 + 1e-9) else ""
+        notes["blade advance in a step"] = f"{share:.2g} of an element{late}"
+    return notes

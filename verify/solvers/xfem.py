@@ -188,7 +188,7 @@ def _cut(
     phantom = cut_mesh(asked.mesh, asked.cuts, asked.rule)
     phantom, fragments = join_fragments(phantom, supports_of(scene, phantom, exact))
     phantom, slivers = treated(phantom, given.slivers, held)
-    return phantom, [*slivers, *asked.done, *joined(fragments)]
+    return phantom, [*slivers, *asked.done, joined(fragments)]
 
 
 def _check_penalty(scene: Scene, mass: str) -> None:

@@ -1,6 +1,6 @@
 """Equilibria of a cut body, and its fields as a neutral solution with all that was changed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def solution_on(
 
 def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Regularisation]:
     """Report a ghost penalty: its faces, and its share in the energy or else its factor."""
-    if ghost is None or not len(ghost.weights):
+    if ghost is None:
         return []
     size, unit = (ghost.factor, "factor") if share is None else (share, "of the strain energy")
     return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
@@ -111,23 +111,19 @@ def treated(
     return phantom, [
         Regularisation(kind, count, report.largest, "volume fraction")
         for kind, count in counts.items()
-        if count
     ]
 
 
-def joined(fragments: Fragments) -> list[Regularisation]:
+def joined(fragments: Fragments) -> Regularisation:
     """Report loose parts of round-off size that move with their neighbours."""
-    if not fragments.count:
-        return []
     kind = "loose part of round-off size joined to its neighbour"
-    return [Regularisation(kind, fragments.count, fragments.largest, "volume fraction")]
+    return Regularisation(kind, fragments.count, fragments.largest, "volume fraction")
 
 
-def springs_left_out(force: InternalForce) -> list[Regularisation]:
+def springs_left_out(force: InternalForce) -> Regularisation:
     """Report the springs that a fit would make negative; elements have none."""
-    count = int(getattr(force, "clamped", 0))
     kind = "spring that the fit would make negative left out"
-    return [Regularisation(kind, count, 0.0, "N/m")] if count else []
+    return Regularisation(kind, int(getattr(force, "clamped", 0)), 0.0, "N/m")
 
 
 def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
@@ -144,19 +140,11 @@ def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
 
 def _of_the_cut(phantom: PhantomMesh) -> list[Regularisation]:
     """Report what the solver moved or left out, each with its size."""
-    entries = []
-    if phantom.snapped:
-        entries.append(Regularisation("node taken as on the cut", phantom.snapped, 0.0, "m"))
-    if phantom.dropped:
-        entries.append(
-            Regularisation(
-                "piece within round-off of its cell left to its neighbour",
-                phantom.dropped,
-                ROUND_OFF_SHARE,
-                "volume fraction",
-            )
-        )
-    return entries
+    left = "piece within round-off of its cell left to its neighbour"
+    return [
+        Regularisation("node taken as on the cut", phantom.snapped, 0.0, "m"),
+        Regularisation(left, phantom.dropped, ROUND_OFF_SHARE, "volume fraction"),
+    ]
 
 
 Law = Callable[..., InternalForce]
@@ -232,7 +220,7 @@ def solve_equilibrium(
         **_path_notes(found),
         "pieces inside out": _inverted(force, found.displacement),
     }
-    record.regularisations += [*_dismissed(found), *springs_left_out(force)]
+    record.regularisations += [_dismissed(found.check.dismissed), springs_left_out(force)]
     return at_rest(found.displacement, found.energy)
 
 
@@ -257,13 +245,10 @@ def _path_notes(found: StaticEquilibrium) -> dict[str, str]:
     }
 
 
-def _dismissed(found: StaticEquilibrium) -> list[Regularisation]:
+def _dismissed(energies: Sequence[float]) -> Regularisation:
     """Report equilibria that were found and left for one of less energy."""
-    energies = found.check.dismissed
-    if not energies:
-        return []
     kind = "equilibrium left for one of less potential energy"
-    return [Regularisation(kind, len(energies), max(energies), "J")]
+    return Regularisation(kind, len(energies), max(energies, default=0.0), "J")
 
 
 def _inverted(force: InternalForce, displacement: NDArray[np.float64]) -> str:
