@@ -22,13 +22,13 @@ from verify.accelerated.conjugate_gradient_kernels import (
 )
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.cuts import Plane
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 pytestmark = [pytest.mark.timing, pytest.mark.benchmark(timer=process_time)]
 
@@ -111,6 +111,21 @@ def test_a_plane_costs_no_more_than_the_mesh_grows(benchmark):
     benchmark.pedantic(cut_mesh, (cube(), [CUT]), rounds=3, warmup_rounds=1)
     assert passes[-1] < 70.0
     assert np.polyfit(np.log(cells), np.log(seconds), 1)[0] < 1.0
+
+
+def test_separate_cuts_cost_what_they_are_many(benchmark):
+    """One cut to each 3 × 3 boxes of a plane body. Exponents: 3 where each cut copied all."""
+    seconds, counts = [], (49, 100, 196)
+    for count in counts:
+        k = int(np.sqrt(count))
+        mesh = rectangle_mesh((3 * k, 3 * k), (0.0, 0.0), (3.0 * k, 3.0 * k))
+        angle = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, count)
+        way = 1.2 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        middle = 3.0 * np.stack(np.divmod(np.arange(count), k), axis=1) + 1.55
+        cuts = [Polyline([m - w, m + w]) for m, w in zip(middle, way, strict=True)]
+        seconds.append(median_seconds(lambda m=mesh, c=cuts: cut_mesh(m, c), 3))
+    benchmark.pedantic(cut_mesh, (mesh, cuts), rounds=1)
+    assert np.polyfit(np.log(counts), np.log(seconds), 1)[0] < 1.6
 
 
 def test_treating_slivers_costs_no_more_than_one_and_a_half_times_cutting(benchmark):

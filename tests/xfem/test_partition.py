@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 
 from verify.xfem.clip import ROUND_OFF_SHARE
-from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
@@ -178,6 +178,48 @@ def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
             np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
         np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
         np.testing.assert_array_equal(alone.points.ends, among.points.ends)
+
+
+def _short_cuts(dim, count, rng):
+    """Cuts in boxes of three elements' length, none within two of them of another, as one mesh."""
+    mesh = _shaken(rectangle_mesh if dim == 2 else box_mesh, (6 * count,) + (6,) * (dim - 1), rng)
+    cuts = []
+    for k in range(count):
+        middle = np.full(dim, 3.0) + 6.0 * k * np.eye(dim)[0] + 0.2 * rng.random(dim)
+        frame = np.linalg.qr(rng.standard_normal((dim, dim)))[0]
+        if dim == 2:
+            cuts.append(Polyline([middle - 1.4 * frame[0], middle + 1.4 * frame[0]]))
+        else:
+            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ frame[:2]
+            cuts.append(PolygonPatch(middle + 1.1 * corners))
+    return mesh, cuts
+
+
+def _shaken(make, divisions, rng):
+    mesh = make(divisions, np.zeros(len(divisions)), divisions)
+    inner = ((mesh.points > 0.5) & (mesh.points < np.array(divisions) - 0.5)).all(axis=1)
+    move = 0.15 * rng.uniform(-1.0, 1.0, mesh.points.shape) * inner[:, None]
+    return SimplexMesh(mesh.points + move, mesh.cells)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_cuts_apart_from_one_another_divide_together_what_each_does_alone(dim, seed):
+    """Also what is decided at once, of cuts whose extensions cross, is what they do in turn."""
+    mesh, cuts = _short_cuts(dim, 5, np.random.default_rng(seed))
+    together = cut_mesh(mesh, cuts)
+    added = 0
+    for k, cut in enumerate(cuts):
+        alone = cut_mesh(mesh, [cut])
+        rows, mine = np.flatnonzero(alone.split), np.flatnonzero(together.label[:, k])
+        assert len(rows) > 0
+        np.testing.assert_array_equal(together.parent[mine], alone.parent[rows])
+        np.testing.assert_array_equal(together.label[mine, k], alone.label[rows, 0])
+        np.testing.assert_allclose(together.fraction[mine], alone.fraction[rows], atol=1e-14)
+        added += alone.node_count - len(mesh.points)
+    assert added > 0
+    assert together.node_count == len(mesh.points) + added
+    assert together.split.sum() == (together.label != 0).sum()
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -178,33 +178,36 @@ def staircase_entries(plus: Bools) -> tuple[Ints, Ints]:
     return stairs.start[pattern][of] + within, of
 
 
-def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Simplices:
-    """Divide simplices by a cut; those that are not clipped come first.
+def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> Simplices:
+    """Divide simplices by cuts; those that are not clipped come first.
 
     Parameters
     ----------
     simplices : Simplices
     zero : ZeroPoints
-        Of all cuts; points of this one are added.
-    cut : int
-        Its number.
+        Of all cuts; points of these are added.
+    cut : (p,) int array
+        Cut that divides each piece; any if none does.
     below : (p,) int array
         Piece that takes what is on the minus side of each piece; −1 if that is not divided.
     """
-    plus = zero.values[simplices.points, cut] >= 0.0
-    touched, all_plus = below[simplices.piece] >= 0, plus.all(axis=1)
-    clipped = touched & ~all_plus & plus.any(axis=1)
-    beneath = touched & ~plus.any(axis=1)
-    moved = np.where(beneath, below[simplices.piece], simplices.piece)
+    touched = np.flatnonzero(below[simplices.piece] >= 0)
+    piece = simplices.piece[touched]
+    plus = zero.values[simplices.points[touched], cut[piece, None]] >= 0.0
+    above, beneath = plus.all(axis=1), ~plus.any(axis=1)
+    moved, clipped = simplices.piece.copy(), np.zeros(len(simplices), dtype=bool)
+    moved[touched[beneath]] = below[piece[beneath]]
+    clipped[touched] = ~above & ~beneath
     whole = Simplices(moved, *list(vars(simplices).values())[1:])[~clipped]
     crossed = simplices[clipped]
     if len(crossed) == 0:
         return whole
+    own = cut[crossed.piece]
     order = np.argsort(crossed.points, axis=1, kind="stable")
     row = np.arange(len(crossed))[:, None]
     ids, corners = crossed.points[row, order], crossed.barycentric[row, order]
-    level = zero.values[ids, cut]
-    number = zero.on_edges(cut, ids)
+    level = zero.values[ids, own[:, None]]
+    number = zero.on_edges(own, ids)
     entry, of = staircase_entries(level >= 0.0)
     stairs = staircase(ids.shape[1])
     at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
@@ -353,14 +356,19 @@ class Partition:
         sub = self.simplices
         return np.bincount(sub.piece, sub.fraction, minlength=len(self.parent))
 
-    def crossed_edges(self, cut: int) -> tuple[Ints, Ints]:
-        """Edges (q, 2) from plus to minus that a cut crosses, and the piece (q,) of each.
+    def crossed_edges(self, cut: Ints) -> tuple[Ints, Ints]:
+        """Edges (q, 2) from plus to minus that the cut of a piece crosses, and the piece (q,).
 
-        Of pieces that the cut has divided already none are given.
+        Parameters
+        ----------
+        cut : (p,) int array
+            One cut for each piece, −1 for none. Of pieces that it has divided already no edges
+            are given.
         """
         sub = self.simplices
-        rows = np.flatnonzero(self.label[sub.piece, cut] == 0)
-        plus = self.points.values[sub.points[rows], cut] >= 0.0
+        whole = (cut >= 0) & (self.label[np.arange(len(cut)), cut] == 0)
+        rows = np.flatnonzero(whole[sub.piece])
+        plus = self.points.values[sub.points[rows], cut[sub.piece[rows], None]] >= 0.0
         row, a, b = np.nonzero(plus[:, :, None] & ~plus[:, None, :])
         rows = rows[row]
         return np.stack([sub.points[rows, a], sub.points[rows, b]], axis=1), sub.piece[rows]

@@ -1,11 +1,11 @@
-"""Crossing of pieces by one cut: it divides those that it goes through.
+"""Crossing of pieces by one cut each: it divides those that it goes through.
 
 That is read off the zero points on the edges of a piece: are they inside the extent of the cut?
 A branch on a stem that goes through is decided here, too: it splits what the stem leaves. Cuts
 that part a cell only together are the matter of `verify.xfem.junctions`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,16 +15,17 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 
 TipRule = Literal["inside", "through", "nearest"]
-Reached = Callable[[Ints, Floats], Bools]
+Reached = Callable[[Ints, Ints, Floats], Bools]
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
 
 
 class Crossing(NamedTuple):
-    """Where the zero set of a cut crosses the edges of pieces.
+    """Where the zero sets of cuts cross the edges of pieces, of each piece one cut.
 
     Attributes
     ----------
+    cut : (q,) int array
     zero : (q,) int array
         Numbers of the points; edges that several simplices share may come several times.
     piece : (q,) int array
@@ -34,6 +35,7 @@ class Crossing(NamedTuple):
         Number of pieces.
     """
 
+    cut: Ints
     zero: Ints
     piece: Ints
     size: Floats
@@ -60,34 +62,51 @@ def level_and_depth(cut: Cut, points: Floats) -> tuple[Floats, Floats]:
     return found[0], found[1]
 
 
+def levels_and_depths(cuts: Sequence[Cut], of: Ints, points: Floats) -> tuple[Floats, Floats]:
+    """Level set (n,) and depth (n,) at points (n, d), each of one of the cuts, in metres.
+
+    Raises
+    ------
+    XfemError
+        As `level_and_depth`.
+    """
+    found = np.empty((2, len(points)))
+    order = np.argsort(of, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(of[order])) + 1):
+        if len(rows):
+            found[:, rows] = level_and_depth(cuts[of[rows[0]]], points[rows])
+    return found[0], found[1]
+
+
 def crossed_through(
-    cut: Cut,
+    cuts: Sequence[Cut],
     positions: Floats,
     crossing: Crossing,
     tip: TipRule,
     reached: Reached | None = None,
 ) -> tuple[Bools, Bools]:
-    """Which pieces (p,) a cut goes through, and in which (p,) it ends by the rule `inside`.
+    """Which pieces (p,) their cuts go through, and in which (p,) they end by the rule `inside`.
 
-    By the other rules it ends in none. A piece is gone through if all of its zero points are inside
-    the extent (`inside`), if one is (`through`), or if their mean is (`nearest`).
+    By the other rules they end in none. A piece is gone through if all of its zero points are
+    inside the extent (`inside`), if one is (`through`), or if their mean is (`nearest`).
 
     Parameters
     ----------
-    cut : Cut
+    cuts : sequence of Cut
     positions : (n, d) float array
         All numbered points, in metres.
     crossing : Crossing
     tip : {"inside", "through", "nearest"}
     reached : callable, optional
-        Given numbers of points past the end and sizes of their elements, tells which belong to the
-        cut all the same.
+        Given cuts, numbers of points past their ends and sizes of the elements, tells which points
+        belong to the cut all the same.
     """
-    zero, piece, size, pieces = crossing
+    cut, zero, piece, size, pieces = crossing
     if tip == "nearest":
-        return _mostly_crossed(cut, positions, crossing), np.zeros(pieces, dtype=bool)
-    wanted, at = np.unique(zero, return_inverse=True)
-    level, depth = level_and_depth(cut, positions[wanted])
+        return _mostly_crossed(cuts, positions, crossing), np.zeros(pieces, dtype=bool)
+    wanted, at = np.unique(zero * len(cuts) + cut, return_inverse=True)
+    point, of = np.divmod(wanted, len(cuts))
+    level, depth = levels_and_depths(cuts, of, positions[point])
     # an end on an edge is inside by the rule `inside`: it has gone through the element before it;
     # by `through` it is not: it has not gone into the one behind it
     margin = 1.0 if tip == "through" else -1.0
@@ -96,7 +115,7 @@ def crossed_through(
         near = (np.abs(level[at]) <= REACH * size) & (depth[at] > -size)
         past = np.flatnonzero(near & ~inside)
         if len(past):
-            inside[past] = reached(zero[past], size[past])
+            inside[past] = reached(cut[past], zero[past], size[past])
     some, every = np.zeros(pieces, dtype=bool), np.zeros(pieces, dtype=bool)
     some[piece[inside]] = True
     if tip == "through":
@@ -106,16 +125,16 @@ def crossed_through(
     return every, some & ~every
 
 
-def _mostly_crossed(cut: Cut, positions: Floats, crossing: Crossing) -> Bools:
-    """Which pieces a cut crosses as far as the centre of its section."""
+def _mostly_crossed(cuts: Sequence[Cut], positions: Floats, crossing: Crossing) -> Bools:
+    """Which pieces their cuts cross as far as the centre of the section."""
     pairs, first = np.unique(np.stack([crossing.piece, crossing.zero]), axis=1, return_index=True)
     count = np.bincount(pairs[0], minlength=crossing.pieces)
     found = np.flatnonzero(count)
     sums = [np.bincount(pairs[0], x, minlength=crossing.pieces) for x in positions[pairs[1]].T]
     centres = np.stack(sums, axis=1)[found] / count[found, None]
-    size = np.zeros(crossing.pieces)
-    size[pairs[0]] = crossing.size[first]
-    level, depth = level_and_depth(cut, centres)
+    size, cut = np.zeros(crossing.pieces), np.zeros(crossing.pieces, dtype=np.int64)
+    size[pairs[0]], cut[pairs[0]] = crossing.size[first], crossing.cut[first]
+    level, depth = levels_and_depths(cuts, cut[found], centres)
     inside = (np.abs(level) <= REACH * size[found]) & (depth >= -AT_END * size[found])
     mostly = np.zeros(crossing.pieces, dtype=bool)
     mostly[found] = inside

@@ -15,7 +15,7 @@ same on shared faces. Cuts made of facets and tool paths have modules of their o
 on here.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -179,3 +179,20 @@ def _tangents(normal: Floats) -> tuple[Floats, Floats]:
     first = np.cross(normal, helper)
     first /= np.linalg.norm(first)
     return first, np.cross(normal, first)
+
+
+def boxes_of(cuts: Sequence[Cut], space: int) -> Floats:
+    """Lower and upper corners (cuts, 2, space) of boxes around the extents of cuts, in metres.
+
+    Of what is not known to have an end they are infinite.
+    """
+    boxes = np.tile([[-np.inf], [np.inf]], (len(cuts), 1, space))
+    for box, cut in zip(boxes, cuts, strict=True):
+        if isinstance(cut, (Polyline, TriangulatedSurface)):
+            corners = cut.arrays.corners.reshape(-1, space)
+        elif isinstance(cut, PolygonPatch):
+            corners = cut.corners
+        else:
+            continue
+        box[:] = corners.min(axis=0), corners.max(axis=0)
+    return boxes

@@ -105,20 +105,23 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
     # cuts come in the order of their numbers, which need not be that of the division: then points
     # may be new here, and are added. Only sides leave this function; points tell empty regions.
     face, side = np.arange(len(nodes)), np.zeros(dividing.shape, dtype=np.int8)
-    stairs = staircase(nodes.shape[1])
-    for cut in range(dividing.shape[1]):
-        chosen = np.flatnonzero(dividing[face, cut])
-        plus = points.values[nodes[chosen], cut] >= 0.0
+    stairs, left = staircase(nodes.shape[1]), dividing.copy()
+    while left.any():
+        # of each face the first cut that is left: faces do not wait for those of other cuts
+        first, some = left.argmax(axis=1), left.any(axis=1)
+        left[some, first[some]] = False
+        chosen = np.flatnonzero(some[face])
+        cut = first[face[chosen]]
+        plus = points.values[nodes[chosen], cut[:, None]] >= 0.0
         side[chosen, cut] = np.where(plus.all(axis=1), 1, -1)
-        mixed = chosen[plus.any(axis=1) & ~plus.all(axis=1)]
-        if len(mixed) == 0:
-            continue
+        both = plus.any(axis=1) & ~plus.all(axis=1)
+        mixed, cut = chosen[both], cut[both]
         ids = np.sort(nodes[mixed], axis=1)
-        entry, of = staircase_entries(points.values[ids, cut] >= 0.0)
+        entry, of = staircase_entries(points.values[ids, cut[:, None]] >= 0.0)
         number = points.on_edges(cut, ids)
         regions = number[of[:, None], stairs.plus[entry], stairs.minus[entry]]
         region_side = side[mixed[of]]
-        region_side[:, cut] = stairs.side[entry]
+        region_side[np.arange(len(of)), cut[of]] = stairs.side[entry]
         rest = np.ones(len(face), dtype=bool)
         rest[mixed] = False
         nodes = np.concatenate([nodes[rest], regions])
@@ -177,11 +180,13 @@ def number_nodes(
     # the one above most of them: there may be none above all, as where a cut runs along a wall.
     # Only numbers depend on that, not the space.
     rank = np.zeros(nodes.shape, dtype=np.int64)
-    level = partition.points.values[nodes[:pieces]]
-    label = partition.label[:, None, :]
-    beyond = (label * level < 0.0).any(axis=2)
-    below = ((label < 0) & (level == 0.0)).sum(axis=2)
-    rank[:pieces] = np.where(beyond, 1 + label.shape[2], below)
+    piece, cut = np.nonzero(partition.label)
+    level = partition.points.values[nodes[piece], cut[:, None]]
+    side = partition.label[piece, cut][:, None]
+    beyond, below = np.zeros((2, pieces, nodes.shape[1]), dtype=np.int64)
+    np.add.at(beyond, piece, side * level < 0.0)
+    np.add.at(below, piece, (side < 0) & (level == 0.0))
+    rank[:pieces] = np.where(beyond > 0, 1 + partition.label.shape[1], below)
     group_rank = np.full(groups, np.iinfo(np.int64).max)
     np.minimum.at(group_rank, joined.group[alive], rank[alive])
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.clip import Partition, facets_between
-from verify.xfem.crossing import AT_END, REACH, level_and_depth
+from verify.xfem.crossing import AT_END, REACH, levels_and_depths
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import connected
 from verify.xfem.zero_points import ZeroPoints
@@ -31,9 +31,10 @@ class _Facets(NamedTuple):
 
 def junction_cuts(
     partition: Partition,
-    ends: Sequence[Ints],
+    ends: tuple[Ints, Ints],
     divide_all: Callable[[Ints, Bools], Partition],
     cuts: Sequence[Cut],
+    boxes: Floats,
     sizes: Floats,
     known: Bools | None = None,
 ) -> Bools:
@@ -43,24 +44,28 @@ def junction_cuts(
     ----------
     partition : Partition
         Cells divided by the cuts that go through them.
-    ends : sequence of int arrays
-        For each cut the cells in pieces of which it ends.
+    ends : (e,), (e,) int arrays
+        Cells in pieces of which cuts end, and which cut.
     divide_all : callable
         Divides the cells (q,) by the cuts (m, cuts) whatever their ends.
     cuts : sequence of Cut
+    boxes : (cuts, 2, space) float array
+        From `verify.xfem.cuts.boxes_of`.
     sizes : (m,) float array
         Longest edges of the cells, in metres.
     known : (m,) bool array, optional
         Cells with a junction before: they keep one as cuts grow.
     """
-    meets = _meeting_cuts(partition, ends, len(sizes), known)
+    meets = np.zeros((len(sizes), len(cuts)), dtype=bool)
+    meets[ends] = True
+    _add_meeting_cuts(meets, partition, known)
     suspects = meets.any(axis=1)
     if not suspects.any():
         return meets
     divided = divide_all(np.flatnonzero(suspects), meets)
     # facets outside the extent of every cut join their pieces to parts
     facets = _inner_facets(divided, suspects)
-    inside = _inside_extent(divided, facets, cuts, sizes)
+    inside = _inside_extent(divided, facets, cuts, boxes, sizes)
     joining = ~inside.any(axis=1)
     part = connected(len(divided.parent), facets.first[joining], facets.second[joining])
     solid = divided.solid
@@ -79,29 +84,23 @@ def junction_cuts(
 
 
 def pieces_of_one_part(
-    partition: Partition, cuts: Sequence[Cut], sizes: Floats, cells: Bools
+    partition: Partition, cuts: Sequence[Cut], boxes: Floats, sizes: Floats, cells: Bools
 ) -> Ints:
     """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
     if not cells.any():
         return np.empty((0, 2), dtype=np.int64)
     facets = _inner_facets(partition, cells)
-    joining = ~_inside_extent(partition, facets, cuts, sizes).any(axis=1)
+    joining = ~_inside_extent(partition, facets, cuts, boxes, sizes).any(axis=1)
     pairs = np.stack([facets.first[joining], facets.second[joining]], axis=1)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
-def _meeting_cuts(
-    partition: Partition, ends: Sequence[Ints], cells: int, known: Bools | None
-) -> Bools:
-    """Which cuts (m, cuts) meet which cells, where several do and one at least ends."""
-    meets = np.zeros((cells, len(ends)), dtype=bool)
-    for cut, some in enumerate(ends):
-        meets[some, cut] = True
+def _add_meeting_cuts(meets: Bools, partition: Partition, known: Bools | None) -> None:
+    """Add to the cuts (m, cuts) that end in cells those that divide them; leave single ones out."""
     ending = meets.any(axis=1) if known is None else meets.any(axis=1) | known
     piece, cut = np.nonzero((partition.label != 0) & ending[partition.parent, None])
     meets[partition.parent[piece], cut] = True
     meets[meets.sum(axis=1) < 2] = False
-    return meets
 
 
 def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
@@ -114,35 +113,29 @@ def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
 
 
 def _inside_extent(
-    partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: Floats
+    partition: Partition, facets: _Facets, cuts: Sequence[Cut], boxes: Floats, sizes: Floats
 ) -> Bools:
     """Which facets lie inside the extent of each cut that has their pieces on its two sides."""
-    label, positions = partition.label, partition.points.positions
+    label, zero = partition.label, partition.points
     found = np.zeros((len(facets.points), len(cuts)), dtype=bool)
-    for index, cut in enumerate(cuts):
-        rows = np.flatnonzero(label[facets.first, index] * label[facets.second, index] < 0)
-        if len(rows) == 0:
-            continue
-        points = facets.points[rows]
-        size = sizes[partition.parent[facets.first[rows]]][:, None]
-        level, depth = (
-            x.reshape(points.shape) for x in level_and_depth(cut, positions[points.ravel()])
-        )
-        inside = depth >= -AT_END * size
-        if not inside.all():
-            # corners past the end of a facet that begins inside the extent
-            past = (depth < -AT_END * size) & (depth > depth.max(axis=1, keepdims=True) - size)
-            past &= (depth > AT_END * size).any(axis=1, keepdims=True)
-            row, corner = np.nonzero(past)
-            if len(row):
-                inside[row, corner] = reached(
-                    cuts, index, partition.points, points[row, corner], size[row, 0]
-                )
-        found[rows, index] = (inside & (np.abs(level) <= REACH * size)).all(axis=1)
+    facet, cut = np.nonzero(label[facets.first] * label[facets.second] < 0)
+    points = facets.points[facet]
+    size = sizes[partition.parent[facets.first[facet]]][:, None]
+    at, of = zero.positions[points.ravel()], np.repeat(cut, points.shape[1])
+    level, depth = (x.reshape(points.shape) for x in levels_and_depths(cuts, of, at))
+    inside = depth >= -AT_END * size
+    # corners past the end of a facet that begins inside the extent
+    past = ~inside & (depth > depth.max(axis=1, keepdims=True, initial=-np.inf) - size)
+    past &= (depth > AT_END * size).any(axis=1, keepdims=True)
+    row, corner = np.nonzero(past)
+    inside[row, corner] = reached(cuts, boxes, zero, cut[row], points[row, corner], size[row, 0])
+    found[facet, cut] = (inside & (np.abs(level) <= REACH * size)).all(axis=1)
     return found
 
 
-def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, size: Floats) -> Bools:
+def reached(
+    cuts: Sequence[Cut], boxes: Floats, zero: ZeroPoints, own: Ints, points: Ints, size: Floats
+) -> Bools:
     """Which points past the end of a cut it reaches all the same: it ends on another cut there.
 
     A cut that is bent inside an element is realised a little beside where it was given. A branch
@@ -161,36 +154,38 @@ def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, siz
     Parameters
     ----------
     cuts : sequence of Cut
-    index : int
-        Of the cut that ends.
+    boxes : (cuts, 2, space) float array
     zero : ZeroPoints
+    own : (q,) int array
+        Cuts that end.
     points : (q,) int array
-        Numbers of points of its plane past its end.
+        Numbers of points of their planes past their ends.
     size : (q,) float array
         Of the cells in which they lie, in metres.
     """
     found = np.zeros(len(points), dtype=bool)
-    at, realised = zero.positions[points], zero.values[points]
-    near = np.abs(realised) <= size[:, None]
-    near[:, index] = False
-    for other in np.flatnonzero(near.any(axis=0)).tolist():
-        cut = cuts[other]
-        given = level_and_depth(cut, at)[0]
-        between = near[:, other] & (given * realised[:, other] <= 0.0)
-        between &= np.abs(given - realised[:, other]) > AT_END * size
-        rows = np.flatnonzero(between & ~found)
-        if len(rows) == 0:
-            continue
-        end, inwards = _end(cuts[index], at[rows], size[rows])
-        off = AT_END * size[rows] + np.abs(level_and_depth(cuts[index], end)[0])
-        level, depth = level_and_depth(cut, end)
-        before = level_and_depth(cut, end + _ASIDE * size[rows, None] * inwards)[0]
-        found[rows] = (np.abs(level) <= off) & (depth >= -off) & (before * given[rows] < 0.0)
+    near = np.abs(zero.values[points]) <= size[:, None]
+    near[np.arange(len(own)), own] = False
+    row, other = np.nonzero(near)
+    # the end is on the other cut, and no farther from the point than the size
+    at = zero.positions[points[row]]
+    gap = np.maximum(boxes[other, 0] - at, at - boxes[other, 1]).max(axis=1)
+    close = gap <= 2.0 * size[row]
+    row, other, at = row[close], other[close], at[close]
+    given, realised = levels_and_depths(cuts, other, at)[0], zero.values[points[row], other]
+    between = (given * realised <= 0.0) & (np.abs(given - realised) > AT_END * size[row])
+    row, other, at, given = row[between], other[between], at[between], given[between]
+    mine, size = own[row], size[row]
+    end, inwards = _end(cuts, mine, at, size)
+    off = AT_END * size + np.abs(levels_and_depths(cuts, mine, end)[0])
+    level, depth = levels_and_depths(cuts, other, end)
+    before = levels_and_depths(cuts, other, end + _ASIDE * size[:, None] * inwards)[0]
+    found[row[(np.abs(level) <= off) & (depth >= -off) & (before * given < 0.0)]] = True
     return found
 
 
-def _end(cut: Cut, points: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Nearest end (q, space) of a cut to points past it, and the unit vectors that lead inwards.
+def _end(cuts: Sequence[Cut], of: Ints, points: Floats, size: Floats) -> tuple[Floats, Floats]:
+    """Nearest ends (q, space) of cuts to points past them, and unit vectors that lead inwards.
 
     The depth t is a distance from the end, negative here: its slope is that direction, and the end
     x − t ∇t/‖∇t‖. Where two ends are equally near, the difference quotient is a mean of both.
@@ -198,8 +193,11 @@ def _end(cut: Cut, points: Floats, size: Floats) -> tuple[Floats, Floats]:
     step = _ASIDE * size
     slope = np.empty_like(points)
     for axis, unit in enumerate(np.eye(points.shape[1])):
-        ahead, behind = (cut.depth(points + way * step[:, None] * unit) for way in (0.5, -0.5))
+        ahead, behind = (
+            levels_and_depths(cuts, of, points + way * step[:, None] * unit)[1]
+            for way in (0.5, -0.5)
+        )
         slope[:, axis] = (ahead - behind) / step
     length = np.linalg.norm(slope, axis=1)
     slope /= np.where(length > 0.0, length, 1.0)[:, None]
-    return points - cut.depth(points)[:, None] * slope, slope
+    return points - levels_and_depths(cuts, of, points)[1][:, None] * slope, slope

@@ -5,6 +5,9 @@ extent of the cut (`verify.xfem.crossing`). So tips end on element edges (2D) or
 branch splits only the piece that it crosses. `verify.xfem.clip` then divides the piece at these
 points, numbered once for the mesh by `verify.xfem.zero_points`.
 
+Cuts that meet in no cell divide in one round. A cut meets a cell if its level set changes sign
+there, and the cell is near its extent: of a cut with ends most cells are on its extension only.
+
 |φ| below round-off is exactly zero, and zero counts as the plus side: the cut is in effect moved a
 little to its minus side, the same at every node. A piece of no more than round-off of the volume of
 its cell is left to the other half of the division that made it. It still takes its place at the
@@ -37,7 +40,7 @@ import numpy as np
 from verify.xfem.arrays import Bools, Floats, Ints, Sides, check_choice, finite_array
 from verify.xfem.clip import ROUND_OFF_SHARE, Partition, bisected, divided
 from verify.xfem.crossing import Crossing, TipRule, crossed_through
-from verify.xfem.cuts import Cut
+from verify.xfem.cuts import Cut, boxes_of
 from verify.xfem.errors import XfemError
 from verify.xfem.junctions import junction_cuts, pieces_of_one_part, reached
 from verify.xfem.mesh import SimplexMesh
@@ -46,14 +49,20 @@ from verify.xfem.zero_points import ZeroPoints
 # cells (q,) and labels (q, cuts) of pieces, and the number of a cut, to whether it splits them
 Separated = Callable[[Ints, Sides, int], Bools]
 
+_NONE = np.empty(0, dtype=np.int64)
 ROUND_OFF = 8.0 * np.finfo(float).eps  # of the extent of the mesh: a level set that is zero
 
 
 class _Rules(NamedTuple):
-    """How cuts divide: what `split_cells` was given, and sizes of the cells."""
+    """How cuts divide: what `split_cells` was given, boxes of the cuts and sizes of the cells.
+
+    The cuts divide in rounds: of each round the cells that they meet, (q,), and which cut, (q,).
+    """
 
     cuts: Sequence[Cut]
+    boxes: Floats
     sizes: Floats
+    rounds: list[tuple[Ints, Ints]]
     tip: TipRule
     separated: Separated | None
     opened: Bools | None
@@ -113,18 +122,15 @@ def split_cells(
             f"opened cells of shape {opened.shape}; expected ({len(mesh.cells)}, {len(cuts)})"
         )
     values, snapped = nodal_values(mesh, cuts)
-    plus = values >= 0.0
-    first = plus[mesh.cells[:, 0]]
-    mixed = np.logical_or.reduce([plus[nodes] != first for nodes in mesh.cells.T[1:]])
-    crossed = np.flatnonzero(mixed.any(axis=1))
-    sizes = np.zeros(len(mesh.cells))
-    sizes[crossed] = mesh.longest_edges(crossed)
+    boxes = boxes_of(cuts, mesh.space)
+    meets, sizes = _met_cells(mesh, values, boxes)
+    crossed = np.flatnonzero(meets.any(axis=1))
 
-    def divide(cells: Ints, rules: _Rules) -> tuple[Partition, list[Ints]]:
+    def divide(cells: Ints, rules: _Rules) -> tuple[Partition, tuple[Ints, Ints]]:
         points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
         return _split_by_all(Partition.whole(mesh.cells, cells, points, snapped), rules)
 
-    rules = _Rules(cuts, sizes, tip, separated, opened)
+    rules = _Rules(cuts, boxes, sizes, _rounds(meets), tip, separated, opened)
     partition, ends = divide(crossed, rules)
     at_junctions = np.zeros(len(mesh.cells), dtype=bool)
     if tip == "inside" and len(cuts) > 1:
@@ -134,6 +140,7 @@ def split_cells(
             *((partition, ends) if opened is None else divide(crossed, free)),
             lambda cells, forced: divide(cells, free._replace(forced=forced))[0],
             cuts,
+            boxes,
             sizes,
             junction_cells,
         )
@@ -141,7 +148,7 @@ def split_cells(
         if at_junctions.any():
             partition = divide(crossed, rules._replace(forced=junctions))[0]
     partition = partition.only_split()
-    pairs = pieces_of_one_part(partition, cuts, sizes, at_junctions)
+    pairs = pieces_of_one_part(partition, cuts, boxes, sizes, at_junctions)
     return replace(partition, one_part=pairs).absorbed()
 
 
@@ -168,70 +175,121 @@ def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
     return values, int(tiny.sum())
 
 
-def _split_by_all(partition: Partition, rules: _Rules) -> tuple[Partition, list[Ints]]:
-    """Divide pieces by all cuts; also the cells in pieces of which each cut ends."""
-    ends = [np.empty(0, dtype=np.int64)] * len(rules.cuts)
+def _met_cells(mesh: SimplexMesh, values: Floats, boxes: Floats) -> tuple[Bools, Floats]:
+    """Which cells each cut meets (m, cuts), and the longest edges (m,) of those, in metres.
+
+    A cell that is crossed by the extension of a cut only, far from the cut itself, is left out.
+    """
+    plus = values >= 0.0
+    first = plus[mesh.cells[:, 0]]
+    meets = np.logical_or.reduce([plus[nodes] != first for nodes in mesh.cells.T[1:]])
+    crossed = np.flatnonzero(meets.any(axis=1))
+    sizes = np.zeros(len(mesh.cells))
+    sizes[crossed] = mesh.longest_edges(crossed)
+    # A cut has to do with points at most 1.5 sizes from it: half a size to one side of a point that
+    # is on it (`REACH`), and past that within the same cell. A facet is of two cells, hence the
+    # larger size around.
+    reach = np.zeros(len(mesh.points))
+    np.maximum.at(reach, mesh.cells[crossed], 1.6 * sizes[crossed, None])
+    for cut in np.flatnonzero(np.isfinite(boxes[:, 0, 0])).tolist():
+        cells = np.flatnonzero(meets[:, cut])
+        nodes = mesh.cells[cells]
+        low, high = mesh.points[nodes].min(axis=1), mesh.points[nodes].max(axis=1)
+        gap = np.maximum(boxes[cut, 0] - high, low - boxes[cut, 1]).max(axis=1)
+        meets[cells, cut] = gap <= reach[nodes].max(axis=1)
+    return meets, sizes
+
+
+def _rounds(meets: Bools) -> list[tuple[Ints, Ints]]:
+    """Cells (q,) and cuts (q,) of each round: cuts that meet in no cell divide in the same one.
+
+    Of those that do the one given first divides in an earlier round.
+    """
+    cell, cut = np.nonzero(meets)
+    after = np.zeros(len(meets), dtype=np.int64)
+    number = np.zeros(meets.shape[1], dtype=np.int64)
+    for index in range(len(number)):
+        cells = np.flatnonzero(meets[:, index])
+        number[index] = after[cells].max(initial=0)
+        after[cells] = number[index] + 1
+    order = np.argsort(number[cut], kind="stable")
+    starts = np.flatnonzero(np.diff(number[cut[order]])) + 1
+    return [(cell[now], cut[now]) for now in np.split(order, starts)]
+
+
+def _split_by_all(partition: Partition, rules: _Rules) -> tuple[Partition, tuple[Ints, Ints]]:
+    """Divide pieces by all cuts; also the cells in pieces of which cuts end, and which cut."""
+    ends: list[tuple[Ints, Ints]] = []
     # a branch given before its stem can split only once the stem has: hence more than one pass
     for _ in rules.cuts:
-        before = len(partition.parent)
-        for index in range(len(rules.cuts)):
-            partition, ends[index] = _split_by(partition, index, rules)
+        before, ends = len(partition.parent), []
+        for cells, cuts in rules.rounds:
+            partition, ending = _split_by(partition, cells, cuts, rules)
+            ends.append(ending)
         if len(partition.parent) == before or len(rules.cuts) == 1:
             break
-    return partition, ends
+    cell, cut = np.concatenate([np.empty((2, 0), dtype=np.int64), *ends], axis=1)
+    return partition, (cell, cut)
 
 
-def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partition, Ints]:
-    """Divide pieces by one cut; also the cells in pieces of which it ends."""
-    points, parent, cut = partition.points, partition.parent, rules.cuts[index]
-    edges, piece = partition.crossed_edges(index)
+def _split_by(
+    partition: Partition, cells: Ints, cuts: Ints, rules: _Rules
+) -> tuple[Partition, tuple[Ints, Ints]]:
+    """Divide the pieces of cells (q,) by cuts (q,); also the cells in which these end."""
+    points, parent = partition.points, partition.parent
+    of_cell = np.full(len(rules.sizes), -1)
+    of_cell[cells] = cuts
+    cut = of_cell[parent]
+    edges, piece = partition.crossed_edges(cut)
     if len(edges) == 0:
-        return partition, np.empty(0, dtype=np.int64)
+        return partition, (_NONE, _NONE)
     crossing = Crossing(
-        zero=points.find(index, edges[:, 0], edges[:, 1]),
+        cut=cut[piece],
+        zero=points.find(cut[piece], edges[:, 0], edges[:, 1]),
         piece=piece,
         size=rules.sizes[parent[piece]],
         pieces=len(parent),
     )
     on_others = None
     if rules.tip == "inside" and len(rules.cuts) > 1:
-        on_others = partial(reached, rules.cuts, index, points)
-    active, ending = crossed_through(cut, points.positions, crossing, rules.tip, on_others)
+        on_others = partial(reached, rules.cuts, rules.boxes, points)
+    active, ending = crossed_through(rules.cuts, points.positions, crossing, rules.tip, on_others)
     meets = np.bincount(piece, minlength=len(active)) > 0
     if rules.forced is not None:
-        active |= meets & rules.forced[parent, index]
+        active |= meets & rules.forced[parent, cut]
     if rules.separated is not None:
-        doubtful = np.flatnonzero(meets & ~active)
-        active[doubtful] = rules.separated(parent[doubtful], partition.label[doubtful], index)
+        for index in np.unique(cuts).tolist():
+            doubtful = np.flatnonzero(meets & ~active & (cut == index))
+            active[doubtful] = rules.separated(parent[doubtful], partition.label[doubtful], index)
     if rules.opened is not None:
-        active &= rules.opened[parent, index]
-    ends = parent[ending]
+        active &= rules.opened[parent, cut]
+    ends = parent[ending], cut[ending]
     if not active.any():
         return partition, ends
-    partition = _divide(partition, index, active)
-    return (partition if len(rules.cuts) == 1 else _bisect_beside(partition, index)), ends
+    partition = _divide(partition, cut, active)
+    return (partition if len(rules.cuts) == 1 else _bisect_beside(partition, of_cell)), ends
 
 
-def _divide(partition: Partition, index: int, active: Bools) -> Partition:
-    """Replace each active piece by its half above (same place) and below (appended).
+def _divide(partition: Partition, cut: Ints, active: Bools) -> Partition:
+    """Replace each active piece by its half above its cut (same place) and below (appended).
 
     A piece of round-off size names another of its cell in `absorbed_by`, which may name a further
     one. The chain ends at a solid piece: a solid piece that is divided has a solid half.
     """
     below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
     label = np.concatenate([partition.label, partition.label[active]])
-    label[: len(active)][active, index] = 1
-    label[len(active) :, index] = -1
+    above = np.flatnonzero(active)
+    label[above, cut[above]] = 1
+    label[below[above], cut[above]] = -1
     parted = replace(
         partition,
         parent=np.concatenate([partition.parent, partition.parent[active]]),
         label=label,
-        simplices=divided(partition.simplices, partition.points, index, below),
+        simplices=divided(partition.simplices, partition.points, cut, below),
         absorbed_by=np.concatenate([partition.absorbed_by, below[active]]),
     )
     # halves: the one that may take, the one that it takes. The larger half of a solid piece takes
     # the other if that is of round-off size; of a piece that is not solid, above takes below.
-    above = np.flatnonzero(active)
     share, solid = parted.fraction, partition.solid[above]
     halves = np.stack([above, below[active]])
     swapped = solid & (share[halves[0]] <= share[halves[1]])
@@ -243,24 +301,28 @@ def _divide(partition: Partition, index: int, active: Bools) -> Partition:
     taken = np.flatnonzero(~partition.solid & active[partition.absorbed_by])
     if len(taken):
         sub = partition.simplices
-        level = partition.points.values[sub.points, index].sum(axis=1)
+        level = partition.points.values[sub.points, cut[sub.piece, None]].sum(axis=1)
         under = active[taken] | (np.bincount(sub.piece, level, len(active))[taken] < 0.0)
         lower = np.where(active[taken], below[taken], taken)[under]
         parted.absorbed_by[lower] = below[partition.absorbed_by[taken[under]]]
     return parted
 
 
-def _bisect_beside(partition: Partition, index: int) -> Partition:
-    """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges.
+def _bisect_beside(partition: Partition, of_cell: Ints) -> Partition:
+    """Bisect what the cut of a cell leaves whole where it ends: later cuts find matching edges.
 
     That changes sub-simplices, and no piece.
     """
     zero, simplices = partition.points, partition.simplices
-    if len(partition.crossed_edges(index)[0]) == 0:
+    cut = of_cell[partition.parent]
+    if len(partition.crossed_edges(cut)[0]) == 0:
         return partition
-    labelled = partition.label[simplices.piece, index] != 0
+    divided_now = (cut >= 0) & (partition.label[np.arange(len(cut)), cut] != 0)
+    labelled = divided_now[simplices.piece]
     on_cut = np.zeros(len(zero.positions), dtype=bool)
     on_cut[simplices.points[labelled]] = True
-    numbers = np.flatnonzero(on_cut[zero.nodes :] & (zero.cut == index))
+    of_round = np.zeros(partition.label.shape[1], dtype=bool)
+    of_round[cut[divided_now]] = True
+    numbers = np.flatnonzero(on_cut[zero.nodes :] & of_round[zero.cut])
     beside = bisected(simplices[~labelled], zero, numbers)
     return replace(partition, simplices=simplices[labelled] + beside)

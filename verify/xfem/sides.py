@@ -25,8 +25,10 @@ def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats
     weights : (p, d + 1) float array
         Barycentric coordinates of the centroids, up to a positive factor.
     """
-    # φ(centroid) = Σ_i λ_i φ_i
-    level = np.einsum("pi,pic->pc", weights, level_sets[corners])
+    # φ(centroid) = Σ_i λ_i φ_i, a corner at a time: there may be hundreds of cuts
+    level = sum(
+        w[:, None] * level_sets[nodes] for w, nodes in zip(weights.T, corners.T, strict=True)
+    )
     return np.where(label != 0, label, np.where(level >= 0.0, 1, -1)).astype(np.int8)
 
 
@@ -63,18 +65,22 @@ def node_sides(
     side = np.empty((len(node_parent), label.shape[1]), dtype=np.int8)
     # where a node's own material has no volume, its number is of an unknown beyond a cut
     own = np.zeros(len(node_parent), dtype=bool)
-    own[cells[(label[:, None] * level_sets[node_parent[cells]] >= 0.0).all(axis=2)]] = True
+    piece, cut = np.nonzero(label)
+    level = level_sets[node_parent[cells[piece]], cut[:, None]]
+    against = np.zeros(cells.shape, dtype=np.int64)
+    np.add.at(against, piece, label[piece, cut][:, None] * level < 0.0)
+    own[cells[against == 0]] = True
     voters = np.flatnonzero(share)
     nodes = cells[voters].ravel()
-    for cut in range(label.shape[1]):
-        above, below = (_at_any(cells[sign * label[:, cut] > 0], len(side)) for sign in (1, -1))
-        weight = np.repeat(share[voters] * piece_side[voters, cut], cells.shape[1])
+    for k in range(label.shape[1]):
+        above, below = (_at_any(cells[sign * label[:, k] > 0], len(side)) for sign in (1, -1))
+        weight = np.repeat(share[voters] * piece_side[voters, k], cells.shape[1])
         vote = np.bincount(nodes, weight, minlength=len(node_parent))
         vote[np.abs(vote) <= _TIE * np.bincount(nodes, np.abs(weight), len(node_parent))] = 0.0
-        level = level_sets[node_parent, cut]
+        level = level_sets[node_parent, k]
         # a node exactly on the cut has its material where its pieces are
         told = np.where((vote == 0.0) | (own & (level != 0.0)), level, vote)
-        side[:, cut] = np.where(above != below, np.where(above, 1, -1), np.where(told >= 0, 1, -1))
+        side[:, k] = np.where(above != below, np.where(above, 1, -1), np.where(told >= 0, 1, -1))
     return side
 
 

@@ -12,7 +12,7 @@ else. Points that no sub-simplex uses do no harm.
 
 import numpy as np
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints
 
 _NONE = np.zeros(0, dtype=np.int64)
 _NEVER = np.iinfo(np.int64).max
@@ -52,42 +52,54 @@ class ZeroPoints:
         self.cut, self.turn = _NONE, _NONE
         self._turns = 0
         self._snap = snap
-        # per cut: edges (plus << 32 | minus), ascending, and the point of each
-        self._known: dict[int, tuple[Ints, Ints]] = {}
+        self._room = values[:0]  # of which the values are the first rows, for those to come
+        # edges (plus << 32 | minus) that are known, ascending, on each the cuts, ascending, and
+        # their points; the last entry is none
+        self._edge, self._of, self._point = np.array([[_NEVER], [0], [0]])
 
-    def shares(self, cut: int | Ints, plus: Ints, minus: Ints) -> tuple[Floats, Floats]:
+    def shares(self, cut: Ints, plus: Ints, minus: Ints) -> tuple[Floats, Floats]:
         """(r, s), (q,) each, of the zero points z = s·plus + r·minus on edges (plus, minus)."""
         above, below = self.values[plus, cut], self.values[minus, cut]
         return above / (above - below), -below / (above - below)
 
-    def find(self, cut: int, plus: Ints, minus: Ints) -> Ints:
-        """Numbers (q,) of the zero points of `cut` on edges from `plus`, φ ≥ 0, to `minus`, φ < 0.
+    def find(self, cut: Ints, plus: Ints, minus: Ints) -> Ints:
+        """Numbers (q,) of the zero points of cuts (q,) on edges from φ ≥ 0 to φ < 0, (q,) each.
 
         Where φ is exactly zero at the plus end, the zero point is that end. New points are
         numbered in the order of their ends, whatever the order in which they are asked for.
         """
         edge = plus << 32 | minus
-        known, point = self._known.get(cut, (_NONE, _NONE))
-        new = np.unique(edge)
-        if len(known):
-            new = new[known[np.minimum(np.searchsorted(known, new), len(known) - 1)] != new]
-        if len(new):
-            known = np.concatenate([known, new])
-            point = np.concatenate([point, self._append(cut, new >> 32, new & 0xFFFFFFFF)])
-            order = np.argsort(known)
-            known, point = self._known[cut] = known[order], point[order]
-        return point[np.searchsorted(known, edge)]
+        at, known = self._places(edge, cut)
+        new = np.flatnonzero(~known)
+        if len(new) == 0:
+            return self._point[at]
+        new = new[np.lexsort((cut[new], edge[new]))]
+        first = np.ones(len(new), dtype=bool)
+        first[1:] = (np.diff(edge[new]) != 0) | (np.diff(cut[new]) != 0)
+        new = new[first]
+        point = self._append(cut[new], plus[new], minus[new])
+        self._edge = np.insert(self._edge, at[new], edge[new])
+        self._of = np.insert(self._of, at[new], cut[new])
+        self._point = np.insert(self._point, at[new], point)
+        return self._point[self._places(edge, cut)[0]]
 
-    def on_edges(self, cut: int, points: Ints) -> Ints:
-        """Numbers (q, c, c) of the points of `cut` on the edges of simplices with points (q, c).
+    def _places(self, edge: Ints, cut: Ints) -> tuple[Ints, Bools]:
+        """Places (q,) of pairs of edge and cut among those known, and whether they are there."""
+        at = np.searchsorted(self._edge, edge)
+        while (before := (self._edge[at] == edge) & (self._of[at] < cut)).any():
+            at += before
+        return at, (self._edge[at] == edge) & (self._of[at] == cut)
+
+    def on_edges(self, cut: Ints, points: Ints) -> Ints:
+        """Numbers (q, c, c) of the points of cuts (q,) on edges of simplices with points (q, c).
 
         Entry ab is the point between corner a, where φ ≥ 0, and b, where φ < 0; if a = b it is
         the corner itself, elsewhere 0, which is not read.
         """
-        plus = self.values[points, cut] >= 0.0
+        plus = self.values[points, cut[:, None]] >= 0.0
         row, a, b = np.nonzero(plus[:, :, None] & ~plus[:, None, :])
         number = np.zeros((*points.shape, points.shape[1]), dtype=np.int64)
-        number[row, a, b] = self.find(cut, points[row, a], points[row, b])
+        number[row, a, b] = self.find(cut[row], points[row, a], points[row, b])
         corner = np.arange(points.shape[1])
         number[:, corner, corner] = points
         return number
@@ -107,20 +119,25 @@ class ZeroPoints:
         ends = self.ends[numbers]
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], self.turn[numbers]])]
 
-    def _append(self, cut: int, plus: Ints, minus: Ints) -> Ints:
+    def _append(self, cut: Ints, plus: Ints, minus: Ints) -> Ints:
         """Points on edges that had none."""
         r, s = self.shares(cut, plus, minus)
         new = r > 0.0
         point = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus)
-        r, s, p, m = r[new, None], s[new, None], plus[new], minus[new]
+        r, s, p, m, cut = r[new, None], s[new, None], plus[new], minus[new], cut[new]
         values = s * self.values[p] + r * self.values[m]
         values[np.abs(values) <= self._snap] = 0.0
-        values[:, cut] = 0.0
-        self.values = np.concatenate([self.values, values])
+        values[np.arange(len(p)), cut] = 0.0
+        count = len(self.values) + len(p)
+        if count > len(self._room):
+            self._room = np.empty((2 * count, values.shape[1]))
+            self._room[: len(self.values)] = self.values
+        self._room[len(self.values) : count] = values
+        self.values = self._room[:count]
         self.positions = np.concatenate(
             [self.positions, s * self.positions[p] + r * self.positions[m]]
         )
         self.ends = np.concatenate([self.ends, np.stack([p, m], axis=1)])
-        self.cut = np.concatenate([self.cut, np.full(len(p), cut)])
+        self.cut = np.concatenate([self.cut, cut])
         self.turn = np.concatenate([self.turn, np.full(len(p), _NEVER)])
         return point
