@@ -9,6 +9,7 @@ from verify.compare.hooke import law_of
 from verify.errors import UnsupportedSceneError
 from verify.judge.quantities import Measured, unit_of
 from verify.judge.reference import conforming_reference
+from verify.judge.resultants import resultants_over_time
 from verify.scene import load_scene
 from verify.solution import Solution
 from verify.solvers import find_solver
@@ -192,6 +193,9 @@ def test_a_reaction_in_motion_has_the_inertia_in_it(solver):
         total - load, abs=1e-8
     )
     assert np.abs(total).min() > 0.05
+    over_time = resultants_over_time(one.weak_form, scene.quantities)
+    assert over_time["quantity_1x"][step] == found["1x"]
+    assert len(over_time["quantity_sx"]) == 5
 
 
 def hanging(solver, level, radius):

@@ -48,6 +48,7 @@ from verify.judge.reference import (
     conforming_reference,
     exact_reference,
 )
+from verify.judge.resultants import resultants_over_time
 from verify.judge.sufficiency import sufficiency
 from verify.printable import one_line
 from verify.records import ReferenceRecord
@@ -292,7 +293,9 @@ def _measure(
         if account.lighter:
             notes["parts"] = f"{account.lighter} lighter parts are not listed"
         history = motion_history(account)
-        history |= blade_forces(scene, account) if history else {}
+        if history:
+            history |= blade_forces(scene, account)
+            history |= resultants_over_time(one.weak_form, scene.quantities)
         record = replace(record, account=history, parts=parts)
     if reference is None:
         without = _named(scene, missing)

@@ -11,6 +11,8 @@ The force in a section is that of a rigid motion of all nodes on one side of it.
 on the layer of elements that the section runs through is integrated up to the section.
 """
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,7 +38,7 @@ from verify.compare.strain_energy import stress_power, viscous_power
 from verify.compare.support_work import taken_up
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
-from verify.scene.acceptance import ReactionQuantity, SectionQuantity, StressQuantity
+from verify.scene.acceptance import Quantity, ReactionQuantity, SectionQuantity, StressQuantity
 from verify.scene.parts import Pieces, clipped
 from verify.scene.physics import factor_at
 from verify.scene.placement import on_unit_sphere
@@ -92,6 +94,16 @@ class WeakForm:
             return np.zeros(len(points), dtype=bool)
         away = cKDTree(facets.reshape(-1, points.shape[1])).query(points)[0]
         return np.asarray(away <= 10 * ROUND_OFF * self.size)
+
+    @cached_property
+    def owners(self) -> NDArray[np.int64]:
+        """Number (n, d) of the support that holds each component of each node; −1 of those free."""
+        supports = self.scene.supports
+        owners = np.full(self.solution.points.shape, -1, dtype=np.int64)
+        held = nodes_held(self.scene, self.solution, [one.where for one in supports])
+        for i, (nodes, one) in enumerate(zip(held, supports, strict=True)):
+            owners[np.ix_(nodes, list(one.held(self.scene.dimension)))] = i
+        return owners
 
     def internal(self, step: int, w: Array) -> float:
         """Power of the stresses of an output time on nodal velocities w (n, d), W."""
@@ -212,7 +224,7 @@ def reaction(form: WeakForm, asked: ReactionQuantity) -> float:
         If a load follows an exact field, or a solution in motion has no accelerations.
     """
     step = step_at(form.solution, asked.time)
-    owners = _owners(form)
+    owners = form.owners
     own = [i for i, one in enumerate(form.scene.supports) if one.where == asked.where]
     w = _extended(form, np.isin(owners, own), owners >= 0) * form.rigid(asked, step)
     force, rates = -form.loads(step), form.rates(step)
@@ -236,16 +248,6 @@ def _extended(form: WeakForm, own: Bools, held: Bools) -> Array:
     share = np.minimum(away / (_REACH * form.size), 1.0)
     smooth = (1.0 - share) ** 2 * (1.0 + 2.0 * share)
     return np.where(held, found, smooth[:, None])
-
-
-def _owners(form: WeakForm) -> NDArray[np.int64]:
-    """Give the support (n, d) that holds each component of each node; −1 of those free."""
-    supports = form.scene.supports
-    owners = np.full(form.solution.points.shape, -1, dtype=np.int64)
-    held = nodes_held(form.scene, form.solution, [one.where for one in supports])
-    for i, (nodes, one) in enumerate(zip(held, supports, strict=True)):
-        owners[np.ix_(nodes, list(one.held(form.scene.dimension)))] = i
-    return owners
 
 
 @dataclass(frozen=True)
@@ -318,7 +320,7 @@ def _check_section(form: WeakForm, beyond: Bools, rigid: Array) -> None:
         raise UnsupportedSceneError(
             "the section runs through elements that a cut meets; expected uncut material"
         )
-    bears = (_owners(form) >= 0) & (np.abs(rigid) > ROUND_OFF * np.abs(rigid).max())
+    bears = (form.owners >= 0) & (np.abs(rigid) > ROUND_OFF * np.abs(rigid).max())
     for held in np.moveaxis(bears[crossed], 2, 0):
         both = (held & beyond[crossed]).any(axis=1) & (held & ~beyond[crossed]).any(axis=1)
         if both.any():
@@ -327,6 +329,20 @@ def _check_section(form: WeakForm, beyond: Bools, rigid: Array) -> None:
                 f"the section meets a support near ({x}) m that bears a part of it; expected a "
                 "plane beside it, or a component that is not held"
             )
+
+
+def resultants_over_time(form: WeakForm, asked: Sequence[Quantity]) -> dict[str, list[float]]:
+    """Values of reactions and sections at all output times, as ``quantity_NAME``; of those had."""
+    found = {}
+    for one in asked:
+        if isinstance(one, ReactionQuantity | SectionQuantity):
+            then = [one.model_copy(update={"time": float(time)}) for time in form.solution.times]
+            with suppress(InputError, UnsupportedSceneError):
+                found[f"quantity_{one.name}"] = [
+                    reaction(form, at) if isinstance(at, ReactionQuantity) else section(form, at)
+                    for at in then
+                ]
+    return found
 
 
 def mean_stress(field: Field, law: Law, asked: StressQuantity) -> float:

@@ -96,7 +96,7 @@ def _hidden(solves: Sequence[SolveRecord]) -> dict[str, list[str]]:
 def _over_time(
     result: CaseResult, solves: Sequence[SolveRecord], hidden: dict[str, list[str]], unit: str
 ) -> Iterator[tuple[str, list[Curve], Band | None]]:
-    """Yield title, curves and band of each panel: errors, energies, their total, momenta."""
+    """Yield title, curves and band of each panel: errors, energies, forces, momenta."""
     for name, below in hidden.items():
         shown = [s for s in solves if name in s.series and s.solver not in below]
         halves = [m.uncertainty for s in shown if (m := s.metric(f"{name}_max")) is not None]
@@ -120,6 +120,9 @@ def _over_time(
     yield panel(f"change of the total energy, {unit}", _change)
     for title, name in _blade_forces(solves):
         yield panel(f"{title}, {unit.replace('J', 'N')}", partial(_part, name))
+    for metric in {m.name: m for s in solves for m in s.metrics}.values():
+        if any(f"quantity_{metric.name}" in s.account for s in solves):
+            yield panel(f"{metric.name}, {metric.unit}", partial(_part, f"quantity_{metric.name}"))
     for name, unit_ in _MOMENTA:
         yield panel(f"magnitude of the {name.replace('_', ' ')}, {unit_}", partial(_size, name))
 
