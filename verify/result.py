@@ -165,7 +165,7 @@ class SolveRecord:
     solution: str | None = None  # path of the stored solution, relative to the run directory
     # relative errors over time, by metric, with "time" in s; empty for a static scene
     series: dict[str, list[float]] = field(default_factory=dict)
-    # energies, momenta, reactions and section forces over time, by name, with "time" in s; empty for a static scene
+    # energies, momenta and asked forces over time, by name, with "time" in s; empty if static
     account: dict[str, list[float]] = field(default_factory=dict)
     # separated parts, from the top down; empty for a static scene
     parts: list[PartRecord] = field(default_factory=list)
