@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from unittest.mock import patch
 
-from command_line import run_here
+from command_line import forking, run_here
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -28,14 +28,16 @@ def commands(page):
 def run_line(line, folder, path=None):
     """Run a command line in a folder, where `path` (default the folder) is on the search path.
 
-    `verify` runs in this process, unless it is to find a package that is installed in the folder.
+    `verify` runs in this process, unless it is to find a package that is installed in the folder;
+    guests that it finds there run in processes forked from its server.
     """
     path = path or folder
     command, _, target = line.partition(" > ")
     first, *words = shlex.split(command)
     environment = {"PYTHONPATH": os.pathsep.join([str(path), str(ROOT), *_given()])}
     if first == "verify" and not list(folder.glob("*.dist-info")):
-        with patch.object(sys, "path", [str(path), *sys.path]):
+        beside = path == folder  # where a forked process looks, too
+        with patch.object(sys, "path", [str(path), *sys.path]), forking(lambda _: beside):
             done = run_here(words, folder, environment)
         for name in {file.stem for file in path.glob("*.py")}:
             sys.modules.pop(name, None)

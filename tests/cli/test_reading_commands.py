@@ -17,7 +17,7 @@ from verify.cli import build_parser, main, progress
 from verify.cli.progress import Waiting, said_to_wait
 from verify.cli.run import of_one_solver, of_solvers
 from verify.cli.streams import print_line, printable_streams
-from verify.scene import list_cases, load_scene
+from verify.scene import list_cases
 
 COMMANDS = ("list", "describe", "run", "report", "check", "schema")
 SCENES = {scene.name: scene for rows in catalogue().values() for scene in rows}
@@ -64,7 +64,7 @@ def test_list_wraps_at_the_width_of_the_terminal(capsys, monkeypatch):
 def test_describe_says_the_requirement_and_every_check(case, capsys):
     assert main(["describe", case]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    scene = load_scene(case)
+    scene = SCENES[case]
     assert scene.requirement in text
     for check in scene.acceptance:
         assert f"{check.metric} of {check.solver or 'each solver'}" in text

@@ -7,17 +7,15 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from unittest.mock import patch
 
 import pytest
 from case_texts import STRETCHED, body_text
-from command_line import run_here
-
-from verify.runner import engines, loading
-from verify.solvers.interface import is_built_in
+from command_line import forking, run_here
 
 HERE = Path(__file__).parent
-HARMLESS = [f"fake_solvers:{name}" for name in ("Instant", "Other", "Wrong", "HangingOnLevelOne")]
+HARMLESS = {f"fake_solvers:{name}" for name in (
+    "Instant", "Other", "Wrong", "Straining", "Frozen", "Refusing", "Raising", "HangingOnLevelOne",
+)}  # fmt: skip
 
 CASE = (
     'tags = ["stretched"]\n'
@@ -64,10 +62,7 @@ class CommandLine:
             return subprocess.CompletedProcess(arguments, process.returncode, out, err)
         if arguments[0] == "run":
             arguments = (*arguments, "--no-report")
-        with (
-            patch.object(engines, "is_built_in", forked),
-            patch.object(loading, "is_built_in", forked),
-        ):
+        with forking(HARMLESS.__contains__):
             return run_here(arguments, self.folder, {**self.environment, **environment})
 
     def records(self, out="out"):
@@ -75,11 +70,6 @@ class CommandLine:
         files = (self.folder / out).glob("cases/*/*/record.json")
         records = [json.loads(file.read_text())["record"] for file in files]
         return {(r["solver"].removeprefix("fake_solvers:"), r["level"]): r for r in records}
-
-
-def forked(name):
-    """Whether the solver is run as the own ones are."""
-    return is_built_in(name) or name in HARMLESS
 
 
 @pytest.fixture

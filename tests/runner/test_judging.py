@@ -212,10 +212,8 @@ def test_lips_are_compared_with_their_own_side_however_slender_the_cells() -> No
         assert nodal_error(own, SolutionField(other)).max() <= 1e-12
 
 
-def note(case, solver, folder):
-    scene = load_scene(case)
-    content = scene_content(scene)
-    job = {"scene": content, "solver": solver, "level": 0, "repetitions": 1,
+def note(scene, solver, folder):
+    job = {"scene": scene_content(scene), "solver": solver, "level": 0, "repetitions": 1,
            "parameters": {}}  # fmt: skip
     outcome = solve_job(job, folder, store=False)
     assert outcome["status"] == "solved", outcome
@@ -224,13 +222,14 @@ def note(case, solver, folder):
 
 def test_every_rival_of_a_motion_says_its_critical_step(tmp_path):
     """Subdivision makes slivers elements of their own: its step is shorter; springs have none."""
+    scene = load_scene("cutting/plate_crossed_quick")
     steps = {
-        name: float(note("cutting/plate_crossed_quick", name, tmp_path).removesuffix(" s"))
+        name: float(note(scene, name, tmp_path).removesuffix(" s"))
         for name in ("xfem", "conforming", "subdivision")
     }
     assert 0.0 < steps["subdivision"] < 0.9 * steps["xfem"]
     assert steps["conforming"] > 0.0
-    assert "springs" in note("cutting/plate_crossed_quick", "mass_spring", tmp_path)
+    assert "springs" in note(scene, "mass_spring", tmp_path)
 
 
 def test_a_scene_at_rest_has_no_critical_step(tmp_path):
