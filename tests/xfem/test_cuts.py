@@ -1,6 +1,7 @@
 """Geometry of cuts: level sets, sweeps of a tool, nearest facets, areas of thin triangles."""
 
 from fractions import Fraction
+from itertools import pairwise
 from math import isqrt
 
 import numpy as np
@@ -15,6 +16,7 @@ from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.surfaces import SurfaceCollider
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
+from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh
@@ -35,6 +37,43 @@ def test_the_left_side_is_positive_at_a_sharp_kink_too():
     at = np.array([[-0.9, 0.1], [-0.9, -0.1], [0.5, 0.0], [0.1, 0.4], [-0.5, 0.3]])
     assert np.sign(kink.level_set(at)).tolist() == [1, -1, -1, -1, -1]
     assert kink.level_set(np.array([[0.5, 0.0]])) == pytest.approx([-0.5])
+
+
+def _first_meeting(points):
+    """First pair of segments, not neighbours, that meet: in whole numbers, each with each."""
+
+    def side(a, b, x):
+        return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0])
+
+    def between(a, b, x):
+        return all(min(p, q) <= y <= max(p, q) for p, q, y in zip(a, b, x, strict=True))
+
+    segments = list(pairwise(points))
+    for i, (a, b) in enumerate(segments):
+        for j, (c, d) in enumerate(segments[i + 2 :], i + 2):
+            sides = side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)
+            crossing = sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0
+            ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+            if crossing or any(s == 0 and between(*e) for s, e in zip(sides, ends, strict=True)):
+                return i, j
+    return None
+
+
+def test_a_polyline_that_meets_itself_is_refused_with_its_first_pair_of_segments():
+    rng, met = np.random.default_rng(3), 0
+    for _ in range(200):
+        points = rng.integers(0, 12, (int(rng.integers(3, 7)), 2)).tolist()
+        pair = _first_meeting(points)
+        said = ""
+        try:
+            Polyline(points)
+        except XfemError as error:
+            said = str(error)
+        if "length" not in said and "turns back" not in said:
+            assert said.startswith("segments {} and {}".format(*pair) if pair else "")
+            assert (said == "") == (pair is None)
+            met += pair is not None
+    assert met > 30
 
 
 def test_a_circle_of_segments_is_the_distance_to_the_circle_up_to_its_sagitta():

@@ -319,32 +319,51 @@ def _check_segments(vertices: Floats, closed: bool) -> None:
     back = (t[: len(following)] * following).sum(axis=1) < -1.0 + 1e-12
     if back.any():
         raise XfemError(f"the polyline turns back on itself at vertex {int(back.argmax()) + 1}")
-    pair = _first_intersection(starts, segments, closed)
-    if pair is not None:
-        raise XfemError(f"segments {pair[0]} and {pair[1]} of the polyline intersect")
+    low = np.minimum(starts, starts + segments)
+    axis = int(np.ptp(low, axis=0).argmax())
+    order = np.argsort(low[:, axis])
+    first, second = _first_intersection(starts, starts + segments, axis, order, closed)
+    if first < len(starts):
+        raise XfemError(f"segments {first} and {second} of the polyline intersect")
 
 
-def _first_intersection(starts: Floats, segments: Floats, closed: bool) -> tuple[int, int] | None:
-    """First pair of segments, not neighbours, that have a point in common."""
+@njit(cache=True)
+def _first_intersection(starts, ends, axis, order, closed):
+    """First pair of segments, not neighbours, that have a point in common; their number if none.
+
+    Segments come in the `order` in which they begin along the axis: each is held against those
+    that begin before its end.
+    """
     count = len(starts)
-    ends = starts + segments
-    for i in range(count - 2):
-        others = slice(i + 2, count - 1 if closed and i == 0 else count)
-        side_a = _cross(segments[i], starts[others] - starts[i])
-        side_b = _cross(segments[i], ends[others] - starts[i])
-        side_c = _cross(segments[others], starts[i] - starts[others])
-        side_d = _cross(segments[others], ends[i] - starts[others])
-        low_i, high_i = np.minimum(starts[i], ends[i]), np.maximum(starts[i], ends[i])
-        low, high = np.minimum(starts, ends)[others], np.maximum(starts, ends)[others]
-        boxes = ((low <= high_i) & (low_i <= high)).all(axis=1)
-        meet = boxes & (side_a * side_b <= 0.0) & (side_c * side_d <= 0.0)
-        if meet.any():
-            return i, i + 2 + int(meet.argmax())
-    return None
+    found = count, count
+    for a in range(count):
+        i = order[a]
+        end = max(starts[i, axis], ends[i, axis])
+        for b in range(a + 1, count):
+            j = order[b]
+            if min(starts[j, axis], ends[j, axis]) > end:
+                break
+            p, q = min(i, j), max(i, j)
+            if q - p < 2 or (closed and p == 0 and q == count - 1) or (p, q) >= found:
+                continue
+            other = 1 - axis
+            if max(starts[i, other], ends[i, other]) < min(starts[j, other], ends[j, other]):
+                continue
+            if max(starts[j, other], ends[j, other]) < min(starts[i, other], ends[i, other]):
+                continue
+            # the ends of each lie on both sides of the other
+            if (
+                _side(starts[p], ends[p], starts[q]) * _side(starts[p], ends[p], ends[q]) <= 0.0
+                and _side(starts[q], ends[q], starts[p]) * _side(starts[q], ends[q], ends[p]) <= 0.0
+            ):
+                found = p, q
+    return found
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+@njit(cache=True)
+def _side(a, b, x):
+    """Twice the area of the triangle a b x, positive on the left of a b."""
+    return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0])
 
 
 @dataclass(frozen=True)
