@@ -126,8 +126,8 @@ SOLVERS = {
 def test_solvers_on_the_strip(case, speed, name):
     """The swept rule has less than the error of late openings, and takes what it can of G.
 
-    What the lattice radiates does not depend on h (blade_strip_06); a part of a strip at 17° to
-    the lines of a mesh has 5 and 11 elements of advance.
+    What the lattice radiates depends on the speed and the mass. A part of a strip at 17° to the
+    lines of a mesh has 10 and 20 elements of advance.
     """
     solver, parameters = SOLVERS[name]
     if solver == "conforming":
@@ -140,5 +140,6 @@ def test_solvers_on_the_strip(case, speed, name):
         print(f"{case} | {speed} | {name} | {rule} |", " | ".join(columns))
     assert swept[1][0] < 0.6 * late[1][0]
     assert swept[1][0] < 0.7 * swept[0][0]
-    if (speed <= 0.6 and parameters.get("mass") == "consistent") or solver == "conforming":
+    consistent = solver == "conforming" or parameters.get("mass") == "consistent"
+    if consistent and speed <= 0.6 and case == "blade_strip_06":
         assert swept[1][3] == pytest.approx(1.0, abs=0.08)
