@@ -370,7 +370,7 @@ class EmbeddedSurface:
 
     def _values(self, vertices: Ints) -> tuple[Ints, Floats]:
         """Cuts between vertices, or through one, and their realised level sets (q, cuts) there."""
-        strokes = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
+        strokes = [stroke for stroke in self._cutter.strokes if stroke.has_begun]
         cells, at = self._cutter.mesh.cells[self._vertex_cell[vertices]], self._vertex_at[vertices]
         nodes = distinct(cells)
         numbers, columns = [], []
@@ -378,8 +378,9 @@ class EmbeddedSurface:
             stroke.level_sets(nodes)
             values = (at * stroke.values[cells]).sum(axis=1)
             values[np.abs(values) <= self._snap] = 0.0
-            # the last stroke may still be led elsewhere: what it met before is asked again
-            if ((values >= 0.0).any() and (values <= 0.0).any()) or stroke is strokes[-1]:
+            # one that may still be led elsewhere: what it met before is asked again
+            led = stroke is strokes[-1] and stroke.opens is None
+            if led or ((values >= 0.0).any() and (values <= 0.0).any()):
                 numbers.append(stroke.number)
                 columns.append(values)
         found = np.stack(columns, axis=1) if columns else np.empty((len(vertices), 0))

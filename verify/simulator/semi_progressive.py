@@ -120,9 +120,15 @@ class Stroke:
     def open_ahead(self, opens: Floats, alike: "Stroke") -> None:
         """Open cells at given times (m,), in s, from now on; `alike` has gone the whole way."""
         self.opens, self.front = opens, alike.front
+        self._first = float(np.nanmin(opens, initial=np.inf))
         self.near, self.entry, self.leave = alike.near, alike.entry, alike.leave
         self.values = alike.values
         self._strokes_near += self.near
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the stroke may have split anything by now."""
+        return self.front >= 0.0 if self.opens is None else self._time >= self._first
 
     def open_cells(self, cells: Ints) -> Bools:
         """Whether the stroke may split each of some cells by now."""
