@@ -53,7 +53,7 @@ class OnePassTetrahedra:
         batches = -(-count // BATCH)
         corner = np.argsort(elements.cells, axis=1)
         nodes = np.take_along_axis(elements.cells, corner, axis=1)
-        cells = np.lexsort(nodes.T[::-1])
+        cells = np.argsort(nodes[:, 0] << 32 | nodes[:, 1], kind="stable")
         whole = count // _WINDOW * _WINDOW
         windows = cells[:whole].reshape(-1, BATCH, _WINDOW // BATCH)
         cells[:whole] = windows.transpose(0, 2, 1).ravel()
@@ -73,9 +73,10 @@ class OnePassTetrahedra:
         constants[:count, 10] = elements.volumes[cells] * elements.mu[parent]
         self._constants = _by_batch(constants)
         # cells after which nothing is added to a row any more
-        ends = np.searchsorted(np.sort(nodes[:, 0]), np.arange(pattern.node_count), "right")
+        ends = np.cumsum(np.bincount(nodes[:, 0], minlength=pattern.node_count))
         self._ends = np.minimum(-(-ends // _WINDOW) * _WINDOW, batches * BATCH)
-        self._quaternions = _by_batch(np.tile([1.0, 0.0, 0.0, 0.0], (batches * BATCH, 1)))
+        self._quaternions = np.zeros((batches, 4 * BATCH))
+        self._quaternions[:, :BATCH] = 1.0
         self._first = self._quaternions  # at the start of a step, once one is averaged
         self._at = np.full((2, pattern.node_count, 3), np.nan)  # of which both are the rotations
         self._irregular = np.zeros(batches * BATCH, dtype=np.bool_)

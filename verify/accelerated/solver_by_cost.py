@@ -63,10 +63,20 @@ class SolverByCost(LinearSolver):
         self._blocks: Floats | None = None
         self._iterative = ConjugateGradients(pattern, block, tolerance, _MANY)
         self.is_iterative = pattern.node_count > _FEW_NODES
-        self._is_large = solid and pattern.node_count >= _LARGE
+        self._waits = solid and pattern.node_count >= _LARGE
         self._matrices, self._is_analysed = 0, False
         if not self.is_iterative:
             self._analyse()
+
+    def learn(self, former: LinearSolver) -> None:
+        """Iterate as often as a former one was allowed to, or factorise at once if it did so."""
+        if not self.is_iterative or not isinstance(former, SolverByCost):
+            return
+        self._iterative.limit = former._iterative.limit
+        self._waits |= former._waits or former._is_analysed
+        if not former.is_iterative:
+            self._analyse()
+            self.is_iterative = self._direct is None
 
     @property
     def reads_half(self) -> bool:  # type: ignore[override]
@@ -96,7 +106,7 @@ class SolverByCost(LinearSolver):
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix; see `LinearSolver`. Whoever has only one is spared the analysis."""
         self._blocks, self._matrices = blocks, self._matrices + 1
-        if self._matrices == 2 and not (self._is_analysed or self._is_large):
+        if self._matrices == 2 and not (self._is_analysed or self._waits):
             self._analyse()
         if self.is_iterative:
             self._iterative.factorize(blocks)

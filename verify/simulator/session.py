@@ -333,7 +333,8 @@ class Session:
         if self._ways is not None:
             with self._timed("assembly"):
                 fading = self._ways.fading(self.phantom.node_parent, self.stage.time_step)
-                acceleration = acceleration_at_corners(body, before)
+                parted = body.near(source[np.flatnonzero(np.bincount(source)[source] > 1)])
+                acceleration = acceleration_at_corners(parted, before)
                 self.body.tie = tie_forces(
                     body, before, acceleration, self.body, source, fading, parting_cuts
                 )

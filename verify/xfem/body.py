@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from verify.xfem.arrays import Bools, Floats, check_floats, finite_array
+from verify.xfem.arrays import Bools, Floats, Ints, check_floats, finite_array
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import Configuration, InternalForce
 from verify.xfem.linear_solvers import LinearSolver
@@ -202,6 +202,12 @@ class DynamicBody:
         """
         other = copy(self)
         other._hold(supports)
+        return other
+
+    def near(self, nodes: Ints) -> "DynamicBody":
+        """Return a body whose forces are right at some dof nodes alone; see `InternalForce.near`."""
+        other = copy(self)
+        other.__dict__["force"] = self.force.near(nodes)
         return other
 
     def _hold(self, supports: Supports | MovingSupports) -> None:

@@ -9,6 +9,7 @@ What is in or behind `has_one_pass` runs with accelerated kernels only: never wi
 """
 
 from collections.abc import Callable
+from copy import copy
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -162,6 +163,22 @@ class InternalForce:
     def couplings(self) -> Ints | None:
         """(k, 2) dof nodes that the penalty alone couples, if there is one."""
         return None if self.ghost is None else self.ghost.couplings
+
+    def near(self, nodes: Ints) -> "InternalForce":
+        """Return the force of the cells at some dof nodes (k,): right there, and nowhere else.
+
+        Where cells are aggregated or faces penalised, forces come from farther off: it is all, as
+        it is of springs.
+        """
+        if self.phantom.aggregation is not None or self.ghost is not None or not self.has_stress:
+            return self
+        wanted = np.zeros(self._shape[0], dtype=bool)
+        wanted[nodes] = True
+        some = np.flatnonzero(wanted[self.phantom.cells].any(axis=1))
+        part = copy(self)
+        part.elements = self.elements.part(some)
+        part._unturned, part._quaternions = self._unturned[some], self._quaternions[some]
+        return part
 
     def configuration(self, displacement: Floats) -> Configuration:
         """Deformation gradients and rotations at a displacement (N, d)."""

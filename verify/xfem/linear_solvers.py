@@ -40,6 +40,9 @@ class LinearSolver(Protocol):
     reads_half: bool = False
     tolerance: float = 0.0
 
+    def learn(self, former: "LinearSolver") -> None:
+        """Take over what one of nearly the same matrices has found out about their cost."""
+
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks (B, d, d), kept by reference.
 

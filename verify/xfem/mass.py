@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from verify.xfem.arrays import Floats, Ints, finite_array
@@ -163,7 +163,8 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     corners = phantom.cells.shape[1]
     share = phantom.volumes * cell_densities(phantom.mesh, density)[phantom.parent] / corners
     weights = np.bincount(phantom.cells.ravel(), np.repeat(share, corners))
-    matrix, root = (csr_array(diags_array(x)) for x in (weights, 1.0 / np.sqrt(weights)))
+    every = np.arange(len(weights) + 1, dtype=np.int32)
+    matrix, root = (csr_array((x, every[:-1], every)) for x in (weights, 1.0 / np.sqrt(weights)))
     return Mass(matrix, root, weights)
 
 

@@ -12,8 +12,6 @@ from math import factorial
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.arrays import Bools, Floats, Ints, finite_array, index_array
 from verify.xfem.errors import XfemError
@@ -220,8 +218,30 @@ def equal_rows(rows: Ints) -> tuple[Ints, Ints]:
 
 def connected(count: int, first: Ints, second: Ints) -> Ints:
     """(count,) component of each node of a graph with edges from `first` (q,) to `second` (q,)."""
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    found = np.arange(count)
+    _connect(found, *(np.ascontiguousarray(ends, dtype=np.int64) for ends in (first, second)))
+    return found
+
+
+@njit(cache=True)
+def _connect(root, first, second):
+    """Number the components in place; `root` leads from each node to a smaller one of its own."""
+    for k in range(len(first)):
+        one, other = first[k], second[k]
+        while root[one] != one:
+            root[one] = root[root[one]]
+            one = root[one]
+        while root[other] != other:
+            root[other] = root[root[other]]
+            other = root[other]
+        root[max(one, other)] = min(one, other)
+    count = 0
+    for node in range(len(root)):
+        if root[node] == node:
+            root[node] = count
+            count += 1
+        else:
+            root[node] = root[root[node]]
 
 
 def neighbours_across(cells: Ints) -> Ints:

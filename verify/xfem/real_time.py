@@ -131,6 +131,7 @@ class RealTimeEuler:
             Its dof node from which each one here descends.
         """
         self._changes = [change[source] for change in other._changes]
+        self.solver.learn(other.solver)
 
     def linearise(self, state: MotionState, whole: bool = True) -> Configuration | None:
         """Write M + hC + h²K, or its upper half, into `blocks`, the right-hand side into `load`.

@@ -13,7 +13,7 @@ are no part of r: what another space makes of them is not the cut's, and not hel
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -71,7 +71,10 @@ class Release:
         row = place[source[nodes]]
         share = weights[nodes] / np.bincount(row, weights[nodes], len(left))[row]
         forces = share[:, None] * self.forces[row]
-        return Release(nodes, forces, _Rows(self.factor, row), self.cut[row])
+        factor = _Rows(self.factor, row)
+        if isinstance(self.factor, _Rows):
+            factor = _Rows(self.factor.factor, self.factor.row[row])
+        return Release(nodes, forces, factor, self.cut[row])
 
 
 @dataclass(frozen=True)
@@ -98,17 +101,28 @@ class TieForces:
 
     phantom: PhantomMesh
     releases: tuple[Release, ...]
+    _known: dict[float, list[Floats]] = field(default_factory=dict, repr=False, compare=False)
+
+    def _factors(self, time: float) -> list[Floats]:
+        """Give the factors of each release; those of one time, asked for again and again, once."""
+        if time not in self._known:
+            self._known.clear()
+            self._known[time] = [one.factor(time) for one in self.releases]
+        return self._known[time]
 
     def __call__(self, time: float) -> Floats:
         """Sum the forces at a time."""
         total = np.zeros((self.phantom.corners.node_count, self.phantom.mesh.space))
-        for one in self.releases:
-            total[one.nodes] += one.factor(time)[:, None] * one.forces
+        for one, factor in zip(self.releases, self._factors(time), strict=True):
+            total[one.nodes] += factor[:, None] * one.forces
         return self.phantom.restrict(total)
 
     def still(self, time: float) -> "TieForces | None":
         """Give what holds anything at a time or later; None if nothing does."""
-        releases = tuple(one for one in self.releases if one.factor(time).any())
+        pairs = zip(self.releases, self._factors(time), strict=True)
+        releases = tuple(one for one, factor in pairs if factor.any())
+        if len(releases) == len(self.releases):
+            return self
         return TieForces(self.phantom, releases) if releases else None
 
     def work_by_cut(self, change: Floats, time: float, cuts: int) -> Floats:
@@ -124,9 +138,9 @@ class TieForces:
             Number of cuts.
         """
         taken, change = np.zeros(cuts), self.phantom.extend(change)
-        for one in self.releases:
+        for one, factor in zip(self.releases, self._factors(time), strict=True):
             done = (change[one.nodes] * one.forces).sum(axis=1)
-            taken -= np.bincount(one.cut, one.factor(time) * done, cuts)
+            taken -= np.bincount(one.cut, factor * done, cuts)
         return taken
 
 
@@ -177,7 +191,7 @@ def tie_forces(
     nodes = np.flatnonzero(np.bincount(source, minlength=old.shape[0])[source] > 1)
     if len(nodes):
         inherited = MotionState(state.displacement[source], state.velocity[source], time)
-        forces = new.mass.apply(acceleration[source]) + _resisting(new, inherited)
+        forces = new.mass.apply(acceleration[source]) + _resisting(new.near(nodes), inherited)
         forces -= TieForces(phantom, releases)(time)
         spread = _balance(forces, nodes, source, new.fixed | old.fixed[source], weights)
         forces[new.fixed] = 0.0
