@@ -248,6 +248,9 @@ def test_what_it_takes_depends_on_the_size_the_shape_and_the_step(divisions, ste
     for _ in range(3):
         scheme.advance(state)
     assert scheme.solver.is_iterative == iterates
+    after = RealTimeEuler(body, step)  # as after a cut: what was found is not found again
+    after.follow(scheme, np.arange(body.shape[0]))
+    assert after.solver.is_iterative == iterates
     same, other = RealTimeEuler(body, step, solver=_cholesky(body)), body.rest()
     for _ in range(3):
         same.advance(other)

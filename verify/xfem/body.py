@@ -205,7 +205,7 @@ class DynamicBody:
         return other
 
     def near(self, nodes: Ints) -> "DynamicBody":
-        """Return a body whose forces are right at some dof nodes alone; see `InternalForce.near`."""
+        """Return a body whose forces are right at some dof nodes; see `InternalForce.near`."""
         other = copy(self)
         other.__dict__["force"] = self.force.near(nodes)
         return other

@@ -225,7 +225,7 @@ def connected(count: int, first: Ints, second: Ints) -> Ints:
 
 @njit(cache=True)
 def _connect(root, first, second):
-    """Number the components in place; `root` leads from each node to a smaller one of its own."""
+    """Join components, then number them; `root` leads from a node to a smaller one of its own."""
     for k in range(len(first)):
         one, other = first[k], second[k]
         while root[one] != one:
