@@ -42,6 +42,7 @@ class LinearSolver(Protocol):
 
     def learn(self, former: "LinearSolver") -> None:
         """Take over what one of nearly the same matrices has found out about their cost."""
+        return
 
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks (B, d, d), kept by reference.
