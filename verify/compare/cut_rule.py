@@ -14,7 +14,7 @@ from verify.compare.membrane_body import MembraneBody, SurfaceLines
 from verify.compare.sides import nearest_segments
 from verify.compare.simplices import divide, measures, points_in, split_at_level
 from verify.compare.solid import SolidBody
-from verify.geometry.patches import Patch
+from verify.geometry.patches import Patch, PlanePatch
 
 Array = NDArray[np.float64]
 
@@ -180,6 +180,7 @@ def _beside(
 # Where the border of the body is not straight in a patch's parameters, cells on it are halved
 # down to this share of the spacing, and their points outside left out.
 _BORDER = 1 / 16
+_THIN = 1e-12  # of the body: what is as close to a plane is on it
 _SURFACE_ORDER = 2  # of the rule in each triangle, see `simplex_rule`
 
 
@@ -197,7 +198,7 @@ def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutR
     Returns
     -------
     CutRule
-        Exact areas for plane polygons in a box; else to the last cells on the body's surface.
+        Exact areas for plane polygons; else to the last cells on the body's surface.
     """
     found = []
     for patch in body.patches:
@@ -205,8 +206,8 @@ def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutR
         uv, weights = points_in(cells, _SURFACE_ORDER)
         away = np.repeat(np.maximum(1e-3 * sizes, AWAY * body.size), len(uv) // max(len(cells), 1))
         points = patch.point(uv)
-        kept = body.inside(points)
-        if body.box is None or not patch.plane:
+        if not patch.plane:
+            kept = body.inside(points)
             uv, weights, away, points = uv[kept], weights[kept], away[kept], points[kept]
         weights = weights * patch.stretch(uv)
         found.append(CutRule.beside(points, weights, patch.normal(uv), away))
@@ -242,17 +243,16 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(sides.max(axis=1))
 
-    cells = patch.cells
+    cells, border = patch.cells, np.inf if patch.plane else _BORDER * spacing
     if body.box is not None and patch.plane:
         for axis, end, sign in _faces(body.box):
             face = _depth_below(patch, axis, end, sign)
             cells, side = split_at_level(cells, face)
             cells = cells[side > 0]
-    if body.box is not None and patch.plane:
+    elif isinstance(patch, PlanePatch):
+        cells = _sections(patch, body)
+    if patch.plane:
         cells = cells[measures(cells) > 0.0]
-        border = np.inf
-    else:
-        border = _BORDER * spacing
 
     lower, upper = body.corners.min(axis=(0, 1)), body.corners.max(axis=(0, 1))
 
@@ -280,6 +280,33 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
 
     cells = divide(cells, wanted)
     return cells, size(cells)
+
+
+def _sections(patch: PlanePatch, body: SolidBody) -> Array:
+    """Triangles (m, 3, 2) of a plane patch's parameters, one or two in each tetrahedron on it."""
+    thin = _THIN * body.size
+    levels = patch.level(body.corners.reshape(-1, 3)).reshape(-1, 4)
+    crossed = body.corners[(levels.max(axis=1) > thin) & (levels.min(axis=1) <= thin)]
+    halves, side = split_at_level(crossed, patch.level)
+    halves = halves[side > 0]
+    levels = patch.level(halves.reshape(-1, 3)).reshape(-1, 4)
+    order = np.argsort(levels, axis=1)
+    on = (np.sort(levels, axis=1)[:, :3] <= thin).all(axis=1) & (levels.max(axis=1) > thin)
+    faces = np.take_along_axis(halves[on], order[on, :3, None], axis=1)
+    flat = (faces - patch.origin) @ patch.axes[:2].T
+    found = [flat[:0]]
+    for triangle in patch.cells:
+        beside = (flat.max(axis=1) < triangle.min(axis=0)) | (
+            flat.min(axis=1) > triangle.max(axis=0)
+        )
+        inner = flat[~beside.any(axis=1)]
+        turn = np.sign(np.linalg.det(triangle[1:] - triangle[0]))
+        for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+            inward = turn * np.array([a[1] - b[1], b[0] - a[0]])
+            inner, inside = split_at_level(inner, lambda uv, a=a, n=inward: (uv - a) @ n)
+            inner = inner[inside > 0]
+        found.append(inner)
+    return np.concatenate(found)
 
 
 def _faces(box: Array) -> list[tuple[int, float, float]]:
