@@ -28,6 +28,7 @@ from reference.loads import load_form
 from reference.nodal_algebra import assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
+from verify.geometry.spatial import measures
 from verify.scene import Material, Scene
 
 # Poisson's ratio from which the pressure pays, measured: docs/theory/reference.md
@@ -152,17 +153,14 @@ def solve_linear(
 
 def _unknowns_of_flat_cells(matrix: Any, space: ConformingSpace) -> NDArray[np.int32]:
     """Unknowns of this process, by their numbers in the matrix, of nodes of cells that are flat."""
-    function_space = space.function_space
-    mesh = function_space.mesh
-    corners = mesh.geometry.x[mesh.geometry.dofmap]
-    edges = corners[:, 1:] - corners[:, :1]
+    corners = space.mesh.points[space.mesh.cells]
     lengths = [
-        np.linalg.norm(edges[:, i] - edges[:, j], axis=1) for i in range(3) for j in range(i)
+        np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i in range(4) for j in range(i)
     ]
-    longest = np.max([*lengths, *np.linalg.norm(edges, axis=2).T], axis=0)
-    flat = np.abs(np.linalg.det(edges)) / 6.0 < _FLAT * longest**3
-    nodes = np.unique(function_space.dofmap.list[: len(flat)][flat])
-    nodes = nodes[nodes < space.owned]
+    flat = measures(corners) < _FLAT * np.max(lengths, axis=0) ** 3
+    touched = np.zeros(len(space.node_points), dtype=bool)
+    touched[space.cell_nodes[flat]] = True
+    nodes = np.flatnonzero(touched[space.node_of_dof[: space.owned]])
     first, d = matrix.getOwnershipRange()[0], space.dimension
     return np.asarray(first + d * nodes[:, None] + np.arange(d), dtype=np.int32).ravel()
 

@@ -13,6 +13,7 @@ Kind = Literal["definite", "symmetric", "general"]  # the first two are symmetri
 LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
 _RUNS = 6
+_MOST_FLAT = 0.5  # of the unknowns: a body all of flat cells is thin, and no cut has made them
 _ROUND_OFFS = 4.0  # a row has some tens of entries: 1.1 to 3 were measured on thin strips
 _GAMG = {
     "pc_type": "gamg",
@@ -213,10 +214,11 @@ def solve_by_multigrid(
     solver.setOperators(matrix)
     solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)  # type: ignore[attr-defined]
     solver.setType("cg")
-    if matrix.comm.tompi4py().allreduce(0 if flat is None else len(flat)):
+    own = np.zeros(0, dtype=np.int32) if flat is None else flat
+    if 0 < matrix.comm.tompi4py().allreduce(len(own)) < _MOST_FLAT * matrix.getSize()[0]:
         conditioner: Any = solver.getPC()
         conditioner.setType("python")
-        conditioner.setPythonContext(_CyclesBetweenFlatCells(matrix, flat))
+        conditioner.setPythonContext(_CyclesBetweenFlatCells(matrix, own))
     else:
         set_multigrid(solver)
         solver.setType("cg")
@@ -236,12 +238,11 @@ def solve_by_multigrid(
 class _CyclesBetweenFlatCells:
     """Preconditioner of PETSc: flat cells directly, a cycle of GAMG, flat cells directly."""
 
-    def __init__(self, matrix: Any, flat: NDArray[np.int32] | None) -> None:
+    def __init__(self, matrix: Any, flat: NDArray[np.int32]) -> None:
         from petsc4py import PETSc
 
-        own = np.zeros(0, dtype=np.int32) if flat is None else flat
         self._matrix = matrix
-        self._rows = PETSc.IS().createGeneral(own, comm=matrix.comm)
+        self._rows = PETSc.IS().createGeneral(flat, comm=matrix.comm)
         self._block = matrix.createSubMatrix(self._rows, self._rows)
         self._direct = factorised(self._block)
         self._cycle = PETSc.KSP().create(matrix.comm)
