@@ -1,4 +1,3 @@
-
 import numpy as np
 import pytest
 from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
