@@ -10,6 +10,7 @@ from verify.compare.hooke import law_of
 from verify.compare.strain_energy import strain_energy
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.adequacy import adequacy_notice, other_scene
+from verify.judge.changed_scenes import coarsest, on_one_level
 from verify.result import NoticeKind, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
@@ -75,3 +76,12 @@ def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
     assert other_scene(moving, "motion").analysis.kind == "static"
     with pytest.raises(ValidationError, match="dynamic"):
         scene(adequacy={"motion": True})
+
+
+@pytest.mark.parametrize(("key", "levels"), [
+    ("sizes", [0.2, 0.1, 0.05]), ("cells", [[2, 1], [4, 2], [8, 4]]),
+])  # fmt: skip
+def test_levels_are_chosen_whether_a_case_gives_sizes_or_cells(key, levels) -> None:
+    one = scene(mesh={key: levels})
+    for chosen, kept in ((on_one_level(one, 1), levels[1:2]), (coarsest(one, 2), levels[:2])):
+        assert list(map(list if key == "cells" else float, getattr(chosen.mesh, key))) == kept

@@ -95,6 +95,16 @@ def test_profiles_hold_both_parts_of_the_jump_with_the_band_of_the_reference(tmp
     assert profile.curves[1].normal_band == []
 
 
+@pytest.mark.parametrize("fall", [4.0, 8.0])
+def test_the_band_of_a_jump_believes_no_order_above_two(tmp_path, fall):
+    """Two, for a normal distribution around the place, times what order two leaves of it: d/3."""
+    off = [4e-3 / fall**k for k in range(3)]
+    own = {k: moved((0.02 + off[k]) * normal(2), 4 + k, k, size=0.25 / 2**k) for k in range(3)}
+    (profile,) = examined(scene(tmp_path), {"xfem": {0: own[0]}, "reference": own}).openings
+    band = np.array(profile.curves[0].normal_band)
+    assert band == pytest.approx(2.0 * (off[1] - off[2]) / 3.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("shift", [0.02 * normal(2), 0.1 * ALONG, 0.0 * ALONG])
 def test_what_opens_slides_or_stays_does_not_warn(tmp_path, shift):
     result = examined(scene(tmp_path), {"xfem": {0: moved(shift)}, "reference": levels(shift)})

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import permutations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -320,6 +321,19 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field_and_found_at
     assert [exact_intensity(scene, exact, q) for q in scene.quantities] == pytest.approx(
         [1.0, 0.6, -0.8, released]
     )
+
+
+def test_means_with_hats_become_the_factor_at_the_middle_of_a_quadratic(
+    monkeypatch,
+):
+    """The mean of a + b s + c s² with a hat of half-width w is that at its middle and c w²/6."""
+    scene = straight(4, {"mode": "I"})
+    a, b, c, w = 1.3, 0.7, -2.1, 0.4
+    means = a + b * w * np.arange(-1, 2) + c * w**2 * (np.arange(-1, 2) ** 2 + 1 / 6)
+    found = SimpleNamespace(modes=np.column_stack([means] * 3), release=means)
+    monkeypatch.setattr(fracture, "front_intensity", lambda *_, **__: found)
+    factor = solution_intensity(scene, sampled(scene, 4), scene.quantities[0])
+    assert factor == pytest.approx(a, rel=1e-12)
 
 
 def test_a_polygon_whose_faces_bear_a_shear_has_the_factors_of_the_field_that_frees_them():
