@@ -12,6 +12,7 @@ s = 2 or 3 dimensions. Its nearest point is given by barycentric weights that ar
 corners that do not take part, so that face, edge and vertex are told apart without a tolerance.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -101,25 +102,64 @@ def nearest_on_facet(x, corners, weights):
 
 
 @njit(cache=True)
-def _nearest(points, facets):
-    """Nearest of the facets (f, k, s) to points (n, s), weights (n, k), squared distances (n,)."""
-    count, size, space = facets.shape
-    facet, square = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
-    found, weights = np.zeros((len(points), size)), np.empty(size)
+def _nearest(x, facets, weights, found):
+    """Nearest of facets (f, k, s) to x (s,), squared distance; its weights (k,) to `found`."""
+    facet, square = 0, np.inf
+    for f in range(len(facets)):
+        nearest_on_facet(x, facets[f], weights)
+        distance = 0.0
+        for i in range(len(x)):
+            foot = 0.0
+            for k in range(len(weights)):
+                foot += weights[k] * facets[f, k, i]
+            distance += (x[i] - foot) ** 2
+        if distance < square:
+            facet, square = f, distance
+            found[:] = weights
+    return facet, square
+
+
+@njit(cache=True)
+def _probed(points, facets, deep):
+    """(n, 3): level set, and if it is to be deep the depth and the travel."""
+    corners, rim = facets.corners, facets.rim
+    size, space = corners.shape[1:]
+    out, off = np.zeros((len(points), 3)), np.empty(space)
+    weights, found = np.empty(size), np.zeros(size)
+    rim_weights, rim_found = np.empty(size - 1), np.empty(size - 1)
     for n in range(len(points)):
-        for f in range(count):
-            nearest_on_facet(points[n], facets[f], weights)
-            distance = 0.0
-            for i in range(space):
-                foot = 0.0
-                for k in range(size):
-                    foot += weights[k] * facets[f, k, i]
-                distance += (points[n, i] - foot) ** 2
-            if distance < square[n]:
-                facet[n], square[n] = f, distance
-                for k in range(size):
-                    found[n, k] = weights[k]
-    return facet, found, square
+        x = points[n]
+        facet, square = _nearest(x, corners, weights, found)
+        feature = 0
+        for k in range(size):
+            if found[k] == 0.0:
+                feature += 1 << k
+        normal, on_rim = facets.feature_normals[facet, feature], facets.feature_rim[facet, feature]
+        # x − y with the nearest point y = Σ_k w_k c_k; φ = (x − y)·n beside a face or past the rim
+        along = 0.0
+        for i in range(space):
+            foot = 0.0
+            for k in range(size):
+                foot += found[k] * corners[facet, k, i]
+            off[i] = x[i] - foot
+            along += off[i] * normal[i]
+        level = along
+        if not on_rim and feature != 0:
+            level = math.sqrt(square) if along >= 0.0 else -math.sqrt(square)
+        out[n, 0] = level
+        if not deep:
+            continue
+        beside = 0.0
+        for i in range(space):
+            beside += (off[i] - along * normal[i]) ** 2
+        if on_rim and beside > 0.0:
+            out[n, 1] = -math.sqrt(beside)
+        else:  # measured along the facets: without the part across them
+            apart = _nearest(x, rim, rim_weights, rim_found)[1]
+            out[n, 1] = math.sqrt(max(apart - level**2, 0.0))
+        for k in range(size):
+            out[n, 2] += found[k] * facets.travel[facet, k]
+    return out
 
 
 class FacetArrays(NamedTuple):
@@ -204,29 +244,6 @@ def _corner_angles(corners: Floats) -> Floats:
     return angles
 
 
-class _Foot(NamedTuple):
-    """Of points: nearest facet (n,), weights (n, k) there, level set, distance past the rim."""
-
-    facet: Ints
-    weights: Floats
-    level: Floats
-    beyond: Floats
-
-
-def _foot(points: Floats, facets: FacetArrays) -> _Foot:
-    facet, weights, square = _nearest(points, facets.corners)
-    feature = (weights == 0.0) @ (1 << np.arange(weights.shape[1]))
-    normal, rim = facets.feature_normals[facet, feature], facets.feature_rim[facet, feature]
-    # x − y with the nearest point y = Σ_k w_k c_k; φ = (x − y)·n beside a face or past the rim
-    off = points - np.einsum("nk,nki->ni", weights, facets.corners[facet])
-    along = np.einsum("ni,ni->n", off, normal)
-    distance = np.where(along >= 0.0, 1.0, -1.0) * np.sqrt(square)
-    level = np.where(rim | (feature == 0), along, distance)
-    beside = off - along[:, None] * normal
-    beyond = np.where(rim, np.sqrt(np.einsum("ni,ni->n", beside, beside)), 0.0)
-    return _Foot(facet, weights, level, beyond)
-
-
 class FacetCut:
     """A cut made of facets."""
 
@@ -239,7 +256,7 @@ class FacetCut:
 
     def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to the facets, to their tangent plane past the rim."""
-        return _foot(self._checked(points), self.arrays).level
+        return _probed(self._checked(points), self.arrays, False)[:, 0]
 
     def depth(self, points: Floats) -> Floats:
         """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
@@ -247,13 +264,8 @@ class FacetCut:
 
     def probed(self, points: Floats) -> Floats:
         """(n, 3): level set, depth, and of a sweep the travel at the nearest point, in metres."""
-        at, facets = self._checked(points), self.arrays
-        foot = _foot(at, facets)
-        # measured along the facets: without the part across them
-        inside = np.sqrt(np.maximum(_nearest(at, facets.rim)[2] - foot.level**2, 0.0))
-        depth = np.where(foot.beyond > 0.0, -foot.beyond, inside)
-        travel = np.einsum("nk,nk->n", foot.weights, facets.travel[foot.facet])
-        return np.stack([foot.level, depth, travel], axis=1)
+        found: Floats = _probed(self._checked(points), self.arrays, True)
+        return found
 
     def _checked(self, points: Floats) -> Floats:
         return finite_array(points, f"{self._name}: points", (None, self.arrays.corners.shape[2]))
