@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from verify.compare.body import Body
 from verify.compare.cell_tree import morton_order
+from verify.compare.field_kernels import squares
 from verify.compare.locate import Field
-from verify.compare.simplices import bisect, heights, in_frames, points_in, split_at_level
+from verify.compare.simplices import bisect, heights, in_frames, measures, points_in, split_at_level
 from verify.compare.solid import SimplexBody
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
@@ -262,7 +263,8 @@ def _slab(
         width = x1 - x0
         if m1 - m0 <= thinnest:
             continue  # two curves on each other: a strip of no width
-        between = columns[(columns > m0 + thinnest) & (columns < m1 - thinnest)]
+        first = np.searchsorted(columns, m0 + thinnest, "right")
+        between = columns[first : np.searchsorted(columns, m1 - thinnest)]
         s = np.concatenate([[0.0], (between - m0) / (m1 - m0), [1.0]])
         step = np.diff(s)
         place = (s[:-1, None] + step[:, None] * u).ravel()
@@ -314,10 +316,20 @@ def body_rule(
     """
     cells = _cells(body, spacing, seed, depth, grading)
     # the points of a piece that is round-off would be on the cut
-    points, weights = points_in(cells[heights(cells) > ROUND_OFF * body.size], order)
+    points, weights = points_in(cells[_thick(cells, ROUND_OFF * body.size)], order)
     kept = morton_order(points)
     points = np.ascontiguousarray(points[kept])
     return Rule(points, weights[kept], body.frames_at(points))
+
+
+def _thick(cells: Array, least: float) -> NDArray[np.bool_]:
+    """Whether simplices (m, k + 1, d) are higher than `least`, m."""
+    k = cells.shape[1] - 1
+    reach = np.sqrt(squares(np.ptp(cells, axis=1)))  # of any face: no more than its power k − 1
+    thick = k * measures(cells) > least * reach ** (k - 1)
+    thin = np.flatnonzero(~thick)
+    thick[thin] = heights(cells[thin]) > least
+    return np.asarray(thick)
 
 
 def _cells(body: SimplexBody, spacing: float, seed: int, depth: float, grading: float) -> Array:

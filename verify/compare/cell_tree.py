@@ -12,6 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEAF = 4  # cells per leaf
+# Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
+_SPREAD = {
+    2: (
+        (16, 0x0000FFFF0000FFFF), (8, 0x00FF00FF00FF00FF), (4, 0x0F0F0F0F0F0F0F0F),
+        (2, 0x3333333333333333), (1, 0x5555555555555555),
+    ),
+    3: (
+        (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
+    ),
+}  # fmt: skip
 
 
 class SearchedCells(NamedTuple):
@@ -107,7 +118,9 @@ def _morton(centres: NDArray[np.float64], in_cubes: bool = False) -> NDArray[np.
         extent[:] = extent.max()
     whole = ((centres - centres.min(axis=0)) / extent * (2**bits - 1)).astype(np.int64)
     code = np.zeros(len(centres), dtype=np.int64)
-    for bit in range(bits):
-        for axis in range(d):
-            code |= ((whole[:, axis] >> bit) & 1) << (d * bit + axis)
+    for axis in range(d):
+        spread = np.ascontiguousarray(whole[:, axis])
+        for shift, mask in _SPREAD[d]:
+            spread = (spread | (spread << shift)) & mask
+        code |= spread << axis
     return code

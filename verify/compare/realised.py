@@ -329,7 +329,9 @@ class SidedField(SolutionField):
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
         """Sides (n, c) of the cuts as asked on which `near` lies, of points close to these."""
         side = points if near is None else np.asarray(near, dtype=float)
-        reach = self._reach + np.linalg.norm(side - points, axis=1)
+        reach = np.full(len(points), self._reach)
+        if side is not points:
+            reach += np.linalg.norm(side - points, axis=1)
         wanted = asked_sides(self._cuts, side, reach, self._size)
         if self._cut is not None:
             rows = np.flatnonzero(wanted.any(axis=1))

@@ -93,11 +93,22 @@ def _distance(piece: Piece | Patch, points: Array) -> Array:
 
 
 def _sides_of(pieces: AskedCut, points: Array, reach: Array, size: float) -> Sides:
+    levels = [piece.level(points) for piece in pieces]
+    within = [np.abs(level) <= reach for level in levels]  # no foot is nearer than its level
+    rows = np.flatnonzero(np.any(within, axis=0))
+    sides = np.zeros(len(points), dtype=np.int8)
+    close = [level[rows] for level in levels]
+    sides[rows] = _sides_beside(pieces, close, points[rows], reach[rows], size)
+    return sides
+
+
+def _sides_beside(
+    pieces: AskedCut, levels: Sequence[Array], points: Array, reach: Array, size: float
+) -> Sides:
     found = []
     nearest = np.full(len(points), np.inf)
-    for piece in pieces:
-        level = piece.level(points)
-        at = np.flatnonzero(np.abs(level) <= reach)  # no foot is nearer than that
+    for piece, level in zip(pieces, levels, strict=True):
+        at = np.flatnonzero(np.abs(level) <= reach)
         away = _distance(piece, points[at])
         found.append((at, level[at], away))
         nearest[at] = np.minimum(nearest[at], away)
