@@ -3,8 +3,9 @@ import pytest
 from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
 
 from verify.compare.body import body_of
-from verify.compare.body_rule import body_rule
+from verify.compare.body_rule import _thick, body_rule
 from verify.compare.cut_rule import surface_rule
+from verify.compare.simplices import heights
 from verify.scene import load_scene
 
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 1.0, 1.0], "radius": 0.3}
@@ -161,3 +162,12 @@ def test_the_rule_of_a_cut_does_not_depend_on_how_far_it_reaches_beyond_the_body
         areas.append(rule.weights.sum())
     assert areas == pytest.approx([np.sqrt(1 + 1 / 9 + 1 / 25)] * 3, rel=1e-12)
     assert max(counts) < 1.1 * min(counts)
+
+
+@pytest.mark.parametrize("k", [2, 3])
+def test_what_is_thick_is_what_its_heights_say(k):
+    cells = np.random.default_rng(k).random((300, k + 1, 3))
+    cells[:99, k] = cells[:99, :k].mean(axis=1) + 1e-14
+    cells[99:150, k] = cells[99:150, 0]
+    for least in (1e-13, 0.1, 0.3):
+        assert (_thick(cells, least) == (heights(cells) > least)).all()

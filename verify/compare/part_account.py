@@ -216,7 +216,7 @@ _ABSOLUTE = ("kinetic", "strain")  # the others are potentials and work, counted
 def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[str, str]]:
     """Measure what a moving solution keeps, all relative.
 
-    Energies are measured (`verify.compare.measured_energies`), without what the time scheme
+    Energies are measured (`verify.compare.motion_account`), without what the time scheme
     dissipates, over the largest energy that moved from one form to another in the run
     (`energy_scale`). ``energy_drift`` is the largest change over the run; ``energy_slope`` the
     secular change over the whole run (its uncertainty: two standard errors);
