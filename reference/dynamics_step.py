@@ -367,8 +367,9 @@ class Ledger:
 class ShortWaves:
     """Kinetic energy of motions of periods up to 4h/c at the end, c the speed of shear waves.
 
-    That of the velocity less its mean over the last such period, averaged over that period: what
-    `verify.compare.released` measures where output times are dense, of every step.
+    That of the velocity less its mean over the last such period, and less the mean of that over
+    each part of the body, which falls or swings as a whole; averaged over the period.
+    `verify.compare.strain_energy.short_wave_energy` has the same of output times.
     """
 
     def __init__(self, body: MovingBody, size: float) -> None:
@@ -389,9 +390,16 @@ class ShortWaves:
         velocities = np.array([velocity for _, velocity in self._recent])
         if len(velocities) < 4:
             return {}
-        fast = velocities - velocities.mean(axis=0)
-        energy = sum(0.5 * float(one @ (self.body.mass @ one)) for one in fast)
-        return {"short_wave_energy": energy / len(fast)}
+        space, energy = self.body.space, 0.0
+        part = np.zeros(len(space.node_points), dtype=np.int64)
+        part[space.cell_nodes] = space.mesh.pieces[:, None]
+        mass = np.bincount(part, (self.body.mass @ np.ones_like(velocities[0]))[:: space.dimension])
+        for fast in velocities - velocities.mean(axis=0):
+            momenta = self.body.mass @ fast
+            energy += 0.5 * float(fast @ momenta)
+            for along in momenta.reshape(-1, space.dimension).T:
+                energy -= 0.5 * float(np.sum(np.bincount(part, along) ** 2 / mass))
+        return {"short_wave_energy": energy / len(velocities)}
 
 
 def momenta_of(body: MovingBody, state: State) -> tuple[Array, Array]:

@@ -45,16 +45,20 @@ def test_the_energy_of_a_difference_is_that_of_the_field_that_is_left():
 
 
 def test_short_waves_are_told_from_a_slow_motion():
-    """Amplitude 0.3 within the period, drift of 2 beside it: ρ/2 · 0.3²/2 · area 2."""
+    """Amplitude 0.3 (x − 1) within the period: ρ/2 · 0.3²/2 · area 2 · 1/3.
+
+    Beside it a drift of 2, and as fast a motion of the whole, which is none of a wave.
+    """
     times, period = np.linspace(0.0, 2.0, 81), 0.4
-    speed = 2.0 + 0.3 * np.sin(2 * np.pi * times / 0.2)
-    velocity = np.stack([np.column_stack([s + np.zeros(4), np.zeros(4)]) for s in speed])
+    along, wave = POINTS[:, 0] - 1.0, np.sin(2 * np.pi * times / 0.2)
+    speed = 2.0 + 0.3 * wave[:, None] * along
+    velocity = np.stack([np.column_stack([s, w + np.zeros(4)]) for s, w in zip(speed, wave, strict=True)])
     solution = _moving(times, 0 * velocity, velocity)
-    assert short_wave_energy(solution, period, 7.0) == pytest.approx(7.0 / 2 * 0.045 * 2)
+    assert short_wave_energy(solution, period, 7.0) == pytest.approx(7.0 / 2 * 0.045 * 2 / 3)
     slow = 0.3 * np.sin(2 * np.pi * times / 8.0)
-    velocity = np.stack([np.column_stack([s + np.zeros(4), np.zeros(4)]) for s in slow])
+    velocity = np.stack([np.column_stack([s * along, np.zeros(4)]) for s in slow])
     found = short_wave_energy(_moving(times, 0 * velocity, velocity), period, 7.0)
-    assert found < 0.01 * 7.0 / 2 * 0.045 * 2
+    assert found < 0.01 * 7.0 / 2 * 0.045 * 2 / 3
     with pytest.raises(InputError, match=r"output times are 0.025 s apart"):
         short_wave_energy(solution, 0.05, 7.0)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from verify.compare.body_rule import Rule
 from verify.compare.hooke import Corotated, Law
+from verify.compare.inertia import separated_parts
 from verify.compare.locate import Field, SolutionField
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
 from verify.errors import InputError
@@ -149,7 +150,8 @@ def difference_energy(
 def short_wave_energy(solution: Solution, period: float, density: Density) -> float:
     """Kinetic energy in motions faster than a period at the end, J (2D: per metre).
 
-    That of the velocity less its mean over the last period, averaged over that period. A motion
+    That of the velocity less its mean over the last period, and less the mean of that over each
+    part of the body, which falls or swings as a whole; averaged over that period. A motion
     of that period, or a whole part of it, counts in full; one of a period P times longer by
     about (π/P)²/3 of itself.
 
@@ -172,10 +174,16 @@ def short_wave_energy(solution: Solution, period: float, density: Density) -> fl
     velocity = solution.velocity[last]
     fast = velocity - velocity.mean(axis=0)
     field, energy = SolutionField(solution), 0.0
-    every = np.arange(len(solution.cells))
+    every, parts = np.arange(len(solution.cells)), separated_parts(solution, density)
+    momenta = np.zeros((len(parts), *fast.shape[::2]))
     order = 2 if solution.order == 1 else 3
     for points, measure in _points_of_cells(field, order):
-        for one in fast:
+        weights = density * measure
+        for k, one in enumerate(fast):
             slip = field.with_nodal(one).in_cells(points, every)[0]
-            energy += 0.5 * float((density * measure) @ np.sum(slip**2, axis=1))
+            energy += 0.5 * float(weights @ np.sum(slip**2, axis=1))
+            for part, momentum in zip(parts, momenta, strict=True):
+                momentum[k] += weights[part.cells] @ slip[part.cells]
+    for part, momentum in zip(parts, momenta, strict=True):
+        energy -= 0.5 * float(np.sum(momentum**2)) / part.mass
     return energy / len(fast)

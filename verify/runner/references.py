@@ -11,17 +11,21 @@ takes up room until `remove` is asked for it.
                  solution.json|.vtu    as `verify.solution.write_solution` wrote them
 
 A bundle is a zip file, to be committed, so that runs that judge by it need no FEniCSx:
-``bundle.json`` with such entries, and the files of their solutions below ``<key>/``. It is given to
+``bundle.json`` with such entries, and the files of each in one ``<key>.tar.xz``, since output times
+repeat their mesh (in bundles of schema 1 below ``<key>/``). It is given to
 a run by name (``--references``), so that, other than in the cache, an entry is found by the physics
 of the scene alone: the code and the versions that made it are those that it says, and the report
 repeats them. A scene whose physics changed is not found, which is an error and not a reason to
 compute something else.
 """
 
+import io
 import json
+import lzma
 import os
 import re
 import shutil
+import tarfile
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -54,8 +58,9 @@ BESIDE = "references"  # folder beside a case in which its own bundle lies
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"
 _HOUR = 3600.0
-BUNDLE_SCHEMA = 1
+BUNDLE_SCHEMA = 2
 _CONTENTS = "bundle.json"
+_PACKED = ".tar.xz"
 # what is read of others: a bundle of ours unpacks to some ten times its size
 _LARGEST_CONTENTS, _LARGEST_FILE, _MOST_TIMES = 2**26, 2**31, 200
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same references give the same bytes
@@ -323,10 +328,31 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
         text = json.dumps(contents, indent=1, sort_keys=True)
         archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
         for entry in entries:
-            for name in sorted(entry.files):
-                data = (cache.root / entry.key / name).read_bytes()
-                archive.writestr(_member(f"{entry.key}/{name}"), data, zipfile.ZIP_DEFLATED)
+            packed = _packed(cache.root / entry.key, sorted(entry.files))
+            archive.writestr(_member(entry.key + _PACKED), packed, zipfile.ZIP_STORED)
     return entries
+
+
+def _packed(folder: Path, names: Sequence[str]) -> bytes:
+    """Files of a folder in one compressed archive: the same files give the same bytes."""
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode="w:xz") as archive:
+        for name in names:
+            data = (folder / name).read_bytes()
+            member = tarfile.TarInfo(name)
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+    return packed.getvalue()
+
+
+def _unpacked(packed: bytes) -> dict[str, bytes]:
+    """Contents of the plain files of such an archive; empty if it is cut off, or far too large."""
+    plain = lzma.LZMADecompressor()
+    data = plain.decompress(packed, _MOST_TIMES * len(packed) + _LARGEST_CONTENTS)
+    if not plain.eof:
+        return {}
+    with tarfile.open(fileobj=io.BytesIO(data), mode="r:") as archive:
+        return {one.name: file.read() for one in archive if (file := archive.extractfile(one))}
 
 
 def _member(name: str) -> zipfile.ZipInfo:
@@ -352,8 +378,9 @@ class ReferenceBundle:
             text = f"unpacks to {unpacked / 1e6:.3g} MB, more than {_MOST_TIMES} times its size"
             raise InputError(f"not a bundle of references ({text})", where)
         self.digest = file_digest(path)
-        if contents.get("schema") != BUNDLE_SCHEMA:
-            raise InputError(f"not a bundle of schema {BUNDLE_SCHEMA}", where)
+        self._schema = contents.get("schema")
+        if self._schema not in range(1, BUNDLE_SCHEMA + 1):
+            raise InputError(f"not a bundle of schema 1 to {BUNDLE_SCHEMA}", where)
         entries = contents.get("entries")
         if not isinstance(entries, list):
             raise InputError("not a bundle of references ('entries' is no list)", where)
@@ -369,8 +396,7 @@ class ReferenceBundle:
         """
         own = self._of(scene)
         for entry in own:
-            for name in entry.files:
-                self._read(entry, name)
+            self._read(entry)
         if not own:
             names = ", ".join(sorted({entry.case for entry in self._entries})) or "nothing"
             raise InputError(
@@ -397,17 +423,21 @@ class ReferenceBundle:
             If the bundle is damaged.
         """
         entry = self._of(scene)[job.level]
-        for name in entry.files:
-            write_whole(job.folder / Path(name).name, self._read(entry, name))
+        for name, data in self._read(entry).items():
+            write_whole(job.folder / Path(name).name, data)
         return entry.taken_by(job, f"from the bundle {self.path.name}")
 
-    def _read(self, entry: Entry, name: str) -> bytes:
-        member = f"{entry.key}/{name}"
+    def _read(self, entry: Entry) -> dict[str, bytes]:
+        """Contents of its files, all whole."""
         with _opened(self.path) as archive:
-            data = _read(archive, member, _LARGEST_FILE)
-        if bytes_digest(data) != entry.files[name]:
-            raise InputError(f"'{member}' is damaged", str(self.path))
-        return data
+            if self._schema == 1:
+                whole = {n: _read(archive, f"{entry.key}/{n}", _LARGEST_FILE) for n in entry.files}
+            else:
+                whole = _unpacked(_read(archive, entry.key + _PACKED, _LARGEST_FILE))
+        for name, digest in entry.files.items():
+            if name not in whole or bytes_digest(whole[name]) != digest:
+                raise InputError(f"'{entry.key}/{name}' is damaged", str(self.path))
+        return {name: whole[name] for name in entry.files}
 
     def _of(self, scene: Scene) -> list[Entry]:
         physics = physics_digest(scene)
