@@ -52,7 +52,7 @@ def test_short_waves_are_told_from_a_slow_motion():
     times, period = np.linspace(0.0, 2.0, 81), 0.4
     along, wave = POINTS[:, 0] - 1.0, np.sin(2 * np.pi * times / 0.2)
     speed = 2.0 + 0.3 * wave[:, None] * along
-    velocity = np.stack([np.column_stack([s, w + np.zeros(4)]) for s, w in zip(speed, wave, strict=True)])
+    velocity = np.stack([speed, np.outer(wave, np.ones(4))], axis=2)
     solution = _moving(times, 0 * velocity, velocity)
     assert short_wave_energy(solution, period, 7.0) == pytest.approx(7.0 / 2 * 0.045 * 2 / 3)
     slow = 0.3 * np.sin(2 * np.pi * times / 8.0)

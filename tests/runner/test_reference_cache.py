@@ -111,6 +111,24 @@ def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, ke
     assert len(read_solution(job.folder / "solution").points) == 81
 
 
+def test_a_bundle_of_the_schema_before_is_read(scene, kept, tmp_path):
+    """With each file by itself, below the key of its entry."""
+    write_bundle(tmp_path / "new.zip", [scene], kept)
+    with (
+        zipfile.ZipFile(tmp_path / "new.zip") as new,
+        zipfile.ZipFile(tmp_path / "old.zip", "w") as old,
+    ):
+        contents = json.loads(new.read("bundle.json"))
+        old.writestr("bundle.json", json.dumps(contents | {"schema": 1}))
+        for entry in contents["entries"]:
+            for name in entry["files"]:
+                old.write(kept.root / entry["key"] / name, f"{entry['key']}/{name}")
+    bundle, job = ReferenceBundle(tmp_path / "old.zip"), job_of(tmp_path / "again", 2)
+    assert bundle.levels(scene) == LEVELS
+    bundle.take(scene, job)
+    assert len(read_solution(job.folder / "solution").points) == 81
+
+
 def test_a_damaged_bundle_is_found_before_anything_runs(scene, kept, tmp_path):
     write_bundle(tmp_path / "one.zip", [scene], kept)
     key = kept.find(scene)[1].key
