@@ -49,8 +49,10 @@ def test_its_bodies_are_checked_and_solved(tmp_path, capsys, number):
 
 @pytest.mark.heavy
 @pytest.mark.fenicsx
-def test_its_first_case_is_judged(tmp_path):
-    path = made(tmp_path, 0)
-    run = ["run", str(path), "--solver", "xfem", "--no-conform", "--repetitions", "1"]
-    assert main([*run, "--out", str(tmp_path / "lump")]) == 0
-    assert (tmp_path / "lump" / "report.html").is_file()
+@pytest.mark.parametrize("number", [0, 1], ids=NAMES)
+def test_its_cases_are_judged_and_pass(tmp_path, capsys, number):
+    path, out = made(tmp_path, number), tmp_path / "out"
+    run = ["run", str(path), "--no-conform", "--repetitions", "1"]
+    assert main([*run, "--out", str(out)]) == 0
+    assert re.search(rf"^{NAMES[number]} +PASS", capsys.readouterr().out, re.M)
+    assert (out / "report.html").is_file()
