@@ -186,8 +186,8 @@ def solve_by_multigrid(
     """Solve by conjugate gradients with algebraic multigrid (GAMG), from x.
 
     Cells that a cut leaves flat are stiff against everything but rigid motions, which no smoother
-    of points resolves: their unknowns are solved for directly before and after each cycle (de
-    Prenter, Verhoosel, van Brummelen, CMAME 350, 2019, on cut cells).
+    of points resolves: their unknowns are solved for directly before and after each cycle (as de
+    Prenter et al. do on cut cells, Comput. Mech. 65, 2020).
 
     PETSc judges convergence by a residual that it updates, and that drifts away from the true one:
     the true one is computed after each run, and CG is started again until it is small.

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import sys
 
 import meshio
 import numpy as np
@@ -381,6 +382,44 @@ def test_the_vtu_of_fenicsx_is_read(tmp_path):
         "</UnstructuredGrid></VTKFile>\n"
     )
     assert read_body(tmp_path / "dx.vtu", 3).cells.shape == (1, 4)
+
+
+def _xdmf_in_hdf5(folder, places="h5"):
+    """Write a body with tags as FEniCSx does: XML whose numbers lie in HDF5."""
+    points, cells, hard, ends, _ = block(1, 2)
+    file, _ = write(folder, "xdmf", points, cells, hard, ends)
+    text, arrays = (folder / file).read_text(), {}
+    while 'Format="XML"' in text:
+        head, _, rest = text.partition('Format="XML">')
+        numbers, _, rest = rest.partition("<")
+        shape = head.rsplit('Dimensions="', 1)[1].split('"')[0]
+        key = f"/Mesh/{len(arrays)}"
+        arrays[key] = np.array(numbers.split(), float).reshape([int(n) for n in shape.split()])
+        text = f'{head}Format="HDF">body.{places}:{key}<{rest}'
+    (folder / file).write_text(text)
+    return folder / file, arrays, (points, cells, hard, ends)
+
+
+def test_xdmf_in_hdf5_names_what_it_needs(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)  # an import of it fails
+    path, _, _ = _xdmf_in_hdf5(tmp_path)
+    with pytest.raises(InputError, match=r"'h5py': pip install 'cutting-verification\[hdf5\]'"):
+        read_body(path, 3)
+
+
+def test_xdmf_in_hdf5_is_read_with_its_tags(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, arrays, (points, cells, hard, ends) = _xdmf_in_hdf5(tmp_path)
+    with pytest.raises(InputError, match=r"'body\.h5' beside it has no '/Mesh/0'"):
+        read_body(path, 3)
+    with h5py.File(tmp_path / "body.h5", "w") as file:
+        for key, values in arrays.items():
+            file[key] = values
+    body = read_body(path, 3)
+    np.testing.assert_array_equal(body.points, points)
+    assert len(body.cells) == len(cells)
+    assert len(body.group("cells=2").cells) == hard.sum()
+    assert len(body.group("facets=3").parts[3]) == len(ends[0])
 
 
 @pytest.mark.fenicsx

@@ -168,7 +168,7 @@ def _read(
     cells, turned = _oriented(body, cells, where)
     if turned and not membrane:
         notes.append(f"{turned} of {len(cells)} cells are turned: their volume was negative")
-    _refuse_overlaps(cells, not membrane, where)
+    _refuse_overlaps(body, cells, not membrane, where)
     groups = {
         name: Group(members.get(name, np.zeros(0, dtype=np.int64)), parts)
         for name, parts in _parts(raw, blocks, points, k, cells, used).items()
@@ -347,7 +347,7 @@ def _oriented(points: Array, cells: Ints, where: str) -> tuple[Ints, int]:
     return cells, int(negative.sum())
 
 
-def _refuse_overlaps(cells: Ints, oriented: bool, where: str) -> None:
+def _refuse_overlaps(points: Array, cells: Ints, oriented: bool, where: str) -> None:
     """Refuse cells on the same side of a facet that they share; of a membrane, the same cell twice.
 
     Cells of positive orientation on either side of a facet name its corners in opposite turns.
@@ -364,6 +364,7 @@ def _refuse_overlaps(cells: Ints, oriented: bool, where: str) -> None:
     same = np.flatnonzero((asked[order[1:]] == asked[order[:-1]]).all(axis=1))
     if same.size:
         pair = np.sort(order[same[0] : same[0] + 2] % len(cells))
-        raise InputError(
-            f"cells {pair[0]} and {pair[1]} overlap: they are on the same side of a facet", where
-        )
+        at = ", ".join(f"{x:.6g}" for x in points[cells[pair[0]]].mean(axis=0))
+        text = f"cells {pair[0]} and {pair[1]} overlap: they are on the same side of a facet"
+        more = f", as are {same.size - 1} pairs more" if same.size > 1 else ""
+        raise InputError(f"{text}, around ({at}){more}; folded, or given twice", where)
