@@ -1,6 +1,7 @@
 """Cost of a model in error: it is said beside the verdict, by the run, and does not move it."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 import scenes
@@ -8,10 +9,12 @@ from pydantic import ValidationError
 
 from verify.compare.hooke import law_of
 from verify.compare.strain_energy import strain_energy
+from verify.judge import adequacy
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.adequacy import adequacy_notice, other_scene
 from verify.judge.changed_scenes import coarsest, on_one_level
-from verify.result import NoticeKind, SolveRecord, Status
+from verify.records import ReferenceRecord
+from verify.result import CaseResult, Metric, NoticeKind, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver
@@ -85,3 +88,15 @@ def test_levels_are_chosen_whether_a_case_gives_sizes_or_cells(key, levels) -> N
     one = scene(mesh={key: levels})
     for chosen, kept in ((on_one_level(one, 1), levels[1:2]), (coarsest(one, 2), levels[:2])):
         assert list(map(list if key == "cells" else float, getattr(chosen.mesh, key))) == kept
+
+
+def test_the_share_is_as_uncertain_as_both_energies_make_it(monkeypatch) -> None:
+    """1.30 ± 0.01 against 1.00 ± 0.04: at most 1.31/0.96 − 1 = 36.5 %, where 30 % are said."""
+    one = scene(adequacy={"kinematics": True})
+    rich = SimpleNamespace(quantities={"strain_energy": (1.0, 0.04)})
+    monkeypatch.setattr(adequacy, "conforming_reference", lambda *_: rich)
+    poor = Metric("strain_energy", 1.3, "J/m", 1.3, 0.01, "conforming")
+    solve = SolveRecord("scene", "xfem", 0, Status.SOLVED, metrics=[poor])
+    result = CaseResult("scene", "", "", "", {}, ReferenceRecord(), [solve], [], [])
+    text = adequacy_notice(one, "kinematics", {}, result).text
+    assert text.endswith(": 30 % (± 6 %) in strain_energy")
