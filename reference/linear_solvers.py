@@ -212,7 +212,8 @@ def solve_by_multigrid(
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
-    solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)  # type: ignore[attr-defined]
+    norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
+    solver.setNormType(norm)
     solver.setType("cg")
     own = np.zeros(0, dtype=np.int32) if flat is None else flat
     if 0 < matrix.comm.tompi4py().allreduce(len(own)) < _MOST_FLAT * matrix.getSize()[0]:
@@ -242,7 +243,8 @@ class _CyclesBetweenFlatCells:
         from petsc4py import PETSc
 
         self._matrix = matrix
-        self._rows = PETSc.IS().createGeneral(flat, comm=matrix.comm)
+        rows: Any = PETSc.IS()
+        self._rows = rows.createGeneral(flat, comm=matrix.comm)
         self._block = matrix.createSubMatrix(self._rows, self._rows)
         self._direct = factorised(self._block)
         self._cycle = PETSc.KSP().create(matrix.comm)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -303,10 +304,15 @@ def _sections(patch: PlanePatch, body: SolidBody) -> Array:
         turn = np.sign(np.linalg.det(triangle[1:] - triangle[0]))
         for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
             inward = turn * np.array([a[1] - b[1], b[0] - a[0]])
-            inner, inside = split_at_level(inner, lambda uv, a=a, n=inward: (uv - a) @ n)
+            inner, inside = split_at_level(inner, partial(_height, a, inward))
             inner = inner[inside > 0]
         found.append(inner)
     return np.concatenate(found)
+
+
+def _height(corner: Array, inward: Array, places: Array) -> Array:
+    """Heights (n,) of places (n, 2) over an edge at a corner, positive on its inward side."""
+    return np.asarray((places - corner) @ inward)
 
 
 def _faces(box: Array) -> list[tuple[int, float, float]]:
