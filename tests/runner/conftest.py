@@ -14,7 +14,8 @@ from command_line import forking, run_here
 
 HERE = Path(__file__).parent
 HARMLESS = {f"fake_solvers:{name}" for name in (
-    "Instant", "Other", "Wrong", "Straining", "Frozen", "Refusing", "Raising", "HangingOnLevelOne",
+    "Instant", "Other", "Wrong", "Straining", "Frozen", "Refusing", "RefusingLate", "Raising",
+    "NotFinite", "HangingOnLevelOne",
 )}  # fmt: skip
 
 CASE = (
