@@ -100,3 +100,26 @@ def test_the_share_is_as_uncertain_as_both_energies_make_it(monkeypatch) -> None
     result = CaseResult("scene", "", "", "", {}, ReferenceRecord(), [solve], [], [])
     text = adequacy_notice(one, "kinematics", {}, result).text
     assert text.endswith(": 30 % (± 6 %) in strain_energy")
+
+
+def test_the_other_reference_of_a_body_without_a_size_follows_its_area() -> None:
+    small, large = (
+        other_scene(scene(geometry=scenes.box([0.4 * s, 0.1 * s]), reference={"levels": 3},
+                          quantities=[{"kind": "strain_energy"}],
+                          adequacy={"kinematics": True}), "kinematics")
+        for s in (1.0, 2.0)
+    )  # fmt: skip
+    assert large.reference.size == pytest.approx(2 * small.reference.size, rel=1e-12)
+    assert 0.0 < small.reference.size < 0.1
+
+
+def test_the_static_answer_bears_the_last_body_force_and_traction() -> None:
+    history = [[0.0, 0.0], [0.5, 2.0], [1.0, 3.0]]
+    moving = scene(
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1}, adequacy={"motion": True},
+        loads=[{"kind": "body_force", "force": [0.5, -1.0], "history": history},
+               {"kind": "traction", "where": "right", "traction": [0.2, 0.4], "history": history}],
+    )  # fmt: skip
+    force, traction = other_scene(moving, "motion").loads
+    assert list(force.force) == [1.5, -3.0]
+    assert list(traction.traction) == pytest.approx([0.6, 1.2], rel=1e-15)
