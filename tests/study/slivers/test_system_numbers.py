@@ -103,6 +103,9 @@ def test_what_cannot_be_known_is_said():
         condition_numbers(free)
     with pytest.raises(InputError, match="no density"):
         critical_step(System(free.stiffness, None, free.fixed))
+    massless = csr_array(diags_array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0]))
+    with pytest.raises(InputError, match="an unknown without mass"):
+        critical_step(System(free.stiffness, massless, free.fixed))
     with pytest.raises(InputError, match="held"):
         condition_numbers(System(free.stiffness, None, ~free.fixed))
 
