@@ -347,6 +347,18 @@ def test_forces_at_a_cut_take_no_more_than_the_blade_releases(records, expected)
     assert found.verdict is expected
 
 
+def test_what_the_balance_of_the_reference_misses_is_as_uncertain_as_its_parts():
+    """Few outputs do not tell what damping took: then 0.44 may have been released."""
+    for uncertainty, expected in ((0.05, Verdict.FAIL), (0.2, Verdict.UNDECIDED)):
+        reference = blades("reference", 0.28, 0.3, to_short_waves=0.0)
+        for record in reference:
+            balance = Metric("released_to_scheme", -0.05, "J/m²", uncertainty=uncertainty)
+            record.metrics.append(balance)
+        records = [*blades("xfem", 0.45, 0.44), *reference]
+        (found,) = judge(scene([STRAIGHT]), records, ())
+        assert found.verdict is expected
+
+
 @pytest.mark.parametrize(
     ("levels", "expected"),
     [

@@ -146,9 +146,10 @@ def _excess(
 
 
 def _taken(levels: Sequence[SolveRecord], names: Sequence[str]) -> Interval:
-    """Sum metrics on the finest level, give or take what that level changed."""
+    """Sum metrics on the finest level, give or take what that changed and they are not known to."""
     *before, value = (sum(_metric(record, name).value for name in names) for record in levels[-2:])
     width = abs(value - before[0]) if before else inf
+    width += sum(_metric(levels[-1], name).uncertainty for name in names)
     return Interval(value, value - width, value + width)
 
 
