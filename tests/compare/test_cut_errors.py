@@ -99,6 +99,21 @@ def test_a_tooth_inside_an_element_is_in_the_error(solver):
     assert "there without continuation" in record.notes[CUT]
 
 
+def test_where_a_cut_lies_is_said_in_a_body_of_any_size():
+    """A tooth that is cut off is 0.2 of the body, be that 10 µm."""
+    size = 1e-5
+    cut = {"kind": "polyline", "points": (size * np.asarray(TOOTH)).tolist()}
+    body = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [size, size]}
+    case = scene([cut], geometry=body, mesh={"cells": [[8, 8]]})
+    solution, body, law = find_solver("xfem").solve(case, 0, 0), body_of(case), law_of(case)
+    rules = Rules(body, size / 8)
+    one = Measured(solution, body, law, case, measured_cut(solution, body, rules))
+    record, other = with_cut(SolveRecord("case", "xfem", 0, Status.SOLVED), one, rules)
+    assert record.cut.lateral > 0.1 * size
+    assert "there without continuation" in record.notes[CUT]
+    assert other is not None
+
+
 def zigzag(random):
     x = np.sort(random.uniform(0.1, 0.9, random.integers(2, 6)))
     kinks = np.column_stack([x, random.uniform(0.3, 0.7, len(x))])

@@ -11,7 +11,8 @@ from reference.meshing.opening import open_cut
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.judge.quantities import Measured, local_difference
-from verify.judge.richardson import place_uncertainty
+from verify.judge.reference import known_quantity
+from verify.judge.richardson import extrapolate, place_uncertainty
 from verify.solution import Solution
 
 SIZES = [0.4, 0.2, 0.1]
@@ -82,3 +83,16 @@ def test_levels_that_are_equal_around_a_place_are_known_to_round_off():
     found = place_uncertainty(3.0, [0.0, 0.0], SIZES, 2)
     assert 0 < found.half_width < 1e-12
     assert "equal" in found.reason
+
+
+def test_an_energy_may_converge_with_twice_the_order_of_its_element():
+    """Linear elements, differences that fall by four: as good as order 2 lets them be."""
+    (energy,) = scenes.scene(quantities=[{"kind": "strain_energy"}]).quantities
+    levels = [measured(n, field=lambda x, y: x * y) for n in (4, 8, 16)]
+    values = [1.0 + size**2 for size in SIZES]
+    found = known_quantity(energy, levels, values, SIZES)
+    assert found.half_width == pytest.approx(extrapolate(values, SIZES, 2.0).half_width)
+    assert found.half_width < 0.75 * extrapolate(values, SIZES, 3.0).half_width
+    # where the field allows no order, twice the least that is counted on: ¼ in the energy norm
+    rough = known_quantity(energy, levels, values, SIZES, functional=0.0)
+    assert rough.half_width == pytest.approx(extrapolate(values, SIZES, 0.5).half_width)

@@ -171,6 +171,9 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
     assert by["y"]["regularisations"] == {"node moved": 3}
     assert (by["z"]["timeout"], by["z"]["inside_out"]) == (1, 1)
     assert by["x"]["refused"] == 1
+    said = [solve("a", "x", 0, 0.1, notes={"pieces inside out": "near (0.1, 0.2) m"})]
+    (one,) = rank_solvers([case_of("a", said)])["stability"]
+    assert one["inside_out"] == 1  # what is no number is no zero either
 
 
 def test_of_energy_the_worst_case_counts_and_round_off_is_as_good_as_zero():

@@ -53,6 +53,10 @@ def test_the_time_of_an_error_between_levels_is_that_of_the_power_law():
         assert time_at(points, error)[0] == pytest.approx(0.01 * (0.4 / error) ** 2, rel=1e-12)
     assert time_at(points, 0.5)[0] == pytest.approx(0.01)  # the coarsest does it
     assert time_at(points, 0.09) is None
+    # a level without any error has no place on a scale of logarithms
+    exact = work_points([*ladder("one", 0.4, 0.01), solve("one", 3, 0.0, 1.0)], "energy_norm")
+    assert time_at(exact, 0.3) == time_at(points, 0.3)
+    assert time_at(exact, 0.09) is None
 
 
 def test_a_solver_ten_times_slower_at_equal_accuracy_is_said_to_be_that():
