@@ -4,7 +4,7 @@ from functools import cache
 
 from verify.errors import InputError
 from verify.runner.checking import check_scene
-from verify.scene import Scene, list_cases, load_scenes
+from verify.scene import Scene, list_cases, load_scene, load_scenes
 
 
 @cache
@@ -36,6 +36,13 @@ def scene(cuts=(), d=2, **changes):
         "cuts": list(cuts),
     }
     return Scene.model_validate(content | changes)
+
+
+def undamped(case):
+    """Load a scene without its damping, which most programs do not offer."""
+    scene = load_scene(case)
+    bare = scene.analysis.model_copy(update={"damping": (0.0, 0.0)})
+    return scene.model_copy(update={"analysis": bare})
 
 
 def check_refusal(**content):

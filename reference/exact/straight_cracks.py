@@ -111,8 +111,9 @@ class ComplexCrack(ExactSolution):
         z = np.empty(len(x), dtype=complex)
         z.real, z.imag = x, y  # x + 1j*y would lose the sign of −0
         with np.errstate(divide="ignore", invalid="ignore"):
-            self._last = asked, (z, self._potentials(z, sheet))
-        return self._last[1]
+            found = z, self._potentials(z, sheet)
+        self._last = asked, found
+        return found
 
 
 class CrackTip(ComplexCrack):

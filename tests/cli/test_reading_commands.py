@@ -39,7 +39,8 @@ def test_help_teaches_by_examples_that_parse(command, capsys):
         build_parser().parse_args([word.strip('"') for word in words])
 
 
-def test_list_names_every_case_with_its_title(capsys):
+def test_list_names_every_case_with_its_title(capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)  # what runs tests side by side sets it
     assert main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(SCENES)
@@ -51,6 +52,7 @@ def test_list_names_every_case_with_its_title(capsys):
 
 
 def test_list_wraps_at_the_width_of_the_terminal(capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
     assert main(["list"]) == 0
     whole = capsys.readouterr().out
     monkeypatch.setenv("COLUMNS", "70")

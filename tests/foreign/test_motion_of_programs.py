@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from scenes import undamped
 
 from verify.compare.hooke import law_of
 from verify.compare.motion_account import motion_account
@@ -13,13 +14,6 @@ from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
 from verify.solvers import find_solver
-
-
-def undamped(case):
-    """Load a scene without its damping, which most programs do not offer."""
-    scene = load_scene(case)
-    bare = scene.analysis.model_copy(update={"damping": (0.0, 0.0)})
-    return scene.model_copy(update={"analysis": bare})
 
 
 @pytest.fixture

@@ -62,6 +62,14 @@ class TipAdvance(ComplexCrack):
         self.strength = -0.25 * end * share  # ½ S dR/de, with dR/de = ∓ R / (2 (z ∓ a)) outwards
         self.terms = np.zeros((2, _ORDER), complex)
 
+    @property
+    def _last(self):
+        """Nothing of a last evaluation is kept: strength and terms are set after it."""
+
+    @_last.setter
+    def _last(self, _kept):
+        pass
+
     def _on_crack(self, x):
         return np.abs(x) < self._a
 
