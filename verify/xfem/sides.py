@@ -9,11 +9,13 @@ import numpy as np
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 
-_TIE = 1e-12  # of all shares: a vote as close as that is none, whatever the order of the sum
+# of the absolute sum: a vote, or a centroid, as close as that to neither side is on none, whatever
+# the order of the sum
+_TIE = 1e-12
 
 
 def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats) -> Sides:
-    """Sides (p, cuts) of the cuts on which pieces lie.
+    """Sides (p, cuts) of the cuts on which pieces lie; plus where a centroid is on the cut.
 
     Parameters
     ----------
@@ -26,10 +28,13 @@ def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats
         Barycentric coordinates of the centroids, up to a positive factor.
     """
     # φ(centroid) = Σ_i λ_i φ_i, a corner at a time: there may be hundreds of cuts
-    level = sum(
-        w[:, None] * level_sets[nodes] for w, nodes in zip(weights.T, corners.T, strict=True)
-    )
-    return np.where(label != 0, label, np.where(level >= 0.0, 1, -1)).astype(np.int8)
+    level, whole = np.zeros((2, *label.shape))
+    for w, nodes in zip(weights.T, corners.T, strict=True):
+        share = w[:, None] * level_sets[nodes]
+        level += share
+        whole += np.abs(share)
+    side = np.where(level >= -_TIE * whole, 1, -1)
+    return np.where(label != 0, label, side).astype(np.int8)
 
 
 def node_sides(
