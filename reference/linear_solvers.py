@@ -212,17 +212,16 @@ def solve_by_multigrid(
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
-    norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
-    solver.setNormType(norm)
-    solver.setType("cg")
     own = np.zeros(0, dtype=np.int32) if flat is None else flat
     if 0 < matrix.comm.tompi4py().allreduce(len(own)) < _MOST_FLAT * matrix.getSize()[0]:
+        norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
+        solver.setNormType(norm)
         conditioner: Any = solver.getPC()
         conditioner.setType("python")
         conditioner.setPythonContext(_CyclesBetweenFlatCells(matrix, own))
     else:
         set_multigrid(solver)
-        solver.setType("cg")
+    solver.setType("cg")
     solver.setInitialGuessNonzero(True)
 
     def aim(loads: float, _left: float) -> None:

@@ -49,7 +49,8 @@ class ComplexCrack(ExactSolution):
         c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
         self._origin = origin
         self._axes = np.array([[c, s], [-s, c]])
-        # displacement and gradient are mostly asked for at the same points
+        # displacement and gradient are mostly asked for at the same points; a field does not
+        # change once it is made
         self._last: tuple[Array, tuple[Complex, Potentials]] | None = None
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""How large a body may be that is played at 60 Hz, at rest and while it is cut.
+"""Largest body that is played at 60 Hz, at rest and while it is cut.
 
     pytest tests/benchmarks/test_real_time_sizes.py -m timing -s
 
