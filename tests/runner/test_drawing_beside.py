@@ -9,7 +9,7 @@ import pytest
 from verify.errors import RunStoppedError
 from verify.report import rendering
 from verify.report.rendering import render
-from verify.runner import Options, drawing, run_cases
+from verify.runner import Options, comparing, run_cases
 from verify.scene import load_scene
 
 
@@ -58,14 +58,14 @@ def test_what_was_not_drawn_to_its_end_is_drawn_by_the_report(drawn, tmp_path):
 def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypatch):
     """The run is stopped as soon as a case is being drawn; all that it started ends with it."""
     started = []
-    real = drawing.Child
+    real = comparing.Child
 
     def child(module, *arguments, **named):
         started.append(real(module, *arguments, **named))
         os.kill(os.getpid(), signal.SIGTERM)  # SIGINT is ignored behind an `&`
         return started[-1]
 
-    monkeypatch.setattr(drawing, "Child", child)
+    monkeypatch.setattr(comparing, "Child", child)
     source, _ = drawn
     scenes = [load_scene(source.parent / f"{name}.toml") for name in ("one", "two")]
     options = Options(solvers=("xfem", "conforming"), repetitions=1, jobs=2)

@@ -7,7 +7,7 @@ import pytest
 from thesis_stages import stage
 
 from verify.simulator import Stage
-from verify.simulator.skin_shapes import procedural_face
+from verify.simulator.skin_mesh import procedural_face
 
 
 @pytest.fixture(scope="session")

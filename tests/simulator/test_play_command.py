@@ -11,7 +11,7 @@ from thesis_stages import CASES
 from verify.cli import main
 from verify.scene import load_scene
 from verify.simulator import Session, stage_of
-from verify.simulator.window import LiveScalpel, stroke_text, write_stroke
+from verify.simulator.animation import LiveScalpel, stroke_text, write_stroke
 
 graphics = pytest.mark.graphics
 

@@ -5,9 +5,9 @@ import pytest
 from thesis_stages import CASES
 
 from verify.scene import load_scene
+from verify.simulator.animation import PlayWindow, place_in_sight
 from verify.simulator.stage import stage_of
 from verify.simulator.surfaces import Picture
-from verify.simulator.window import PlayWindow, place_in_sight
 
 
 def _two_sheets(inner: bool) -> Picture:

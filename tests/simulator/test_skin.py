@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 
 from verify.scene import Skin
-from verify.simulator.skin_mesh import border_loops, closed_shell, skin_mesh, skin_surface, thicken
-from verify.simulator.skin_shapes import plane_mesh, procedural_face
+from verify.simulator.skin_mesh import (
+    border_loops,
+    closed_shell,
+    plane_mesh,
+    procedural_face,
+    skin_mesh,
+    skin_surface,
+    thicken,
+)
 from verify.xfem.mesh import SimplexMesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

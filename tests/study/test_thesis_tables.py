@@ -7,15 +7,17 @@ import pytest
 
 from verify.result import Verdict
 from verify.scene import load_scenes
-from verify.simulator.thesis.added_nodes import count_face, count_strips
-from verify.simulator.thesis.delays import delays, with_other_frames
-from verify.simulator.thesis.real_time import (
+from verify.simulator.thesis import (
     CUTS,
     LIMITS,
     TETRAHEDRA,
     RealTime,
     StepTime,
+    count_face,
+    count_strips,
+    delays,
     step_times,
+    with_other_frames,
 )
 from verify.study.thesis import measured as measuring
 from verify.study.thesis.measured import (

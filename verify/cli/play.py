@@ -79,7 +79,7 @@ def play(
             raise InputError(f"--tolerance {tolerance:g}: expected below 1")
         stage = replace(stage, tolerance=tolerance)
     if window or (out is None and has_display):
-        from verify.simulator.window import play_in_window
+        from verify.simulator.animation import play_in_window
 
         play_in_window(stage, scene.title, stroke)
         return 0

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.geometry.planar import overlap_length
 from verify.geometry.spatial import measures, rim_edges
-from verify.runner import exact_samples as samples
+from verify.runner import exact_fit as samples
 from verify.runner.cost import mesh_of_level
-from verify.runner.exact_samples import holds
+from verify.runner.exact_fit import holds
 from verify.runner.mesh_faults import mesh_warning
 from verify.scene import (
     BodyForce,

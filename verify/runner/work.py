@@ -14,7 +14,7 @@ from verify.printable import one_line
 from verify.result import LOG, CaseResult, SolveRecord, Status
 from verify.result_files import write_result
 from verify.runner.child import POLL_SECONDS, Ending, death
-from verify.runner.comparing import Comparison, comparison_label, stored_result
+from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
 from verify.runner.directory import (
     LEVELS,
     Job,
@@ -26,7 +26,6 @@ from verify.runner.directory import (
     store_record,
     stored_record,
 )
-from verify.runner.drawing import Drawings
 from verify.runner.engines import ClusterEngine, Engine, LocalEngine, Running
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.plan import CasePlan, begun_after, further_level, levels_in_vain

@@ -16,11 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from verify.simulator.division import MeshPatch
-from verify.simulator.edge_points import EdgePoints
 from verify.simulator.growing_body import Increment
 from verify.simulator.moving_surface import MovingSurface
 from verify.simulator.places import MaterialPlaces
-from verify.simulator.point_numbers import FoundPoints, PointNumbers, distinct, of_lists, ranges
+from verify.simulator.point_numbers import (
+    EdgePoints,
+    FoundPoints,
+    PointNumbers,
+    distinct,
+    of_lists,
+    ranges,
+)
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.errors import XfemError

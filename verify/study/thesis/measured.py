@@ -15,9 +15,7 @@ from verify.judge.cost import work_points
 from verify.judge.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scenes, restore_scene
-from verify.simulator.thesis.added_nodes import FaceCount, StripCount
-from verify.simulator.thesis.delays import Delay, Frames
-from verify.simulator.thesis.real_time import RealTime, StepTime
+from verify.simulator.thesis import Delay, FaceCount, Frames, RealTime, StepTime, StripCount
 from verify.solvers import find_solver
 from verify.study.measured_scenes import variant_of
 

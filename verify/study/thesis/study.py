@@ -9,17 +9,22 @@ from typing import Any
 from verify.judge.changed_scenes import coarsest
 from verify.runner.tasks import Task
 from verify.scene import load_scene, scene_content
-from verify.simulator.thesis.added_nodes import count_face, count_strips
-from verify.simulator.thesis.delays import (
+from verify.simulator.thesis import (
+    CUTS,
     SPEEDS,
+    TETRAHEDRA,
     Delay,
     Frames,
+    RealTime,
+    count_face,
+    count_strips,
     delays,
     published_rows,
     published_source,
+    real_time,
+    step_times,
     with_other_frames,
 )
-from verify.simulator.thesis.real_time import CUTS, TETRAHEDRA, RealTime, real_time, step_times
 from verify.study.record import Study
 from verify.study.solving import Making
 from verify.study.thesis.measured import (

@@ -4,9 +4,15 @@ from collections.abc import Iterator, Sequence
 
 from verify.result import Verdict
 from verify.simulator.session import LIMITS
-from verify.simulator.thesis.added_nodes import FaceCount, StripCount
-from verify.simulator.thesis.delays import SPEEDS, Delay, Frames
-from verify.simulator.thesis.real_time import RealTime, StepTime
+from verify.simulator.thesis import (
+    SPEEDS,
+    Delay,
+    FaceCount,
+    Frames,
+    RealTime,
+    StepTime,
+    StripCount,
+)
 from verify.study.record import Finding
 from verify.study.thesis.measured import Measured, MethodOnCase, SliverSystem, exponent
 
