@@ -14,13 +14,13 @@ import pytest
 from numba import njit
 
 from verify.accelerated import FAST
-from verify.accelerated.conjugate_gradient_kernels import (
+from verify.accelerated.conjugate_gradients import (
+    ConjugateGradients,
     invert_blocks,
     solve_lower,
     solve_upper,
     upper_pattern,
 )
-from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic

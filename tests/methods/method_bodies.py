@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verify.methods.catalogue import METHODS, cut_by
+from verify.methods import METHODS, cut_by
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
 from verify.xfem.statics import solve_static

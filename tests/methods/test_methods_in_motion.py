@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from method_bodies import CUTTING, held_at
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.methods.springs import SpringForce
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Polyline

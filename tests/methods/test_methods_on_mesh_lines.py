@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from method_bodies import CUTTING, MATERIAL, at_places, hang, held_at
 
-from verify.methods.opening import OpenedMesh
+from verify.methods.cut_body import OpenedMesh
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.loads import body_force
 from verify.xfem.phantom import cut_mesh

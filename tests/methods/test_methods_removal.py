@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.methods.removal import bisect_cells
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

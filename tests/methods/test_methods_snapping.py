@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.methods.snapping import snap_nodes, take_near_nodes
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

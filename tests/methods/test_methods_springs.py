@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.methods.springs import SpringForce, spring_stiffness
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Polyline

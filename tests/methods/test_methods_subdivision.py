@@ -6,7 +6,7 @@ import skfem
 from method_bodies import MATERIAL, hang
 from skfem.models.elasticity import linear_elasticity
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane, Polyline

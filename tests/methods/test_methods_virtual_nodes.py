@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from method_bodies import hang
 
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh

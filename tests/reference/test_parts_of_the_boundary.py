@@ -12,7 +12,7 @@ from reference_scenes import needs_fenicsx
 from verify.exchange import export_case, problem_of
 from verify.foreign.records import PROGRAMS
 from verify.judge.rates import shifted_ends
-from verify.methods.catalogue import METHODS
+from verify.methods import METHODS
 from verify.records import Regularisation
 from verify.result import SolveRecord, Status
 from verify.solvers import find_solver

@@ -5,17 +5,15 @@ many unknowns it cost and what it moved, merged or lost. Statics and dynamics ar
 `verify.xfem` for all of them, so that only the cut differs. Read it in this order:
 
 what every method gives
-    `cut_body`, `catalogue` (all methods by name)
-nodes that move onto the cut
-    `feet`, `nodal_cut`, `snapped_mesh`, `snapping`
-cells that are split
-    `tip_nodes` (ends of cuts as nodes), `opened_mesh`, `subdivision`
+    `cut_body`; here all of them by name
+nodes that move onto the cut, and cells that are split along it
+    `tip_nodes` (ends of cuts as nodes), `snapping`
 cells that go
-    `refinement`, `removal`
+    `removal`
 cells that are copied
     `virtual_nodes`
 springs instead of elements
-    `spring_fit`, `spring_kernels`, `spring_force`
+    `springs`
 in the place of parts of `verify.xfem`, chosen by its adapter
     `tip_nodes` before the cut, `mass_variants` for the mass, `generalised_alpha` for the steps
 
@@ -23,7 +21,7 @@ Sources and limits of each: ``docs/theory/methods.md``.
 
 Example
 -------
->>> from verify.methods.catalogue import cut_by
+>>> from verify.methods import cut_by
 >>> from verify.xfem.cuts import Polyline
 >>> from verify.xfem.structured_meshes import rectangle_mesh
 >>> body = cut_by("snapping", rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
@@ -31,7 +29,47 @@ Example
 4
 """
 
-from verify.methods.catalogue import METHODS, cut_by
-from verify.methods.cut_body import Change, Counts, CutBody
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from verify.methods.cut_body import Change, Counts, CutBody, make_body
+from verify.methods.removal import removal, removal_refined
+from verify.methods.snapping import snapping, snapping_subdivision, subdivision
+from verify.methods.virtual_nodes import virtual_node, virtual_node_arbitrary
+from verify.xfem.cuts import Cut
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 
 __all__ = ["METHODS", "Change", "Counts", "CutBody", "cut_by"]
+
+
+def uncut(mesh: SimplexMesh, cuts: Sequence[Cut]) -> CutBody:
+    """Leave the cuts out, and say so."""
+    change = Change("cut left out", len(cuts), float("inf") if cuts else 0.0, "m")
+    return make_body(mesh, cut_mesh(mesh, []), (change,))
+
+
+METHODS: Mapping[str, Callable[..., CutBody]] = {
+    "subdivision": subdivision,
+    "snapping": snapping,
+    "snapping_subdivision": snapping_subdivision,
+    "removal": removal,
+    "removal_refined": removal_refined,
+    "virtual_node": virtual_node,
+    "virtual_node_arbitrary": virtual_node_arbitrary,
+    "uncut": uncut,
+}
+
+
+def cut_by(method: str, mesh: SimplexMesh, cuts: Sequence[Cut], **parameters: Any) -> CutBody:
+    """Cut a mesh by a method of the given name, with its own parameters.
+
+    Raises
+    ------
+    XfemError
+        If there is no such method, or it cannot make this cut.
+    """
+    if method not in METHODS:
+        raise XfemError(f"no method '{method}'; expected one of {', '.join(METHODS)}")
+    return METHODS[method](mesh, cuts, **parameters)

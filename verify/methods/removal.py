@@ -20,8 +20,16 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.methods.cut_body import Change, CutBody, make_body, whole_cells
-from verify.methods.opening import OpenedCells, OpenedMesh, conforming_to, cut_so_far
+from verify.methods.cut_body import (
+    Change,
+    CutBody,
+    OpenedCells,
+    OpenedMesh,
+    conforming_to,
+    cut_so_far,
+    make_body,
+    whole_cells,
+)
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.contacts import face_contacts
 from verify.xfem.crossing import TipRule

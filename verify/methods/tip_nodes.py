@@ -7,7 +7,7 @@ the cut goes through one of these parts and stops at their common node. So the j
 from the nodes of the edge by which the cut comes in to zero at its end: the partially cut element
 of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a node.
 
-`verify.methods.subdivision` needs the first of these divisions alone: `add_tip_points`.
+`verify.methods.snapping` needs the first of these divisions alone: `add_tip_points`.
 """
 
 from collections.abc import Iterator, Sequence

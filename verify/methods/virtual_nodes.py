@@ -17,8 +17,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.methods.cut_body import Change, CutBody, make_body, whole_cells
-from verify.methods.opening import OpenedCells, cut_so_far
+from verify.methods.cut_body import Change, CutBody, OpenedCells, cut_so_far, make_body, whole_cells
 from verify.xfem.contacts import absorb, sibling_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut

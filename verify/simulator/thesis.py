@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from verify.calibration import kernel_seconds
-from verify.methods.catalogue import cut_by
+from verify.methods import cut_by
 from verify.methods.cut_body import CutBody
 from verify.scene import Scene, Skin, load_scene
 from verify.simulator import PHASES, Session, Stage, quality_of, stage_of

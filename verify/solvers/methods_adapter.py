@@ -8,7 +8,7 @@ from typing import Any
 from reference.exact import exact_of
 from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
-from verify.methods.catalogue import METHODS
+from verify.methods import METHODS
 from verify.methods.cut_body import CutBody
 from verify.methods.springs import SpringForce
 from verify.scene import Scene

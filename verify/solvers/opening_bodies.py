@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.methods.catalogue import METHODS
-from verify.methods.cut_body import CutBody, make_body
-from verify.methods.opening import Seams, seams_of, welded
+from verify.methods import METHODS
+from verify.methods.cut_body import CutBody, Seams, make_body, seams_of, welded
 from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.motion_of_scene import Fade
