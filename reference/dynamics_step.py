@@ -369,7 +369,7 @@ class ShortWaves:
 
     That of the velocity less its mean over the last such period, and less the mean of that over
     each part of the body, which falls or swings as a whole; averaged over the period.
-    `verify.compare.strain_energy.short_wave_energy` has the same of output times.
+    `verify.compare.hooke.short_wave_energy` has the same of output times.
     """
 
     def __init__(self, body: MovingBody, size: float) -> None:

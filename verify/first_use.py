@@ -24,15 +24,14 @@ import numpy as np
 from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.calibration import compile_times
-from verify.compare.cell_tree import build_cell_tree
-from verify.compare.field_kernels import (
+from verify.compare.cell_tree import build_cell_tree, find_cells
+from verify.compare.locate import (
+    SolutionField,
     evaluate_linear,
     evaluate_quadratic,
     squares,
     strain_squares,
 )
-from verify.compare.locate import SolutionField
-from verify.compare.locate_kernels import find_cells
 from verify.compare.overlap import OverlapSearch
 from verify.compare.sides import distance_to_segments
 from verify.compare.simplices import simplices

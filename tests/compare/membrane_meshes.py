@@ -7,7 +7,7 @@ import numpy as np
 from cut_meshes import Map, grid, layered
 from numpy.typing import NDArray
 
-from verify.compare.membrane_body import MembraneBody, cut_membrane
+from verify.compare.simplex_bodies import MembraneBody, cut_membrane
 from verify.scene.cuts import PolygonCut
 from verify.solution import Solution
 

@@ -9,7 +9,7 @@ import numpy as np
 import scenes
 from numpy.typing import NDArray
 
-from verify.compare.solid import SolidBody, solid_of
+from verify.compare.simplex_bodies import SolidBody, solid_of
 from verify.scene import Scene
 from verify.scene.cuts import PolygonCut
 

@@ -7,10 +7,9 @@ from solid_meshes import cube_grid
 
 from verify.compare.body_rule import Rule
 from verify.compare.error_norm import energy_error
-from verify.compare.hooke import corotated, hooke
+from verify.compare.hooke import corotated, hooke, strain_energy
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import points_in
-from verify.compare.strain_energy import strain_energy
 from verify.scene import Material
 
 PLANE = Material(young=1e4, poisson=0.3, plane="strain")

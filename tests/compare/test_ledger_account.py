@@ -9,9 +9,9 @@ from case_texts import body_text
 from cut_meshes import grid, quadratic
 from solid_meshes import cube_grid
 
+from verify.compare.blade import blade_forces, driving_force, swept_area
 from verify.compare.mass import kinetic
 from verify.compare.motion_account import balance, energy_scale, total_energy
-from verify.compare.released import blade_forces, driving_force, swept_area
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solution import Solution

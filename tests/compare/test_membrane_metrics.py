@@ -14,9 +14,9 @@ from verify.compare.error_norm import (
     energy_error,
     jump_error,
 )
-from verify.compare.membrane_body import cut_membrane
+from verify.compare.hooke import field_strain_energy, strain_energy
 from verify.compare.realised import MembraneField, field_of
-from verify.compare.strain_energy import field_strain_energy, strain_energy
+from verify.compare.simplex_bodies import cut_membrane
 from verify.scene.cuts import SweptCut
 
 LAW = Sheet.law

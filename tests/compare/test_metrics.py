@@ -7,9 +7,8 @@ from verify.compare.body_rule import area_rule
 from verify.compare.cut_profile import opening
 from verify.compare.cut_rule import cut_rule
 from verify.compare.error_norm import displacement_error, energy_error, jump_error
-from verify.compare.hooke import hooke
+from verify.compare.hooke import hooke, strain_energy
 from verify.compare.locate import SolutionField
-from verify.compare.strain_energy import strain_energy
 from verify.scene import Material
 
 LAW = hooke(Material(young=1.0, poisson=0.3, plane="strain"))

@@ -5,7 +5,7 @@ import pytest
 import scenes
 
 from reference.exact import exact_solution
-from verify.compare.blade_intensity import blade_front, blade_intensity
+from verify.compare.blade import blade_front, blade_intensity
 from verify.compare.body import body_of
 from verify.compare.motion import ExactMotion
 from verify.judge.stress_intensity import intensity_defect

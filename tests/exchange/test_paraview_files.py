@@ -7,9 +7,8 @@ import pytest
 import pyvista
 
 from reference.exact import exact_solution
-from verify.compare.hooke import law_of, strain_and_stress
+from verify.compare.hooke import law_of, strain_and_stress, strain_energy
 from verify.compare.locate import SolutionField
-from verify.compare.strain_energy import strain_energy
 from verify.exchange import export_fields, problem_of
 from verify.json_files import write_json
 from verify.result import SolveRecord, Status

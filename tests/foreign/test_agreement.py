@@ -16,8 +16,7 @@ import pytest
 from scenes import undamped
 
 from verify.cli import main
-from verify.compare.hooke import hooke
-from verify.compare.strain_energy import strain_energy
+from verify.compare.hooke import hooke, strain_energy
 from verify.exchange import read_answers
 from verify.foreign import foreign_solver, state_of
 from verify.scene import load_scene

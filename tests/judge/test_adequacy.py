@@ -7,8 +7,7 @@ import pytest
 import scenes
 from pydantic import ValidationError
 
-from verify.compare.hooke import law_of
-from verify.compare.strain_energy import strain_energy
+from verify.compare.hooke import law_of, strain_energy
 from verify.judge import adequacy
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.adequacy import adequacy_notice, other_scene

@@ -9,7 +9,7 @@ from solid_meshes import height, inclined, solid_scene, stacked
 
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
-from verify.compare.inertia import separated_parts
+from verify.compare.mass import separated_parts
 from verify.compare.motion_account import motion_account
 from verify.compare.part_account import ACCOUNT as ACCOUNT_METRICS
 from verify.compare.part_account import account_metrics, part_metrics, part_records

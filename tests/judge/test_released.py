@@ -5,10 +5,9 @@ import pytest
 import scenes
 
 from reference.exact import exact_solution
-from verify.compare.hooke import Hooke, law_of
+from verify.compare.blade import advance, released_metrics
+from verify.compare.hooke import Hooke, difference_energy, law_of, short_wave_energy
 from verify.compare.motion_account import motion_account
-from verify.compare.released import advance, released_metrics
-from verify.compare.strain_energy import difference_energy, short_wave_energy
 from verify.errors import InputError
 from verify.solution import Solution
 from verify.solvers import find_solver

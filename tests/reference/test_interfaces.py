@@ -6,8 +6,7 @@ from reference_scenes import square
 from solid_scenes import cube, polygon
 
 from reference.meshing import Grading, conforming_mesh, singular_points
-from verify.compare.hooke import law_of
-from verify.compare.strain_energy import strain_energy
+from verify.compare.hooke import law_of, strain_energy
 from verify.scene import Scene, crossed_by_interfaces
 from verify.solvers import find_solver
 

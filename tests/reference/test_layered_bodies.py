@@ -5,9 +5,8 @@ import pytest
 from reference_scenes import square
 
 from reference.exact import exact_solution
-from verify.compare.hooke import law_of
+from verify.compare.hooke import law_of, strain_energy
 from verify.compare.mass import density_of, kinetic
-from verify.compare.strain_energy import strain_energy
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verify.compare.error_field import nodal_error
+from verify.compare.errors import nodal_error
 from verify.compare.locate import SolutionField
 from verify.judge import accuracy
 from verify.records import ReferenceRecord

@@ -19,7 +19,7 @@ from tool_path_scenes import (
     path_text,
 )
 
-from verify.compare.released import advance
+from verify.compare.blade import advance
 from verify.errors import InputError
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import load_scene

@@ -11,7 +11,7 @@ import pytest
 from strip_rules import RULES, Strip, solve
 
 from reference.exact import exact_of
-from verify.compare.released import advance
+from verify.compare.blade import advance
 from verify.scene import Scene
 from verify.solvers import find_solver
 

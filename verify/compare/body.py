@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.membrane_body import MembraneBody, membrane_of
 from verify.compare.sides import distance_to_cut, distance_to_segments
-from verify.compare.solid import SolidBody, solid_of
+from verify.compare.simplex_bodies import MembraneBody, SolidBody, membrane_of, solid_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
 from verify.geometry.nearest import distance_to_outline

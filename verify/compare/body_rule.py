@@ -23,10 +23,9 @@ from numpy.typing import NDArray
 
 from verify.compare.body import Body
 from verify.compare.cell_tree import morton_order
-from verify.compare.field_kernels import squares
-from verify.compare.locate import Field
+from verify.compare.locate import Field, squares
+from verify.compare.simplex_bodies import SimplexBody
 from verify.compare.simplices import bisect, heights, in_frames, measures, points_in, split_at_level
-from verify.compare.solid import SimplexBody
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
 

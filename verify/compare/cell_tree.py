@@ -1,14 +1,15 @@
-"""A tree of bounding boxes over the cells of a mesh.
+"""A tree of bounding boxes over the cells of a mesh, and the search for cells in it.
 
 A uniform grid of bins fails on meshes that are graded to a crack tip: an eighth of all cells
 can fall into one bin. Boxes over runs of cells in Morton order adapt to the grading and are
-built without recursion.
+built without recursion. Kernels find in it the cell that holds a point or is nearest to it.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 LEAF = 4  # cells per leaf
@@ -124,3 +125,346 @@ def _morton(centres: NDArray[np.float64], in_cubes: bool = False) -> NDArray[np.
             spread = (spread | (spread << shift)) & mask
         code |= spread << axis
     return code
+
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def axes_of(dimension: int) -> tuple[int, ...]:
+    """Return the axes of space as kernels take them: loops over a tuple are unrolled."""
+    return tuple(range(dimension))
+
+
+@njit(inline="always")
+def _depth(x, normals, corners, axes):
+    """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
+    d = len(axes)
+    depth = np.inf
+    for facet in range(d + 1):
+        on_it = (facet + 1) % (d + 1)
+        distance = 0.0
+        for a in range(d):
+            distance += normals[facet, a] * (x[a] - corners[on_it, a])
+        depth = min(depth, distance)
+    return depth
+
+
+@njit(cache=True)
+def segment_distance2(x, a, b):
+    """Squared distance of `x` to the segment ab, in any dimension."""
+    along, length2 = 0.0, 0.0
+    for c in range(x.shape[0]):
+        along += (x[c] - a[c]) * (b[c] - a[c])
+        length2 += (b[c] - a[c]) ** 2
+    t = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
+    distance2 = 0.0
+    for c in range(x.shape[0]):
+        distance2 += (x[c] - a[c] - t * (b[c] - a[c])) ** 2
+    return distance2
+
+
+@njit(inline="always")
+def _outside_distance2(x, normals, corners, axes):
+    """Squared distance to a simplex of a point outside of it."""
+    d = len(axes)
+    best = np.inf
+    for i in range(d + 1):
+        for j in range(i):
+            best = min(best, segment_distance2(x, corners[i], corners[j]))
+    if d == 2:
+        return best
+    for facet in range(4):  # the foot inside a face beats its edges
+        on_it = (facet + 1) % 4
+        height = 0.0
+        for a in range(3):
+            height += normals[facet, a] * (x[a] - corners[on_it, a])
+        if height < 0.0 and _is_over(x, height, facet, normals, corners):
+            best = min(best, height * height)
+    return best
+
+
+@njit(inline="always")
+def _is_over(x, height, facet, normals, corners):
+    """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
+    for other in range(4):
+        if other == facet:
+            continue
+        p, q = (facet + 1) % 4, (facet + 1) % 4
+        for k in range(4):
+            if k != facet and k != other:  # `in` takes longer to compile
+                p, q = q, k
+        side = opposite = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            # across the edge pq, in the facet
+            across = (corners[q, b] - corners[p, b]) * normals[facet, c]
+            across -= (corners[q, c] - corners[p, c]) * normals[facet, b]
+            side += across * (x[a] - height * normals[facet, a] - corners[p, a])
+            opposite += across * (corners[other, a] - corners[p, a])
+        if side * opposite < 0.0:
+            return False
+    return True
+
+
+@njit(inline="always")
+def allowed(wish, side):
+    """Whether sides of cuts do not contradict those that are wished for; 0 is either side."""
+    agreed = True
+    for p in range(wish.shape[0]):
+        if wish[p] * side[p] < 0:
+            agreed = False
+    return agreed
+
+
+@njit(inline="always")
+def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack):
+    """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
+    lower, upper, cells, corners, normals, centres = searched
+    d = len(axes)
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack[0], top = 1, 1
+    best, best_depth, best_side = -1, -np.inf, False
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        inside = True
+        for a in range(d):
+            if x[a] < lower[node, a] - tolerance or x[a] > upper[node, a] + tolerance:
+                inside = False
+        if not inside:
+            continue
+        if node < leaves:
+            stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * leaf_size
+        for k in range(first, first + leaf_size):
+            cell = cells[k]
+            if cell < 0:
+                break
+            depth = _depth(x, normals[cell], corners[cell], axes)
+            if depth < -tolerance or not allowed(wish, sides[cell]):
+                continue
+            if depth > tolerance:
+                return cell
+            on_side = not sided
+            if sided:
+                towards = 0.0
+                for a in range(d):
+                    towards += direction[a] * (centres[cell, a] - x[a])
+                on_side = towards > 0.0
+            if (on_side and not best_side) or (on_side == best_side and depth > best_depth):
+                best, best_depth, best_side = cell, depth, on_side
+    return best
+
+
+@njit(cache=True)
+def _nearest(x, wish, searched, sides, axes, stack):
+    """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
+    lower, upper, cells, corners, normals, _ = searched
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack[0], top = 1, 1
+    best, best2 = -1, np.inf
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if box_distance2(x, lower[node], upper[node]) >= best2:
+            continue
+        if node < leaves:
+            left, right = 2 * node, 2 * node + 1
+            left2 = box_distance2(x, lower[left], upper[left])
+            if left2 < box_distance2(x, lower[right], upper[right]):
+                left, right = right, left
+            stack[top], stack[top + 1] = left, right  # the nearer child is taken first
+            top += 2
+            continue
+        first = (node - leaves) * leaf_size
+        for k in range(first, first + leaf_size):
+            cell = cells[k]
+            if cell < 0:
+                break
+            if not allowed(wish, sides[cell]):
+                continue
+            if _depth(x, normals[cell], corners[cell], axes) >= 0.0:
+                return cell
+            distance2 = _outside_distance2(x, normals[cell], corners[cell], axes)
+            if distance2 < best2:
+                best, best2 = cell, distance2
+    return best
+
+
+@njit(cache=True)
+def box_distance2(x, lower, upper):
+    """Squared distance of `x` to a box, 0 inside."""
+    distance2 = 0.0
+    for a in range(x.shape[0]):
+        gap = max(lower[a] - x[a], x[a] - upper[a])
+        if gap > 0.0:
+            distance2 += gap * gap
+    return distance2
+
+
+def no_sides(places: NDArray[Any]) -> NDArray[np.int8]:
+    """Sides (n, 0) of points or of cells, of which there are n, where no cut is known."""
+    return np.zeros((len(places), 0), dtype=np.int8)
+
+
+def holding_cells(points: Floats, searched: SearchedCells, tolerance: float, **how: bool) -> Ints:
+    """Find the cell (n,) that each point (n, d) lies deepest in; see `find_cells`."""
+    points = np.ascontiguousarray(points, dtype=float)
+    sides = no_sides(searched.corners)
+    return find_cells(points, points[:0], no_sides(points), searched, sides, tolerance, **how)
+
+
+def find_cells(
+    points: Floats,
+    directions: Floats,
+    wanted: NDArray[np.int8],
+    searched: SearchedCells,
+    sides: NDArray[np.int8],
+    tolerance: float,
+    nearest: bool = True,
+) -> Ints:
+    """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
+
+    `directions` is (n, d), or (0, d) where no side is wanted. `wanted` (n, c) is the side of c
+    cuts, −1, 1 or 0 (either), that the cell must lie on, and `sides` (m, c) the one that each cell
+    lies on, 0 if unknown; `searched` is as `SearchedCells`. A point whose wish no cell fulfils
+    gets what it would without one. A point that no cell holds within `tolerance` gets the
+    `nearest` one, or −1.
+    """
+    found = np.full(len(points), -1)
+    some = directions if len(directions) == len(points) else points
+    _find_cells(
+        points, some, some is directions, wanted, searched, sides, tolerance, nearest,
+        axes_of(points.shape[1]), found,
+    )  # fmt: skip
+    return found
+
+
+@njit(cache=True)
+def _find_cells(
+    points, directions, sided, wanted, searched, sides, tolerance, nearest, axes, found
+):
+    _, _, _, corners, normals, _ = searched
+    stack, either = np.empty(64, dtype=np.int64), np.zeros(wanted.shape[1], dtype=wanted.dtype)
+    cell = -1
+    for i in range(len(points)):
+        wish = wanted[i]
+        # points follow each other closely: one well inside the cell of the last belongs to it
+        held = cell >= 0 and allowed(wish, sides[cell])
+        if held and _depth(points[i], normals[cell], corners[cell], axes) > tolerance:
+            found[i] = cell
+            continue
+        for _ in range(2):
+            cell = _containing(
+                points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack
+            )
+            if cell < 0 and nearest:
+                cell = _nearest(points[i], wish, searched, sides, axes, stack)
+            if cell >= 0 or not nearest:
+                break
+            wish = either
+        found[i] = cell
+
+
+@njit(cache=True)
+def nearest_triangles(points, directions, wanted, searched, across, sides, tolerance):
+    """Triangle (n,) nearest to each of `points` (n, 3), and its distance (n,).
+
+    Of those that are equally near within `tolerance` it is the one whose centre lies in the
+    direction (n, 3) that is given, if there is one, then the one whose edges are farthest.
+
+    `wanted` (n, p) is the side of p planes, −1, 1 or 0 (either), that the triangle must lie on,
+    and `sides` (m, p) the one that each triangle lies on, 0 if on both. A point whose wish no
+    triangle fulfils gets the nearest of all. `searched` is as `SearchedCells`, with the normals of
+    the edges, `across` (m, 3) are those of the triangles. `directions` has no rows if none is
+    wanted.
+    """
+    n = points.shape[0]
+    found = np.empty(n, dtype=np.int64)
+    distance = np.empty(n)
+    sided = directions.shape[0] == n
+    nowhere, either = np.zeros(3), np.zeros(wanted.shape[1], dtype=wanted.dtype)
+    for i in range(n):
+        direction = directions[i] if sided else nowhere
+        wish = wanted[i]
+        for _ in range(2):
+            found[i], distance[i] = _nearest_triangle(
+                points[i], direction, sided, wish, searched, across, sides, tolerance
+            )
+            if found[i] >= 0:
+                break
+            wish = either
+    return found, distance
+
+
+@njit(cache=True)
+def _nearest_triangle(x, direction, sided, wish, searched, across, sides, tolerance):
+    lower, upper, cells, corners, normals, centres = searched
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)  # nodes and their distances
+    stack[0], gaps[0], top = 1, 0.0, 1
+    best, nearest, best_depth, best_side = -1, np.inf, -np.inf, False
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if gaps[top] > nearest + tolerance:
+            continue
+        if node < leaves:
+            left, right = 2 * node, 2 * node + 1
+            left_gap = np.sqrt(box_distance2(x, lower[left], upper[left]))
+            right_gap = np.sqrt(box_distance2(x, lower[right], upper[right]))
+            if left_gap < right_gap:  # the nearer child is taken first
+                left, right, left_gap, right_gap = right, left, right_gap, left_gap
+            for child, gap in ((left, left_gap), (right, right_gap)):
+                if gap <= nearest + tolerance:
+                    stack[top], gaps[top] = child, gap
+                    top += 1
+            continue
+        for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
+            cell = cells[k]
+            if cell < 0:
+                break
+            if not allowed(wish, sides[cell]):
+                continue
+            away, depth = _distance_and_depth(x, normals[cell], across[cell], corners[cell])
+            if away > nearest + tolerance:
+                continue
+            if away <= tolerance < depth:  # inside: there is no other
+                return cell, away
+            towards = 0.0
+            if sided:
+                for a in range(3):
+                    towards += direction[a] * (centres[cell, a] - x[a])
+            on_side = not sided or towards > 0.0
+            if (
+                away < nearest - tolerance
+                or (on_side and not best_side)
+                or (on_side == best_side and depth > best_depth)
+            ):
+                best, best_depth, best_side = cell, depth, on_side
+            nearest = min(nearest, away)
+    return best, nearest
+
+
+@njit(cache=True)
+def _distance_and_depth(x, normals, across, corners):
+    """Distance of `x` to a triangle, and of its foot in the plane to the nearest edge, inwards."""
+    depth, height = np.inf, 0.0
+    for k in range(3):
+        inwards = 0.0
+        for a in range(3):
+            inwards += normals[k, a] * (x[a] - corners[(k + 1) % 3, a])
+        depth = min(depth, inwards)
+        height += across[k] * (x[k] - corners[0, k])
+    if depth >= 0.0:
+        return abs(height), depth
+    away2 = np.inf
+    for k in range(3):
+        away2 = min(away2, segment_distance2(x, corners[k], corners[(k + 1) % 3]))
+    return np.sqrt(away2), depth

@@ -19,10 +19,9 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.cut_rule import CutRule
 from verify.compare.error_norm import cut_rules
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
-from verify.compare.membrane_body import MembraneBody
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
+from verify.compare.simplex_bodies import MembraneBody, SolidBody
 from verify.compare.simplices import cells_of, heights, points_in
-from verify.compare.solid import SolidBody
 from verify.geometry.curves import Arc
 from verify.records import CutRecord
 from verify.solution import Solution

@@ -22,8 +22,7 @@ from verify.compare.cut_rule import (
 )
 from verify.compare.error_norm import displacement_jump
 from verify.compare.locate import Field
-from verify.compare.membrane_body import MembraneBody
-from verify.compare.solid import SolidBody
+from verify.compare.simplex_bodies import MembraneBody, SolidBody
 from verify.geometry.patches import (
     CylinderPatch,
     DiscPatch,

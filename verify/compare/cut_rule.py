@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.body_rule import graded_breaks
 from verify.compare.cell_tree import morton_order
-from verify.compare.membrane_body import MembraneBody, SurfaceLines
 from verify.compare.sides import nearest_segments
+from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
 from verify.compare.simplices import divide, measures, points_in, split_at_level
-from verify.compare.solid import SolidBody
 from verify.geometry.patches import Patch, PlanePatch
 
 Array = NDArray[np.float64]

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
 from verify.compare.cut_rule import CutRule, cut_rule, membrane_cut_rule, surface_rule
-from verify.compare.field_kernels import squares
 from verify.compare.hooke import Law
-from verify.compare.locate import Field
-from verify.compare.membrane_body import MembraneBody
+from verify.compare.locate import Field, squares
+from verify.compare.simplex_bodies import MembraneBody
 
 Array = NDArray[np.float64]
 

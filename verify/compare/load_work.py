@@ -11,8 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.inertia import boundary_facets
-from verify.compare.mass import shape_functions
+from verify.compare.mass import boundary_facets, shape_functions
 from verify.compare.simplices import facet_nodes, measures, simplex_rule
 from verify.errors import InputError
 from verify.scene import BodyForce, Scene, Traction

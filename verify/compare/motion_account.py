@@ -2,7 +2,7 @@
 
 Energies are measured on what the solver hands over, each with its interval. Strain energy is that
 of the displacements, kinetic energy that of the velocities with the declared mass
-(`verify.compare.inertia`), which gravity pulls at. Work of dead loads follows from the
+(`verify.compare.mass`), which gravity pulls at. Work of dead loads follows from the
 displacements, that of supports that move from momenta and stresses (`verify.compare.support_work`),
 what damping takes from its rate at the output times. The solver's own ledger is kept beside them,
 to be compared. Its word is the interval only of what no field shows: the work of loads that change
@@ -16,12 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from verify.compare.hooke import Law
-from verify.compare.inertia import Inertia, Part, inertia_of, separated_parts
+from verify.compare.hooke import Law, cell_dissipation, cell_strain_energies
 from verify.compare.load_work import load_work
 from verify.compare.locate import SolutionField
-from verify.compare.mass import Kinetic, density_of, kinetic
-from verify.compare.strain_energy import cell_dissipation, cell_strain_energies
+from verify.compare.mass import (
+    Inertia,
+    Kinetic,
+    Part,
+    density_of,
+    inertia_of,
+    kinetic,
+    separated_parts,
+)
 from verify.compare.support_work import support_work
 from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Scene, Traction, is_uniform

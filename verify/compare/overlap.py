@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.cell_tree import CellTree, build_cell_tree
+from verify.compare.cell_tree import CellTree, build_cell_tree, holding_cells
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.locate_kernels import holding_cells
 from verify.compare.overlap_kernels import facet_distances, first_exits, nearest_before
 from verify.compare.simplices import Simplices, facet_nodes, facet_normals, simplices
 from verify.errors import UnsupportedSceneError

@@ -9,10 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.hooke import Law
-from verify.compare.inertia import Part, boundary_nodes, part_of, separated_parts
+from verify.compare.hooke import Law, cell_strain_energies
 from verify.compare.locate import SolutionField
-from verify.compare.mass import Kinetic, density_of, kinetic
+from verify.compare.mass import (
+    Kinetic,
+    Part,
+    boundary_nodes,
+    density_of,
+    kinetic,
+    part_of,
+    separated_parts,
+)
 from verify.compare.motion import SolutionMotion, step_at
 from verify.compare.motion_account import (
     NO_VELOCITIES,
@@ -24,7 +31,6 @@ from verify.compare.motion_account import (
     total_energy,
     uniform_force,
 )
-from verify.compare.strain_energy import cell_strain_energies
 from verify.errors import UnsupportedSceneError
 from verify.result import Metric, Notice, NoticeKind, PartRecord, SolveRecord
 from verify.scene import BodyForce, Gravity, PartQuantity, Scene, Traction

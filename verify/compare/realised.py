@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody
+from verify.compare.cell_tree import holding_cells
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.locate_kernels import holding_cells
-from verify.compare.membrane_body import MembraneBody
 from verify.compare.sides import AskedCut, asked_sides, distance_to_cut
+from verify.compare.simplex_bodies import MembraneBody
 from verify.compare.simplices import Simplices, facet_normals
 from verify.solution import Solution
 

@@ -12,11 +12,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.hooke import Hooke, hooke
+from verify.compare.hooke import Hooke, hooke, strain_energy
 from verify.compare.locate import SolutionField
 from verify.compare.realised import cut_deviation
 from verify.compare.simplices import simplices
-from verify.compare.strain_energy import strain_energy
 from verify.conformance.check import Check, Finding
 from verify.conformance.scenes import YOUNG, Field
 from verify.conformance.trials import Trial

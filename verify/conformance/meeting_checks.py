@@ -20,10 +20,9 @@ import numpy as np
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut, welded
 from verify.compare.error_norm import cut_rules
-from verify.compare.hooke import hooke
+from verify.compare.hooke import hooke, nodal_strain_energy
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices
-from verify.compare.strain_energy import nodal_strain_energy
 from verify.conformance import meeting_scenes as scenes
 from verify.conformance.check import Check, Finding
 from verify.conformance.field_check import EXACT, Solutions, covered, is_field, named

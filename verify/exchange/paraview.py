@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import body_of
-from verify.compare.error_field import Truth, nodal_differences, truth_of
+from verify.compare.errors import Truth, nodal_differences, truth_of
 from verify.compare.hooke import strain_and_stress
 from verify.compare.locate import SolutionField
 from verify.errors import InputError
@@ -63,7 +63,7 @@ def export_fields(
         Mesh level; default the finest of each solver.
     with_reference : bool
         Whether point data ``reference`` and ``error`` (m) are added: displacement less error, and
-        the error as `verify.compare.error_field` takes it.
+        the error as `verify.compare.errors` takes it.
 
     Returns
     -------

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from verify.compare.blade import blade_forces, released_metrics
 from verify.compare.body import AnyBody, body_of
 from verify.compare.error_norm import spread_of
 from verify.compare.errors import ERROR_NAMES, History, Rules, compared_times, error_history
@@ -25,7 +26,6 @@ from verify.compare.part_account import (
     part_metrics,
     part_records,
 )
-from verify.compare.released import blade_forces, released_metrics
 from verify.compare.simplices import cells_of, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from reference.deformation import wave_speed
-from verify.compare.hooke import Law
-from verify.compare.strain_energy import strain_energy
+from verify.compare.hooke import Law, strain_energy
 from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.result import Notice, NoticeKind, SolveRecord, Status, finest_of
 from verify.scene import RatioCheck, Scene

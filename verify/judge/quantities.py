@@ -11,17 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.blade_intensity import blade_intensity
+from verify.compare.blade import blade_intensity
 from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.cut_profile import cut_place, opening, point_displacement
-from verify.compare.hooke import Law
+from verify.compare.hooke import Law, strain_energy
 from verify.compare.locate import Field
-from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
 from verify.compare.part_account import part_quantity, part_unit
+from verify.compare.simplex_bodies import MembraneBody
 from verify.compare.simplices import cells_of, points_in, simplices
-from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError
 from verify.judge.resultants import WeakForm, mean_stress, reaction, section
 from verify.judge.stress_intensity import Found, solution_intensity

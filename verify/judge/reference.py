@@ -22,11 +22,10 @@ from verify.compare.errors import (
     error_history,
     near_radius,
 )
-from verify.compare.hooke import Corotated, Law
+from verify.compare.hooke import Corotated, Law, field_strain_energy
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import cells_of
-from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.quantities import Measured, field_quantity, local_difference
 from verify.judge.rates import ROUND_OFF, counted_order, cut_on_the_way, error_fall

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from verify.compare.hooke import Hooke, Law
-from verify.compare.inertia import inertia_of, separated_parts
+from verify.compare.hooke import Hooke, Law, stress_power, viscous_power
 from verify.compare.load_work import (
     PrescribedNodes,
     nodal_forces,
@@ -31,10 +30,9 @@ from verify.compare.load_work import (
     spread,
 )
 from verify.compare.locate import ROUND_OFF, Field, SolutionField
-from verify.compare.mass import consistent_mass, density_of, kinetic
+from verify.compare.mass import consistent_mass, density_of, inertia_of, kinetic, separated_parts
 from verify.compare.motion import step_at
 from verify.compare.simplices import measures
-from verify.compare.strain_energy import stress_power, viscous_power
 from verify.compare.support_work import taken_up
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from verify.compare.body import body_of
-from verify.compare.error_field import truth_of, write_error_field
+from verify.compare.errors import truth_of, write_error_field
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.judge.accuracy import assess_accuracy, not_compared

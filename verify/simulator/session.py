@@ -17,7 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from verify.accelerated import FAST
-from verify.compare.released import driving_force
+from verify.compare.blade import driving_force
 from verify.geometry.spatial import measures
 from verify.geometry.swept_shares import SweptShares, swept_measure
 from verify.simulator.semi_progressive import SemiProgressiveCutter, Stroke
