@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from reference.boundary_values import constrained_values
+from reference.boundary_conditions import constrained_values, load_form
 from reference.deformation import lame
 from reference.inside_out import naming_weak_places
 from reference.law import Law, mass_matrix
@@ -24,7 +24,6 @@ from reference.linear_solvers import (
     solve_directly,
     solve_saddle,
 )
-from reference.loads import load_form
 from reference.nodal_algebra import assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError

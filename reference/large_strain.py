@@ -1,25 +1,359 @@
-"""Statics at finite rotation and strain: SNES on the energy, with load steps that adapt."""
+"""Statics at finite rotation and strain: PETSc's Newton on the energy, in load steps that adapt."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.inside_out import Orientation, place_text
-from reference.law import ENERGIES, Law
+from reference.boundary_conditions import RigidMotions
+from reference.deformation import MembraneStretch
+from reference.inside_out import Orientation, OrientationCheck, place_text
+from reference.law import ENERGIES, Law, quadrature
+from reference.linear_solvers import (
+    mean_stiffness,
+    modes_not_positive,
+    near_null_space,
+    options,
+    set_multigrid,
+    solve_directly,
+)
 from reference.space import ConformingSpace
-from reference.strain_equations import StrainEquations
 from verify.scene import Material
 
 Array = NDArray[np.float64]
+_TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
+_UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
+# of stiffness times size squared, J; of stiffness times displacement, N: forces of a rigid motion,
+# whose own scale ‖K u‖ is nothing else
+_ROUND_OFF = 1e-14
+_GOOD_ENOUGH = 1e-8  # of the force scale, where round-off does not let the residual fall further
+_STAGNANT = 0.5  # of the residual of the iteration before, at round-off
+_DIVERGED = 1e4  # of the first residual or of the force scale
+_MOST_ITERATIONS = 25
+# unknowns in space up to which the tangent is factorised; more are solved by multigrid
+_MOST_DIRECT = 40_000
+# A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
+# Tangents, not forces, are those of a tension of so much μ more, falling with Newton's iterations.
+_TENSION = (1.0, 0.1)
+_LINEAR = 1e-6  # of the residual: what a linear solve by multigrid leaves
 _SMALLEST_STEP = 1e-4
 # of a path; one in smaller steps has met what no mesh resolves
 _MOST = {"accepted steps": 100, "refused steps": 50, "Newton iterations": 1000}
 _SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
 _FINER = 2.7  # steps of a second path: another, but no multiple of the first
 _SAME = 1e-6  # of the energy, between two paths
+
+
+class StrainEquations:
+    """Residual and tangent of a strain energy, with the constrained rows taken out.
+
+    Parameters
+    ----------
+    law : Law
+    space : ConformingSpace
+    held : (k,) int array
+        Constrained nodal displacements.
+    load : (n · d,) array or None
+        Nodal forces of the dead loads, N.
+    most_inverted : float
+        Share of the body that may be inside out at singular places.
+
+    Attributes
+    ----------
+    solution : dolfinx.fem.Function
+    orientation : OrientationCheck
+        Of the solution.
+    method : str
+        Solvers of the nonlinear and of the linear systems.
+    iterations : int
+        Newton's so far.
+    """
+
+    def __init__(
+        self,
+        law: Law,
+        space: ConformingSpace,
+        held: NDArray[np.int32],
+        load: Array | None,
+        most_inverted: float,
+    ) -> None:
+        from dolfinx import fem
+        from dolfinx.fem import petsc
+
+        self._law, self._space, self.iterations = law, space, 0
+        self._most_inverted = most_inverted
+        self._unknowns, self.solution = law.unknowns, law.solution
+        self._own, self._at = self._unknowns.own_unknowns(held)
+        self._rows = self._unknowns.rows(held)
+        self._factor, self._is_membrane = 0.0, isinstance(law.state, MembraneStretch)
+        self._motions = RigidMotions(space, held)
+        self.orientation = OrientationCheck(space, held, law.state.J, quadrature_points(space))
+        self._tension: Any = None
+        if not self._is_membrane:
+            self._tangent = law.stiffness_form
+        else:
+            self._tension = fem.Constant(space.function_space.mesh, 1.0)
+            across = law.state.across(law.trial, law.test) * law.state.measure
+            self._tangent = fem.form(law.stiffness + self._tension * law.mu * across)
+        self._matrix: Any = petsc.create_matrix(self._tangent)
+        self._vector = self.solution.x.petsc_vec.duplicate()
+        self._increment, self._load = self._vector.duplicate(), self._vector.duplicate()
+        self._load.array[:] = 0.0 if load is None else self._unknowns.own_part(load)
+        self._force = self._diagonal = 0.0
+        self._first_residual = self._residual_before = np.inf
+        self._solver = self._newton()
+        self._unproven = self._solver.getKSP().getType() == "preonly"
+
+    def advance(self, target: float, values: Array, is_short: bool = False) -> str:
+        """Go to another load factor; say why not, or nothing.
+
+        A state counts if its energy is that before and the work of reactions and loads on the way,
+        by the trapezoidal rule up to a quarter. Less may be stored by what snaps through in a short
+        step, and under dead loads.
+
+        Parameters
+        ----------
+        target : float
+        values : (k,) array
+            Of the constrained unknowns there, m.
+        is_short : bool
+            Whether the step will not be halved for energy that is lost.
+
+        Raises
+        ------
+        IllConditionedError
+            If the first tangent was factorised, and its solution is lost in round-off.
+        """
+        x = self.solution.x.petsc_vec
+        stored = self.energy()
+        self._follow(values)
+        moved, before = x.array.copy(), self._internal_force()
+        rests = bool(np.abs(values[self._at] - moved[self._own]).max(initial=0.0) == 0.0)
+        rests = bool(x.comm.tompi4py().allreduce(int(rests)) == x.comm.size)
+        self._factor = target
+        self._predict(values[self._at])
+        solver = self._solver
+        solver.solve(None, x)
+        self._take(x)
+        self.iterations += solver.getIterationNumber()
+        reason = solver.getConvergedReason()
+        if reason <= 0 and not solver.getFunctionNorm() <= self._round_off():
+            from petsc4py import PETSc
+
+            names = vars(PETSc.SNES.ConvergedReason)
+            words = [n for n, value in names.items() if value == reason and n.isupper()]
+            return f"SNES {words[0].lower() if words else reason}"
+        if lost := self._inside_out():
+            return lost
+        return self._imbalance(stored, before, moved, is_short or rests)
+
+    def _inside_out(self) -> str:
+        """Say where a state is turned inside out that must not be; or nothing."""
+        found = self.orientation()
+        if found.stray:
+            return (
+                f"{found.stray}, away from tips, corners and ends of supports: the body is turned "
+                "inside out there; expected det F > 0, so a smaller load or a finer mesh"
+            )
+        if found.share > self._most_inverted:
+            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
+            return (
+                f"{found.share:.2g} of the {part} is turned inside out, with a least det F of "
+                f"{found.least:.2g} at {place_text(found.place)}; at most {self._most_inverted:g} "
+                "may be"
+            )
+        return ""
+
+    def _judge(self, _snes: Any, iteration: int, norms: tuple[float, float, float]) -> Any:
+        """Give PETSc's reason to end the iterations: balance up to round-off, or divergence."""
+        from petsc4py import PETSc
+
+        reasons, residual, before = PETSc.SNES.ConvergedReason, norms[2], self._residual_before
+        self._residual_before = residual
+        if iteration == 0:
+            self._first_residual, before = residual, np.inf
+        if residual <= _TOLERANCE * self._force:
+            return reasons.CONVERGED_FNORM_ABS
+        if residual > _STAGNANT * before and residual <= self._round_off():
+            return reasons.CONVERGED_FNORM_ABS
+        if residual > _DIVERGED * max(self._first_residual, self._force):
+            return reasons.DIVERGED_DTOL
+        return reasons.ITERATING
+
+    def _round_off(self) -> float:
+        """Residual, in N, that may be left where round-off does not let it fall."""
+        lost = _ROUND_OFF * abs(self._diagonal) * float(np.linalg.norm(self.displacement()))
+        return max(_GOOD_ENOUGH * self._force, lost)
+
+    def _imbalance(self, stored: float, before: Array, moved: Array, may_lose: bool) -> str:
+        """Say that the energy is not what was stored and the work since a state; or nothing."""
+        x = self.solution.x.petsc_vec
+        forces = before + self._internal_force()
+        forces[self._unknowns.pressures] = 0.0
+        work = 0.5 * float(x.comm.tompi4py().allreduce(float(forces @ (x.array - moved))))
+        energy = self.energy()
+        excess = energy - stored - work
+        size = float(np.ptp(self._space.node_points, axis=0).max())
+        allowed = _UNBALANCED * max(energy, stored) + _ROUND_OFF * abs(self._diagonal) * size**2
+        if excess > allowed or (excess < -allowed and not may_lose):
+            return f"{energy:.4g} J stored, {energy - excess:.4g} J accounted for"
+        return ""
+
+    def _internal_force(self) -> Array:
+        """Assemble the forces of the strain energy on the unknowns of this rank, N."""
+        self._assemble_forces(self._vector)
+        return np.array(self._vector.array, dtype=float)
+
+    def negative_modes(self) -> int | None:
+        """Count modes in which the energy does not grow; None if that is not known.
+
+        By the inertia of a factorisation (Sylvester); one negative pivot for each pressure is the
+        saddle's own. Membranes may be slack, and large tangents are not factorised.
+        """
+        linear = self._solver.getKSP()
+        if self._is_membrane or linear.getType() != "preonly":
+            return None
+        self._assemble(self._matrix)
+        self._matrix.zeroRowsColumns(self._rows, self._diagonal)
+        comm = self._space.function_space.mesh.comm
+        return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
+
+    def displacement(self) -> Array:
+        """Nodal displacements (n, d) on every rank, m."""
+        return self._unknowns.everywhere(np.asarray(self.solution.x.array, dtype=float))
+
+    def energy(self) -> float:
+        """Return the stored energy, J (in the plane per metre)."""
+        return self._law.stored()
+
+    def destroy(self) -> None:
+        """Free what PETSc holds."""
+        for entry in (self._solver, self._matrix, self._vector, self._increment, self._load):
+            entry.destroy()
+
+    def _assemble_residual(self, _snes: Any, x: Any, out: Any) -> None:
+        self._take(x)
+        self._assemble_forces(out)
+        out.axpy(-self._factor, self._load)
+        out.array[self._own] = 0.0
+
+    def _assemble_tangent(self, snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
+        self._take(x)
+        self._assemble(matrix, snes.getIterationNumber())
+        matrix.zeroRowsColumns(self._rows, self._diagonal)
+
+    def _follow(self, values: Array) -> None:
+        """Let pieces turn with their supports; what is left is the linear response's."""
+        displacement = self.displacement()
+        moved = self._motions.follow(displacement, values)
+        if moved is None:
+            return
+        x, increment, vector = self.solution.x.petsc_vec, self._increment, self._vector
+        self._take(x)
+        self._assemble(self._matrix)
+        increment.array[:] = self._unknowns.own_part(moved - displacement)
+        # forces of the linear response to the turn: a rigid one has none by which to judge others
+        self._matrix.mult(increment, vector)
+        self._force = max(self._force, float(vector.norm()))
+        x.axpy(1.0, increment)
+        self._take(x)
+
+    def _predict(self, values: Array) -> None:
+        """Add the linear response to the increments of the prescribed values and of the load."""
+        x, increment, vector = self.solution.x.petsc_vec, self._increment, self._vector
+        self._take(x)
+        self._assemble(self._matrix)
+        if not self._diagonal:
+            self._diagonal = mean_stiffness(self._matrix)
+        self._assemble_forces(vector)
+        vector.scale(-1.0)
+        vector.axpy(self._factor, self._load)
+        increment.set(0.0)
+        increment.array[self._own] = values - x.array[self._own]
+        self._matrix.zeroRowsColumns(self._rows, self._diagonal, increment, vector)
+        linear = self._solver.getKSP()
+        linear.setOperators(self._matrix)
+        if self._unproven:  # at rest: what is held too weakly shows as in linear statics
+            solve_directly(linear, self._matrix, increment, vector)
+            self._unproven = False
+        else:
+            linear.solve(vector, increment)
+        self._assemble(self._matrix)
+        self._matrix.mult(increment, vector)
+        self._force = max(self._force, float(vector.norm()), 1e-300)
+        x.axpy(1.0, increment)
+        x.array[self._own] = values
+        self._take(x)
+
+    def _take(self, x: Any) -> None:
+        mine = self.solution.x.petsc_vec
+        if x.handle != mine.handle:
+            x.copy(mine)
+        self._law.update()
+
+    def _assemble_forces(self, out: Any) -> None:
+        """Assemble the forces of the strain energy on all unknowns."""
+        from dolfinx.fem import petsc
+
+        with out.localForm() as local:
+            local.set(0.0)
+        petsc.assemble_vector(out, self._law.work_form)
+        out.ghostUpdate(addv=True, mode="reverse")
+
+    def _assemble(self, matrix: Any, iteration: int = 0) -> None:
+        from dolfinx.fem import petsc
+
+        if self._tension is not None:
+            first, fall = _TENSION
+            self._tension.value = first * fall**iteration
+        matrix.zeroEntries()
+        petsc.assemble_matrix(matrix, self._tangent)
+        matrix.assemble()
+
+    def _newton(self) -> Any:
+        from petsc4py import PETSc
+
+        space, matrix = self._space, self._matrix
+        solver = PETSc.SNES().create(matrix.comm)
+        solver.setType("newtonls")
+        # Turned by the linear response, a slender part is stretched by the square of the angle: the
+        # residual rises by orders of magnitude before it falls, and a slack membrane is overshot.
+        # By options: petsc4py knows the line search itself since 3.23 only.
+        with options(solver, "whole_steps_", {"snes_linesearch_type": "basic"}):
+            solver.setOptionsPrefix("")
+        solver.setTolerances(max_it=_MOST_ITERATIONS)
+        solver.setConvergenceTest(self._judge)
+        solver.setFunction(self._assemble_residual, self._vector.duplicate())
+        solver.setJacobian(self._assemble_tangent, matrix)
+        linear = solver.getKSP()
+        # symmetric, but a tangent at finite rotation need not be definite
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        few = space.mesh.cell_dimension == 2 or space.node_points.size <= _MOST_DIRECT
+        if few or self._law.state.p is not None:  # multigrid is for displacements alone
+            linear.setType("preonly")
+            linear.getPC().setType("cholesky")
+            linear.getPC().setFactorSolverType("mumps")
+            self.method = "PETSc SNES, MUMPS Cholesky"
+            return solver
+        matrix.setNearNullSpace(near_null_space(matrix, space))
+        set_multigrid(linear)
+        linear.setType("gmres")
+        linear.setGMRESRestart(100)
+        linear.setTolerances(rtol=_LINEAR, atol=0.0, max_it=400)
+        self.method = "PETSc SNES, GMRES with GAMG"
+        return solver
+
+
+def quadrature_points(space: ConformingSpace) -> Array:
+    """Points (q, d) of the reference cell at which energies of `space` are integrated."""
+    import basix
+
+    plane = space.mesh.cell_dimension == 2
+    cell = basix.CellType.triangle if plane else basix.CellType.tetrahedron
+    return np.asarray(basix.make_quadrature(cell, quadrature(space))[0], dtype=float)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from reference.dolfinx_versions import create_simplex_mesh
+from reference.installation import create_simplex_mesh
 from reference.meshing import ConformingMesh
 from reference.meshing.opening import measures
 from verify.geometry.refinement import mesh_edges

@@ -151,7 +151,7 @@ def _script(code: str) -> list[str]:
 
 
 def _probe(name: str) -> list[str]:
-    return ["-m", "reference.probe", name]
+    return ["-m", "reference.installation", name]
 
 
 def _tried(name: str, arguments: list[str], cure: str, needed: bool = True) -> Finding:

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from reference.exact.field import Parameters, hooke
-from reference.exact.solution import ExactSolution
+from reference.exact.solution import ExactSolution, Parameters, hooke
 from verify.scene import Material
 
 

@@ -4,10 +4,8 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from reference.exact.arc_crack import ArcCrack, CircularCut
-from reference.exact.field import Hooke, Parameters, hooke
+from reference.exact.circular_cuts import ArcCrack, CircularCut, Penny
 from reference.exact.moving_cracks import BladeStrip, ReleasedBar
-from reference.exact.penny import Penny
 from reference.exact.smooth_fields import (
     Airy,
     Bending,
@@ -17,7 +15,7 @@ from reference.exact.smooth_fields import (
     RolledHalves,
     Sinusoidal,
 )
-from reference.exact.solution import ExactSolution
+from reference.exact.solution import ExactSolution, Hooke, Parameters, hooke
 from reference.exact.straight_cracks import CrackTip, Griffith, StraightFrontField
 from verify.errors import InputError
 from verify.scene import Material, Scene

@@ -5,8 +5,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reference.exact.field import Hooke, Parameters
-from reference.exact.solution import Array, ExactSolution, Plane
+from reference.exact.solution import Array, ExactSolution, Hooke, Parameters, Plane
 from verify.errors import InputError
 from verify.scene import Scene
 

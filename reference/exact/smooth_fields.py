@@ -9,12 +9,14 @@ of the jump, which shears, is a rotation of the second material.
 
 import numpy as np
 
-from reference.exact.field import Hooke, Parameters, hooke
 from reference.exact.solution import (
     Above,
     Array,
     ExactSolution,
+    Hooke,
+    Parameters,
     TwoSidedSolution,
+    hooke,
     line_axes,
     matrices,
     side,

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.field import Hooke, Parameters
-from reference.exact.solution import Array, ExactSolution, outline_of, plane_axes
+from reference.exact.solution import Array, ExactSolution, Hooke, Parameters, outline_of, plane_axes
 from verify.errors import InputError
 from verify.geometry.planar import inner_parts
 from verify.scene import Scene

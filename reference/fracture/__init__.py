@@ -4,19 +4,27 @@ They are computed from a `verify.solution.Solution` alone, so from any solver's.
 """
 
 from reference.fracture.cells import stress_of
-from reference.fracture.front import (
+from reference.fracture.intensity import (
+    DomainError,
+    FrontIntensity,
+    StressIntensity,
+    front_intensity,
+    stress_intensity,
+)
+from reference.fracture.tips import (
     CircularFront,
     Front,
     FrontCoordinates,
     StraightFront,
+    Tip,
     front_at,
     front_reach,
+    no_tip,
     station_count,
     station_spacing,
+    tip_at,
+    tips,
 )
-from reference.fracture.front_intensity import FrontIntensity, front_intensity
-from reference.fracture.intensity import DomainError, StressIntensity, stress_intensity
-from reference.fracture.tips import Tip, no_tip, tip_at, tips
 
 __all__ = [
     "CircularFront",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import cg
 
-from reference.exact.field import Hooke
+from reference.exact.solution import Hooke
 from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution

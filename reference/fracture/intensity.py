@@ -1,26 +1,32 @@
-"""Stress-intensity factors and G of tips in the plane, by integrals over rings of cells."""
+"""Stress intensity factors and G, by integrals in domain form.
+
+At a tip in the plane over rings of cells, along a front in space over tubes.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.field import Hooke, hooke
-from reference.exact.solution import ExactSolution
+from reference.exact.solution import ExactSolution, Hooke, hooke
 from reference.fracture.cells import (
     CellGradients,
     Force,
+    NetForce,
     Stresses,
     cell_gradients,
     net_force,
     stress_of,
 )  # fmt: skip
-from reference.fracture.tips import ahead_of, tip_fields
+from reference.fracture.tips import Front, ahead_of, mode_field, tip_fields
 from verify.errors import InputError
 from verify.scene import ArcCut, Material
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
+_CHUNK = 20_000  # cells at a time
+_ROUND_OFF = 1e-6  # of a cell
+_SAMPLES = 480  # places along a front, where weights are integrated
 
 
 class DomainError(InputError):
@@ -238,3 +244,250 @@ def _integral(around: Ring, flux: Array, change: Array, forces: Array | None) ->
     if forces is not None:
         density -= np.sum(forces * change, axis=2) * around.q
     return float(np.sum(density * around.at.weights))
+
+
+@dataclass(frozen=True)
+class FrontIntensity:
+    """Stress intensity factors along a front, Pa·√m, and its energy release rate.
+
+    Attributes
+    ----------
+    along : (c,) array
+        Arc length of each station, m.
+    modes : (c, 3) array
+        K_I, K_II and K_III, means over the domains. K_II is positive where the upper face, seen
+        across the front, slides ahead; K_III where it slides along the front's third axis.
+    release : (c,) array
+        G, J/m², means over the domains.
+    spread : (c, 3) array
+        Largest deviation of a domain from the mean, of the factors.
+    domains : (r, c, 3) array
+        Factors by domain.
+    """
+
+    along: Array
+    modes: Array
+    release: Array
+    spread: Array
+    domains: Array
+
+
+def front_intensity(
+    solution: Solution,
+    material: Material,
+    front: Front,
+    radii: Array,
+    stations: int = 1,
+    body_force: Force = None,
+    drag: float = 0.0,
+    step: int = -1,
+    fitted: bool = True,
+    stresses: Stresses | None = None,
+) -> FrontIntensity:
+    """K_I, K_II and K_III along the front of a plane crack.
+
+    The interaction integral with the plane tip fields in the coordinates of the front, with the
+    terms of its curvature (M. Gosz & B. Moran, Eng. Fract. Mech. 69, 2002):
+    M = ∫ (σ_ij û_i,k + σ̂_ij u_i,k − σ:ε̂ δ_kj) q_k,j
+    + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − (f_i − ρ (ü_i + α u̇_i)) û_i,k) q_k dV. The virtual
+    extension q points
+    ahead of the front, falls off linearly from half the radius to the radius, and along the front
+    by a hat per station: K is a mean with that weight. Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds.
+    G is ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds, of the
+    field alone.
+
+    Parameters
+    ----------
+    solution : Solution
+        In space and linear elastic.
+    material : Material
+    front : Front
+        Within the largest radius the crack is plane, free of traction, and ends nowhere else.
+    radii : (r,) array
+        Radii of the tubes, m, below the front's own radius.
+    stations : int
+        Number of stations; with one, a closed front gives its mean.
+    body_force : (3,) array or callable, optional
+        Force per volume, or its values (n, 3) at points (n, 3), N/m³.
+    drag : float
+        α, Rayleigh's damping by the mass, 1/s.
+    step : int
+        Which output time; default the last.
+    fitted : bool
+        Whether cells of the mesh must touch the front. They need not in a mesh whose cut ends
+        beside the front.
+    stresses : callable, optional
+        What `stress_of` gives for the solution: where several fronts share it.
+
+    Raises
+    ------
+    InputError
+        If the field is plane, or in motion without accelerations, or a radius or the number of
+        stations does not fit the mesh.
+    """
+    if solution.dimension != 3:
+        raise InputError("stress intensities along a front of a plane field; expected one in space")
+    corners = np.unique(solution.cells[:, :4])
+    place = np.full(len(solution.points), -1, dtype=np.int64)
+    place[corners] = np.arange(len(corners))
+    radii = np.atleast_1d(np.asarray(radii, dtype=float))
+    at = front.coordinates(solution.points[corners])
+    away = np.hypot(at.ahead, at.across)
+    centres, width = _stations(front, stations)
+    along = at.along[place[solution.cells[:, :4]]]
+    beside = np.ones(len(along), dtype=bool)
+    if not front.closed:  # hats are zero beyond its ends
+        beside = (along.max(axis=1) > 0.0) & (along.min(axis=1) < front.length)
+    for radius in radii:
+        _check_fit(solution, away[place[solution.cells[beside, :4]]], radius, fitted)
+    within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
+    nodes = place[solution.cells[within, :4]]
+    force = net_force(solution, material, body_force, drag, step)
+    stresses = stresses or stress_of(solution, hooke(material), step)
+    nodal = _nodal_shares(
+        solution, material, front, within, nodes, at.axes[:, 0], force, stresses, step
+    )
+    hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
+    falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
+    modulus = 0.5 * material.young / (1 - material.poisson**2)
+    extents = _lengths(front, solution.points[corners], nodes, away, hats)
+    if extents.min() <= 1e-3 * front.length / stations:
+        raise InputError(
+            f"{stations} stations along a front of {front.length:.4g} m: one of them has no node "
+            "of the mesh; ask for fewer, or refine"
+        )
+    scale = np.array([modulus, modulus, hooke(material).shear, 1.0]) / extents[:, None]
+    domains = np.array([(hats * fall) @ nodal * scale for fall in falls])
+    mean, spread = domains.mean(axis=0), np.abs(domains - domains.mean(axis=0)).max(axis=0)
+    return FrontIntensity(centres, mean[:, :3], mean[:, 3], spread[:, :3], domains[:, :, :3])
+
+
+def _stations(front: Front, count: int) -> tuple[Array, float | None]:
+    """Arc lengths of the stations, and the half width of the hat of each (None: the whole)."""
+    if count < 1:
+        raise InputError(f"{count} stations along a front; expected at least one")
+    if front.closed:
+        step = front.length / count
+        return step * np.arange(count, dtype=float), step if count > 2 else None
+    step = front.length / (count + 1)
+    return step * np.arange(1.0, count + 1), step
+
+
+def _hat(front: Front, along: Array, centre: float, width: float | None) -> Array:
+    """Weights of a station at places along the front."""
+    if width is None:
+        return np.ones(len(along))
+    apart = along - centre
+    if front.closed:
+        apart = np.mod(apart + 0.5 * front.length, front.length) - 0.5 * front.length
+    return np.clip(1.0 - np.abs(apart) / width, 0.0, 1.0)
+
+
+def _lengths(
+    front: Front, points: Array, cells: NDArray[np.int64], away: Array, hats: Array
+) -> Array:
+    """Integrate weights (c, n) of nodes, linear in cells, along the front, m.
+
+    Cells may be longer than the hats, and nodes, `away` (n,) from the front, beside it: what
+    they make of a hat is what weighs K, be it beyond the ends of the front.
+    """
+    step = front.length / _SAMPLES
+    beyond = 0 if front.closed else _SAMPLES
+    along = step * (np.arange(-beyond, _SAMPLES + beyond, dtype=np.float64) + 0.5)
+    longest = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
+    cells = cells[away[cells].min(axis=1) <= longest]  # no other holds a place of the front
+    corners, size = points[cells], 1e-9 * float(np.ptp(points, axis=0).max())
+    low, high = corners.min(axis=1) - size, corners.max(axis=1) + size
+    total = np.zeros(len(hats))
+    for place in front.places(along):
+        near = np.flatnonzero(((low <= place) & (place <= high)).all(axis=1))
+        if not len(near):
+            continue
+        edges = (corners[near, 1:] - corners[near, :1]).swapaxes(1, 2)
+        share = np.linalg.solve(edges, (place - corners[near, 0])[:, :, None])[:, :, 0]
+        share = np.column_stack([1.0 - share.sum(axis=1), share])
+        inside = int(share.min(axis=1).argmax())
+        if share[inside].min() > -_ROUND_OFF:  # else beyond the surface of the body
+            total += hats[:, cells[near[inside]]] @ share[inside]
+    return total * step
+
+
+def _check_fit(solution: Solution, corner: Array, radius: float, fitted: bool) -> None:
+    """Compare a radius with the distances (c, 4) of corners of cells from the front."""
+    touching = corner.min(axis=1) <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
+    if not fitted:  # what reaches from within a quarter of the radius may hold the front
+        touching = corner.min(axis=1) <= 0.25 * radius
+    if not touching.any():
+        raise InputError("no cell of the mesh touches the front: is it where the cut ends?")
+    if not corner[touching].max() < radius:
+        raise InputError(
+            f"a domain of radius {radius:.4g} m is too small: cells at the front reach "
+            f"{corner[touching].max():.4g} m; expected less"
+        )
+
+
+def _nodal_shares(
+    solution: Solution,
+    material: Material,
+    front: Front,
+    cells: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+    ahead: Array,
+    force: NetForce | None,
+    stresses: Stresses,
+    step: int,
+) -> Array:
+    """M of the modes and G (c, 4), linear in the extension of each node along `ahead` (c, 3)."""
+    nodal = np.zeros((len(ahead), 4))
+    for start in range(0, len(cells), _CHUNK):
+        part, corners = cells[start : start + _CHUNK], nodes[start : start + _CHUNK]
+        field = cell_gradients(solution, part, step)
+        stress = stresses(part, field)
+        forces = None if force is None else force(part, field)
+        found = _front_interaction(material, front, field, stress, ahead[corners], forces)
+        for column in range(4):
+            values = found[:, :, column].ravel()
+            nodal[:, column] += np.bincount(corners.ravel(), values, minlength=len(ahead))
+    return nodal
+
+
+def _front_interaction(
+    material: Material,
+    front: Front,
+    at: CellGradients,
+    stress: Array,
+    ahead: Array,
+    forces: Array | None,
+) -> Array:
+    """M of the modes and G (m, 4, 4) in some cells, if a corner alone moves by one ahead."""
+    local = front.coordinates(at.points.reshape(-1, 3))
+    axes = local.axes
+    # a corner's direction and slopes in the axes of each point: (points, 4, 3)
+    unit = np.repeat(ahead, at.points.shape[1], axis=0)
+    unit = unit @ axes.swapaxes(1, 2)
+    slope = at.hats.reshape(-1, 4, 3) @ axes.swapaxes(1, 2)
+    gradient = axes @ at.gradient.reshape(-1, 3, 3) @ axes.swapaxes(1, 2)
+    stress = axes @ stress.reshape(-1, 3, 3) @ axes.swapaxes(1, 2)
+    turned = gradient.swapaxes(1, 2)
+    share = np.tile(at.corner_shares, (len(at.points), 1))
+    weights = at.weights.reshape(-1, 1)
+    found = np.empty((len(at.points), 4, 4))
+    for mode in (1, 2, 3, 4):
+        if mode < 4:
+            field = mode_field(mode, material, local.ahead, local.across, front.curvature)
+            work = np.sum(field.stress * gradient, axis=(1, 2))  # σ̂ : ε = σ : ε̂
+            moved = field.gradient.swapaxes(1, 2)
+            flux = moved @ stress + turned @ field.stress
+            source = (turned @ field.divergence[:, :, None])[:, :, 0]
+            source[:, 0] += np.sum(stress * field.misfit, axis=(1, 2))
+        else:  # the field itself
+            work, moved = 0.5 * np.sum(stress * gradient, axis=(1, 2)), turned
+            flux, source = moved @ stress, np.zeros((len(turned), 3))
+        flux[:, [0, 1, 2], [0, 1, 2]] -= work[:, None]
+        if forces is not None:
+            force = axes @ forces.reshape(-1, 3, 1)
+            source -= (moved @ force)[:, :, 0]
+        density = np.sum((unit @ flux) * slope, axis=2)
+        density += share * (unit @ source[:, :, None])[:, :, 0]
+        found[:, :, mode - 1] = (weights * density).reshape(len(at.points), -1, 4).sum(axis=1)
+    return found

@@ -16,7 +16,7 @@ from reference.meshing.features import (
     divided_outline,
     plane_features,
 )
-from reference.meshing.interfaces import plane_interfaces
+from reference.meshing.inner_lines import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.session import (
     Grading,

@@ -21,7 +21,7 @@ from reference.meshing.features import (
     plane_features,
     supported_edges,
 )
-from reference.meshing.interfaces import plane_interfaces
+from reference.meshing.inner_lines import plane_interfaces
 from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
 from verify.geometry.refinement import oriented

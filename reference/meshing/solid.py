@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import loosen_front
-from reference.meshing.interfaces import solid_interfaces
+from reference.meshing.inner_lines import clamped_edges, part_lines, solid_interfaces
 from reference.meshing.opening import ConformingMesh, measures, open_cut
-from reference.meshing.part_ends import clamped_edges, part_lines
 from reference.meshing.session import (
     Grading,
     add_polygon,

@@ -11,7 +11,7 @@ from verify.errors import InputError
 from verify.runner.ranks import mpiexec
 
 _ONE = """
-from reference.dolfinx_versions import import_dolfinx
+from reference.installation import import_dolfinx
 import_dolfinx()
 import numpy as np
 from mpi4py import MPI

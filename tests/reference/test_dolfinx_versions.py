@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
 
-from reference.dolfinx_versions import create_simplex_mesh, import_dolfinx
+from reference.installation import create_simplex_mesh, import_dolfinx
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reference.exact import exact_solution, exact_solution_names
-from reference.exact.field import hooke
+from reference.exact.solution import hooke
 from verify.scene import Material
 
 STRAIN = Material(young=1.0, poisson=0.3, plane="strain")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from reference_scenes import needs_fenicsx
 
-from reference.dolfinx_versions import guard_form_cache
+from reference.installation import guard_form_cache
 from verify.doctor import examine_forms
 
 pytestmark = needs_fenicsx
@@ -19,7 +19,7 @@ pytestmark = needs_fenicsx
 
 def compiled(folder, number):
     """Compile a form, with its forms kept in a folder, and integrate it over the unit square."""
-    from reference.dolfinx_versions import import_dolfinx
+    from reference.installation import import_dolfinx
 
     import_dolfinx()
     import ufl
@@ -81,7 +81,7 @@ def test_a_home_that_cannot_be_written_has_its_forms_elsewhere_and_says_so(tmp_p
     environment = {**os.environ, "HOME": str(home), "TMPDIR": str(tmp_path)}
     environment.pop("XDG_CACHE_HOME", None)
     code = (
-        "from reference.dolfinx_versions import import_dolfinx; import_dolfinx()\n"
+        "from reference.installation import import_dolfinx; import_dolfinx()\n"
         "import ufl; from dolfinx import fem, mesh; from mpi4py import MPI\n"
         "square = mesh.create_unit_square(MPI.COMM_SELF, 1, 1)\n"
         "print(fem.assemble_scalar(fem.form(5.25 * ufl.dx(square))))"

@@ -8,7 +8,7 @@ from reference_scenes import needs_fenicsx, polyline, square
 from test_fracture import ALONG_X, ORIGIN, interpolated_tip
 from test_front_fracture import FRONT, prism
 
-from reference.exact.field import hooke
+from reference.exact.solution import hooke
 from reference.fracture import front_intensity, stress_intensity, tips
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of

@@ -10,7 +10,7 @@ from reference_scenes import needs_fenicsx, polyline, square
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from reference import strain_equations
+from reference import large_strain
 from reference.inside_out import singular_nodes
 from verify.judge.richardson import field_uncertainty
 from verify.solvers import find_solver
@@ -249,7 +249,7 @@ def test_a_slender_block_turns_in_few_steps_along_its_load():
 
 def test_the_record_names_the_solver_that_ran(monkeypatch):
     assert slender_block()[0].method == "PETSc SNES, MUMPS Cholesky"
-    monkeypatch.setattr(strain_equations, "_MOST_DIRECT", 0)
+    monkeypatch.setattr(large_strain, "_MOST_DIRECT", 0)
     space = space_of(1, (3, 3, 3))
     found = solve(space, on_ends(space), lambda f: 0.1 * f * space.node_points * [0, 1, 0])
     assert found.method == "PETSc SNES, GMRES with GAMG"

@@ -6,7 +6,7 @@ from ranks_of_tests import on_one_rank_and_two
 from reference_scenes import needs_fenicsx, polyline, square
 from scipy.sparse.linalg import eigsh
 
-from reference.dynamics_cuts import inherit
+from reference.dynamics_body import inherit
 from reference.elasticity import linear_system
 from reference.meshing import Grading, conforming_mesh, singular_points
 from reference.meshing.imprint import imprint, structured_triangles

@@ -10,7 +10,7 @@ from solid_scenes import cube, polygon
 
 from reference.elasticity import solve_linear
 from reference.exact import exact_solution
-from reference.exact.field import hooke
+from reference.exact.solution import hooke
 from reference.fracture import stress_intensity, tips
 from reference.fracture.cells import NodalPressure, cell_gradients
 from reference.space import conforming_space

@@ -137,7 +137,7 @@ def test_a_load_is_that_of_its_piece_for_every_way_to_cut(d, cells, number):
 @pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (2,))])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degree):
-    from reference.loads import load_forces
+    from reference.boundary_conditions import load_forces
     from reference.space import conforming_space
     from verify.solvers.conforming_meshes import peer_mesh, reference_mesh
 

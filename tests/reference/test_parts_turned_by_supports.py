@@ -6,7 +6,7 @@ from large_bodies import forces_of
 from reference_scenes import needs_fenicsx, polyline, square
 from solid_scenes import cube, polygon
 
-from reference.boundary_values import best_rotation
+from reference.boundary_conditions import best_rotation
 from reference.large_strain import solve_large_strain
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut

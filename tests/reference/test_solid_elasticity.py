@@ -286,16 +286,16 @@ def test_linear_elements_equal_another_code_at_finite_rotation():
 
 
 _TURNED = """
-import reference.strain_equations
+import reference.large_strain
 from test_solid_elasticity import hanging
-from reference.boundary_values import constrained_values
-from reference.loads import load_forces
+from reference.boundary_conditions import constrained_values
+from reference.boundary_conditions import load_forces
 from reference.large_strain import solve_large_strain
 from reference.space import conforming_space
 from verify.solvers.conforming_meshes import peer_mesh
 
 if world.size > 1:
-    reference.strain_equations._MOST_DIRECT = 0
+    reference.large_strain._MOST_DIRECT = 0
 scene = hanging([])
 space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, world)
 found = solve_large_strain(

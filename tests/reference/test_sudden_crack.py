@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
 
-from reference.exact.field import Hooke, hooke
 from reference.exact.moving_cracks import sudden_intensity, sudden_slip
+from reference.exact.solution import Hooke, hooke
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.judge.notices import ringing_factors

@@ -120,7 +120,7 @@ class WeakForm:
 
     def _mixed(self, step: int, w: Array) -> float:
         """Power of the stresses of a solution with a pressure of its own."""
-        from reference.exact.field import hooke
+        from reference.exact.solution import hooke
         from reference.fracture.cells import cell_gradients, stress_of
 
         if self.scene.analysis.kinematics != "linear":

@@ -159,7 +159,7 @@ def solution_intensity(
 
 def _shared_stresses(solution: Solution, material: Material, step: int, found: Found) -> Any:
     """Give the stress of a field: a pressure, if it has one, is found once for all of its tips."""
-    from reference.exact.field import hooke
+    from reference.exact.solution import hooke
     from reference.fracture import stress_of
 
     law = hooke(material)
@@ -237,7 +237,7 @@ def _with_free_faces(
             assert normal is not None  # else it is a defect
             stress += np.outer(values, normal) + np.outer(normal, values)
             stress -= (values @ normal) * np.outer(normal, normal)
-    from reference.exact.field import hooke
+    from reference.exact.solution import hooke
 
     law = hooke(scene.material.each[0])
     trace = np.trace(stress) / (d * law.lame + 2 * law.shear)
@@ -289,7 +289,7 @@ def exact_intensity(scene: Scene, exact: Any, asked: FractureQuantity) -> float 
         return None
     if asked.column >= 0:
         return float(stated[asked.column])
-    from reference.exact.field import hooke
+    from reference.exact.solution import hooke
 
     law = hooke(scene.material.each[0])
     k_1, k_2, k_3 = [*stated, 0.0][:3]

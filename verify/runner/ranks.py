@@ -57,7 +57,7 @@ def world() -> Any:
     wanted = int(os.environ.get(RANKS_VARIABLE, "1"))
     if wanted == 1:
         return None
-    from reference.dolfinx_versions import all_ranks
+    from reference.installation import all_ranks
 
     ranks, vendor = all_ranks()
     if ranks.size != wanted:

@@ -4,14 +4,13 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
-from reference.boundary_values import constrained_values, support_ends
-from reference.dolfinx_versions import import_dolfinx
+from reference.boundary_conditions import constrained_values, load_forces, support_ends
 from reference.elasticity import linear_system, solve_linear, wants_pressure
 from reference.exact import exact_of
 from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places, place_text
+from reference.installation import import_dolfinx
 from reference.large_strain import LargeStrainSolve, solve_large_strain
-from reference.loads import load_forces
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
@@ -216,7 +215,7 @@ def _solve(
 
 def _comm() -> Any:
     """Communicator over which a scene is distributed, or None where there is one process only."""
-    from reference.dolfinx_versions import all_ranks
+    from reference.installation import all_ranks
 
     ranks, _ = all_ranks()
     return ranks if ranks.size > 1 else None

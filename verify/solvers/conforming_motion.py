@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.boundary_values import constrained_values
+from reference.boundary_conditions import constrained_values
 from reference.deformation import wave_speed
-from reference.dynamics_body import MovingBody
-from reference.dynamics_cuts import Release, facet_openings, inherit, partly_opened
+from reference.dynamics_body import MovingBody, Release, facet_openings, inherit, partly_opened
 from reference.dynamics_step import (
     Ledger,
     Scheme,

@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from reference.exact.field import hooke
 from reference.exact.moving_cracks import sudden_intensity, wave
+from reference.exact.solution import hooke
 from verify.scene import Material
 from verify.study.calibration.still_scenes import Content, Random
 

@@ -1,4 +1,7 @@
-"""DOLFINx as it is installed: its versions' differences, its cache of forms, its MPI ranks.
+"""FEniCSx and gmsh as installed: probes, versions' differences, cache of forms, MPI ranks.
+
+``python -m reference.installation NAME`` probes one of them and prints one line of JSON: each probe
+runs in a process of its own, because what is half installed may crash or hang instead of failing.
 
 FFCx makes an empty file ``NAME.c``, compiles, and adds ``NAME.c.cached`` at the end. If it is
 killed in between, every later process waits for the end and fails. Here whoever compiles holds a
@@ -6,7 +9,9 @@ lock on ``NAME.lock``, which the system releases when it dies.
 """
 
 import fcntl
+import json
 import os
+import sys
 import tempfile
 import time
 import warnings
@@ -26,6 +31,9 @@ _POLL = 0.05  # s
 # s without a new file after which a program that takes no lock has been killed: DOLFINx itself
 # waits for 10 s at most
 _ABANDONED = 30.0
+OLDEST = (0, 9)  # before, vectors and expressions are others
+# direct solvers, preconditioners and orderings that PETSc may have been built with
+_PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", "hdf5")
 
 
 @cache
@@ -153,9 +161,6 @@ def all_ranks() -> tuple[Any, str]:
     return MPI.COMM_WORLD, MPI.get_vendor()[0]
 
 
-OLDEST = (0, 9)  # before, vectors and expressions are others
-
-
 def import_dolfinx() -> ModuleType:
     """Import DOLFINx; the PyPI wheel wants ``dolfinx_solver`` first.
 
@@ -217,3 +222,115 @@ def create_simplex_mesh(
 def _version() -> tuple[int, int]:
     parts = import_module("dolfinx").__version__.split(".")
     return int(parts[0]), int(parts[1])
+
+
+def _dolfinx() -> str:
+    dolfinx = import_dolfinx()
+    import basix
+    import ufl
+
+    return f"{dolfinx.__version__} (basix {basix.__version__}, ufl {ufl.__version__})"
+
+
+def _petsc() -> str:
+    import_dolfinx()
+    from petsc4py import PETSc
+
+    version = ".".join(map(str, PETSc.Sys.getVersion()))
+    scalar = "real" if np.dtype(PETSc.ScalarType).kind == "f" else "complex"
+    if scalar != "real":
+        raise RuntimeError(f"PETSc {version} is built for complex numbers; real ones are needed")
+    built = [name for name in _PACKAGES if PETSc.Sys.hasExternalPackage(name)]
+    if "mumps" not in built:
+        raise RuntimeError(f"PETSc {version} is built without MUMPS ({', '.join(built)})")
+    return f"{version}, real, with {', '.join([*built, 'gamg'])}"
+
+
+def _slepc() -> str:
+    import_dolfinx()
+    from slepc4py import SLEPc
+
+    return ".".join(map(str, SLEPc.Sys.getVersion()))
+
+
+def _mpi() -> str:
+    import_dolfinx()
+    from mpi4py import MPI
+
+    name, version = MPI.get_vendor()
+    return f"{name} {'.'.join(map(str, version))}"
+
+
+def _forms() -> str:
+    """Compile forms anew and assemble them: needs a C compiler, Python.h, PETSc's library."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _compiled(folder)
+
+
+def _compiled(folder: str) -> str:
+    import_dolfinx()
+    import ufl
+    from dolfinx import fem, mesh
+    from dolfinx.fem.petsc import assemble_matrix  # looks for the library when it is imported
+    from mpi4py import MPI
+
+    anew = {"cache_dir": folder}
+    square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
+    x = ufl.SpatialCoordinate(square)
+    value = fem.assemble_scalar(fem.form(6.0 * x[0] * ufl.dx(square), jit_options=anew))
+    if abs(value - 3.0) > 1e-12:
+        raise RuntimeError(f"the integral of 6x over the unit square came out as {value}")
+    V = fem.functionspace(square, ("Lagrange", 1))
+    product = ufl.TrialFunction(V) * ufl.TestFunction(V) * ufl.dx
+    mass = assemble_matrix(fem.form(product, jit_options=anew))
+    mass.assemble()
+    ones = mass.createVecRight()
+    ones.set(1.0)
+    area = ones.dot(mass * ones)
+    if abs(area - 1.0) > 1e-12:
+        raise RuntimeError(f"the area of the unit square by its mass matrix came out as {area}")
+    return "compiled, assembled, right"
+
+
+def _cache() -> str:
+    """Where compiled forms are kept; in a folder of temporary files, the reason."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        import_dolfinx()
+        folder = guard_form_cache()
+    reasons = [str(one.message) for one in said if issubclass(one.category, RuntimeWarning)]
+    return reasons[0] if reasons else str(folder)
+
+
+def _gmsh() -> str:
+    import gmsh
+
+    gmsh.initialize(["-v", "0"], interruptible=False)
+    try:
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        version: str = gmsh.option.getString("General.Version")
+    finally:
+        gmsh.finalize()
+    return version
+
+
+PROBES: dict[str, Callable[[], str]] = {
+    "dolfinx": _dolfinx,
+    "petsc": _petsc,
+    "slepc": _slepc,
+    "mpi": _mpi,
+    "forms": _forms,
+    "cache": _cache,
+    "gmsh": _gmsh,
+}
+
+
+def main(name: str) -> None:
+    """Run a probe and print what it found."""
+    print(json.dumps({"found": PROBES[name]()}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
