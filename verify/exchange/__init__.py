@@ -5,10 +5,9 @@
 `export_fields` writes the solutions of a run for ParaView.
 """
 
-from verify.exchange.export import Answers, export_case, read_answers
+from verify.exchange.export import Answers, ProgramSolver, export_case, read_answers
 from verify.exchange.paraview import export_fields
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
-from verify.exchange.program import ProgramSolver
 
 __all__ = [
     "Answers",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from verify.errors import InputError
-from verify.exchange.program import ProgramSolver
+from verify.exchange.export import ProgramSolver
 from verify.foreign.records import PROGRAMS, ForeignSolver, foreign_solver
 from verify.json_files import read_json, write_json
 from verify.printable import one_line

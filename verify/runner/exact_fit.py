@@ -17,9 +17,9 @@ from verify.errors import InputError
 from verify.geometry.nearest import distance_to_pieces
 from verify.geometry.spatial import measures, unit_normals
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
-from verify.scene.initial import AtRest, InitialField, Moving
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at
+from verify.scene.tables import AtRest, InitialField, Moving
 from verify.solvers.loads_of_scene import Boundary, ForceDensity
 from verify.xfem.mesh import SimplexMesh
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.scene import RatioCheck, Scene, list_cases, load_scenes
-from verify.scene.family import row_asked
+from verify.scene.loading import row_asked
 
 Predicate = Callable[[Scene], bool]
 _TOKEN = re.compile(r"\(|\)|[^\s()]+")

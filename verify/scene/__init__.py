@@ -12,7 +12,6 @@ from verify.scene.cuts import (
     faces_of,
 )
 from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle, Skin
-from verify.scene.initial import Equilibrium, InitialField, Moving
 from verify.scene.loading import (
     case_folder,
     list_cases,
@@ -25,20 +24,21 @@ from verify.scene.loading import (
     scene_hash,
     scene_schema,
 )
-from verify.scene.materials import Material, crossed_by_interfaces
 from verify.scene.physics import (
     Analysis,
     BodyForce,
     CutFaces,
     Gravity,
+    Material,
     Rotation,
     Support,
     Traction,
+    crossed_by_interfaces,
     is_uniform,
 )
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.scene import Scene
-from verify.scene.tables import Pull
+from verify.scene.tables import Equilibrium, InitialField, Moving, Pull
 from verify.scene.tool_path import ToolPathCut
 
 __all__ = [

@@ -25,7 +25,7 @@ from reference.nodal_algebra import facing_nodes, lasting_ties
 from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
-from verify.scene.initial import starts_open
+from verify.scene.tables import starts_open
 from verify.solvers.runs import LedgerRows, Record, work_of_blades
 from verify.solvers.timeline import march, notes_of_steps, timeline_of
 

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from verify.errors import InputError, UnsupportedSceneError
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, Scene, ToolPathCut
-from verify.scene.initial import starts_open
+from verify.scene.tables import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings
