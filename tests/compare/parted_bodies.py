@@ -11,7 +11,7 @@ from verify.compare.body import AnyBody, body_of
 from verify.geometry.spatial import frame
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.solvers.openings_of_scene import cuts_of
+from verify.solvers.body_of_scene import cuts_of
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.structured_meshes import box_mesh

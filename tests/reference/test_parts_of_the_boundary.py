@@ -16,9 +16,8 @@ from verify.methods import METHODS
 from verify.records import Regularisation
 from verify.result import SolveRecord, Status
 from verify.solvers import find_solver
-from verify.solvers.body_of_scene import background_mesh
-from verify.solvers.loads_of_scene import loads_of
-from verify.solvers.openings_of_scene import cuts_of
+from verify.solvers.body_of_scene import background_mesh, cuts_of
+from verify.solvers.boundary_conditions import loads_of
 
 pytestmark = needs_fenicsx
 

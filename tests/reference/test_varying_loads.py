@@ -7,9 +7,8 @@ from reference_scenes import energy_of, needs_fenicsx, polyline, square
 from reference.exact import exact_solution
 from verify.exchange import problem_of
 from verify.scene import BodyForce
-from verify.solvers.body_of_scene import background_mesh
-from verify.solvers.loads_of_scene import loads_of
-from verify.solvers.openings_of_scene import cuts_of
+from verify.solvers.body_of_scene import background_mesh, cuts_of
+from verify.solvers.boundary_conditions import loads_of
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.phantom import cut_mesh
 

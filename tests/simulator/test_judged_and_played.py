@@ -7,7 +7,7 @@ from thesis_stages import CASES, stage
 from verify.scene import load_scene
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.session import KnownWays
-from verify.solvers.openings_of_scene import Openings, cuts_of
+from verify.solvers.body_of_scene import Openings, cuts_of
 from verify.xfem.phantom import cut_mesh
 
 

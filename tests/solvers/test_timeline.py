@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import scene
 
-from verify.solvers.timeline import march, notes_of_steps, timeline_of
+from verify.solvers.runs import march, notes_of_steps, timeline_of
 
 OFF = 1e-10  # s, of a motion of one second: less than what steps added up are off by
 

@@ -18,8 +18,8 @@ from tool_path_scenes import (
 
 from verify.compare.motion_account import energy_scale, total_energy
 from verify.scene import load_scene
+from verify.solvers.body_of_scene import Openings
 from verify.solvers.interface import find_solver
-from verify.solvers.openings_of_scene import Openings
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.cuts import Polyline

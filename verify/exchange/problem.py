@@ -32,7 +32,7 @@ from verify.scene import (
 from verify.scene.parts import HeldFacets, Pieces, pieces_on_part
 from verify.scene.physics import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
-from verify.solvers.loads_of_scene import Boundary, ForceDensity, is_moving
+from verify.solvers.boundary_conditions import Boundary, ForceDensity, is_moving
 from verify.xfem.loads import simplex_rule
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at
 from verify.scene.tables import AtRest, InitialField, Moving
-from verify.solvers.loads_of_scene import Boundary, ForceDensity
+from verify.solvers.boundary_conditions import Boundary, ForceDensity
 from verify.xfem.mesh import SimplexMesh
 
 Array = NDArray[np.float64]

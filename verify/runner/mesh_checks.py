@@ -26,9 +26,8 @@ from verify.scene import (
 from verify.scene.parts import on_part
 from verify.scene.physics import field_values
 from verify.scene.placement import misplaced_point
-from verify.solvers.body_of_scene import background_mesh
-from verify.solvers.openings_of_scene import cuts_of
-from verify.solvers.supports_of_scene import supports_of
+from verify.solvers.body_of_scene import background_mesh, cuts_of
+from verify.solvers.boundary_conditions import supports_of
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh

@@ -23,7 +23,7 @@ from verify.geometry.swept_shares import SweptShares, swept_measure
 from verify.simulator.semi_progressive import SemiProgressiveCutter, Stroke
 from verify.simulator.stage import Grips, Stage, gripped, held_facets
 from verify.simulator.surfaces import Contacts, Picture, SurfaceCollider, Surfaces
-from verify.solvers.openings_of_scene import sections
+from verify.solvers.body_of_scene import sections
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.cuts import ToolPath

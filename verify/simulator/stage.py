@@ -16,7 +16,7 @@ from verify.simulator.growing_body import GrowingBody
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.solvers.body_of_scene import background_mesh
-from verify.solvers.loads_of_scene import Boundary
+from verify.solvers.boundary_conditions import Boundary
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.body import MovingSupports, RayleighDamping
 from verify.xfem.cuts import ToolPath

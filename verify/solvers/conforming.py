@@ -20,8 +20,7 @@ from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
 from verify.solvers.interface import check_choices
-from verify.solvers.runs import Record, across_interfaces, at_rest, repeated
-from verify.solvers.timeline import OPENINGS
+from verify.solvers.runs import OPENINGS, Record, across_interfaces, at_rest, repeated
 from verify.system import System
 
 # Spectral radii of the reference in linear motion: what jumps excites waves that no mesh resolves.

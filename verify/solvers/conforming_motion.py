@@ -26,8 +26,14 @@ from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.tables import starts_open
-from verify.solvers.runs import LedgerRows, Record, work_of_blades
-from verify.solvers.timeline import march, notes_of_steps, timeline_of
+from verify.solvers.runs import (
+    LedgerRows,
+    Record,
+    march,
+    notes_of_steps,
+    timeline_of,
+    work_of_blades,
+)
 
 Array = NDArray[np.float64]
 _JUST = 1e-12  # of the duration: loads are taken that much later, after a jump

@@ -14,10 +14,8 @@ from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import Regularisation
-from verify.solvers.body_of_scene import density_of, material_of
-from verify.solvers.openings_of_scene import Openings
-from verify.solvers.runs import LedgerRows, Record, work_of_blades
-from verify.solvers.timeline import Timeline, march, notes_of_steps
+from verify.solvers.body_of_scene import Openings, density_of, material_of
+from verify.solvers.runs import LedgerRows, Record, Timeline, march, notes_of_steps, work_of_blades
 from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.body import DynamicBody, Integrator, MotionState

@@ -11,9 +11,8 @@ from verify.accelerated import FAST
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import material_of
-from verify.solvers.loads_of_scene import loads_of
+from verify.solvers.boundary_conditions import loads_of, path_of_supports, support_ends
 from verify.solvers.runs import Record, across_interfaces, at_rest
-from verify.solvers.supports_of_scene import path_of_supports, support_ends
 from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty

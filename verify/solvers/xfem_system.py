@@ -19,8 +19,13 @@ from verify.methods.mass_variants import (
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
 from verify.scene.physics import factor_at, first_factor
 from verify.solvers.body_of_scene import density_of, material_of
-from verify.solvers.loads_of_scene import forces_of, is_moving
-from verify.solvers.supports_of_scene import motion_of_supports, path_of_supports, supports_of
+from verify.solvers.boundary_conditions import (
+    forces_of,
+    is_moving,
+    motion_of_supports,
+    path_of_supports,
+    supports_of,
+)
 from verify.system import System
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
