@@ -22,7 +22,7 @@ from reference.meshing import ConformingMesh, open_cut
 from reference.nodal_algebra import NodalMatrix, NodalSolver, TiedSolver
 from reference.space import ConformingSpace, TiedUnknowns
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_pieces
+from verify.geometry.simplices import distance_to_pieces
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Gravity, Scene, ToolPathCut
 from verify.scene.physics import PrescribedMotion, factor_at, first_factor

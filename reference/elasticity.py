@@ -27,7 +27,7 @@ from reference.linear_solvers import (
 from reference.nodal_algebra import assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import measures
 from verify.scene import Material, Scene
 
 # Poisson's ratio from which the pressure pays, measured: docs/theory/reference.md

@@ -39,21 +39,19 @@ from verify.solution import Solution
 from verify.threads import ONE_THREAD
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, ToolPath
-from verify.xfem.elasticity import State, isotropic
+from verify.xfem.element import State, isotropic
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force
+from verify.xfem.loads_and_supports import Supports, body_force
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 _SECONDS = 1200.0  # ten times what a slow core takes
 

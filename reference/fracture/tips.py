@@ -17,8 +17,8 @@ from reference.meshing.features import plane_features
 from reference.meshing.inner_lines import plane_interfaces
 from reference.meshing.session import singular_points
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.simplices import distance_to_outline
 from verify.scene import (
     ArcCut,
     Box,

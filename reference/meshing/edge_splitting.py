@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.opening import doubled_nodes
-from verify.geometry.nearest import nearest_parts
-from verify.geometry.refinement import mesh_edges
+from verify.geometry.simplices import mesh_edges, nearest_parts
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]

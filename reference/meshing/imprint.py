@@ -23,9 +23,8 @@ from scipy.spatial import cKDTree
 from reference.meshing.edge_splitting import barycentric, loosen_front, split_edges
 from reference.meshing.opening import cell_facets, inner_facets, measures
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
-from verify.geometry.refinement import mesh_edges, oriented
+from verify.geometry.simplices import distance_to_outline, mesh_edges, oriented
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]

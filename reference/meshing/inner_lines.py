@@ -17,8 +17,8 @@ from reference.meshing.edge_splitting import split_edges
 from reference.meshing.features import Feature
 from reference.meshing.opening import cell_facets, doubled_nodes
 from verify.errors import UnsupportedSceneError
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.simplices import distance_to_outline
 from verify.scene import Box, Polygon, Rectangle, Scene, Traction
 from verify.scene.parts import on_part, pieces_on_part, size_of
 from verify.scene.regions import Region, Side, comparisons, is_affine, parse_region

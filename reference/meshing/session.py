@@ -22,9 +22,8 @@ from reference.meshing.features import (
     supported_edges,
 )
 from reference.meshing.inner_lines import plane_interfaces
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
-from verify.geometry.refinement import oriented
+from verify.geometry.simplices import distance_to_outline, oriented
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import FractureQuantity
 from verify.scene.tool_path import Cut

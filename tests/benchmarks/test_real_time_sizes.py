@@ -15,7 +15,7 @@ import pytest
 from verify.calibration import kernel_seconds
 from verify.simulator import Hold, Session, Stage
 from verify.xfem.cuts import ToolPath
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.mesh import SimplexMesh
 
 pytestmark = [pytest.mark.timing, pytest.mark.heavy]

@@ -15,7 +15,7 @@ from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.surfaces import SurfaceCollider
 from verify.xfem.cuts import ToolPath
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.mesh import box_mesh
 
 pytestmark = pytest.mark.timing
 

@@ -14,15 +14,15 @@ from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import box_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.supports import Supports
 
 pytestmark = pytest.mark.timing
 

@@ -23,12 +23,12 @@ from verify.accelerated.conjugate_gradients import (
 )
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 pytestmark = [pytest.mark.timing, pytest.mark.benchmark(timer=process_time)]
 
@@ -212,7 +212,7 @@ from pathlib import Path
 import numpy as np
 import test_xfem_scale as scale
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.mesh import box_mesh
 
 def peak():
     lines = Path("/proc/self/status").read_text().splitlines()

@@ -14,12 +14,11 @@ from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.block_pattern import block_pattern, constrain
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force
+from verify.xfem.loads_and_supports import Supports, body_force
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 pytestmark = pytest.mark.timing
 

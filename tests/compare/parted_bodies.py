@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from verify.compare.body import AnyBody, body_of
-from verify.geometry.spatial import frame
+from verify.geometry.simplices import frame
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers.body_of_scene import cuts_of
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.subdivision import subdivide
 
 Array = NDArray[np.float64]

@@ -19,13 +19,13 @@ from verify.exchange import export_case, read_answers
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
 from verify.xfem.body import DynamicBody
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.supports import Supports
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from verify.geometry.curves import Arc, Segment
-from verify.geometry.nearest import distance_to_pieces, feet, nearest_parts
 from verify.geometry.patches import CylinderPatch, DiscPatch, PlanePatch, SpherePatch
-from verify.geometry.spatial import ear_clipping, frame, measures, unit_normals
+from verify.geometry.simplices import (
+    distance_to_pieces,
+    ear_clipping,
+    feet,
+    frame,
+    measures,
+    nearest_parts,
+    unit_normals,
+)
 
 AXES = frame(np.array([0.3, -0.5, 0.8]), np.array([1.0, 0.4, 0.0]))
 ORIGIN = np.array([0.2, -0.1, 0.4])

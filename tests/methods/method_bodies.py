@@ -3,10 +3,9 @@
 import numpy as np
 
 from verify.methods import METHODS, cut_by
-from verify.xfem.elasticity import isotropic
-from verify.xfem.loads import body_force
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports, body_force
 from verify.xfem.statics import solve_static
-from verify.xfem.supports import Supports
 
 CUTTING = [name for name in METHODS if name != "uncut"]
 MATERIAL = {2: isotropic(1.0, 0.3, "plane strain"), 3: isotropic(1.0, 0.3, "solid")}

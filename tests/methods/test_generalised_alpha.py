@@ -10,8 +10,8 @@ from verify.xfem.energy_balance import run
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.supports import Supports
 
 RADII = [0.0, 0.3, 0.8, 1.0]
 

@@ -8,13 +8,13 @@ from verify.methods import cut_by
 from verify.methods.springs import SpringForce
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Polyline
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.implicit import ImplicitEuler
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.mesh import rectangle_mesh
 
 MATERIAL = isotropic(1e4, 0.3, "plane strain")
 CUT = Polyline([[-1.0, 0.47], [2.0, 0.53]])

@@ -6,10 +6,10 @@ from method_bodies import CUTTING, MATERIAL, at_places, hang, held_at
 
 from verify.methods.cut_body import OpenedMesh
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.loads import body_force
+from verify.xfem.loads_and_supports import body_force
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 AXIS = {2: 1, 3: 2}
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from verify.methods import cut_by
 from verify.methods.removal import bisect_cells
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 FEW = settings(max_examples=30, deadline=None, derandomize=True)
 

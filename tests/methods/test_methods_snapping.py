@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from verify.methods import cut_by
 from verify.methods.snapping import snap_nodes, take_near_nodes
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 number = st.floats(-1.0, 1.0)
 FEW = settings(max_examples=40, deadline=None, derandomize=True)

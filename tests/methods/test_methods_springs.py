@@ -7,10 +7,9 @@ from verify.methods import cut_by
 from verify.methods.springs import SpringForce, spring_stiffness
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Polyline
-from verify.xfem.elasticity import Material, isotropic
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.element import Material, isotropic
+from verify.xfem.mesh import SimplexMesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import rectangle_mesh
 
 
 def sheet_of_equilateral_triangles(rows=6, columns=6, edge=0.2):

@@ -8,11 +8,11 @@ from skfem.models.elasticity import linear_elasticity
 
 from verify.methods import cut_by
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane, Polyline
+from verify.xfem.explicit import critical_step, element_critical_steps
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 LINES = [Polyline([[-0.1, 0.31], [0.62, 0.55]])]
 CROSSING = [Polyline([[0.13, 0.31], [0.88, 0.77]]), Polyline([[0.13, 0.72], [0.88, 0.24]])]

@@ -6,9 +6,8 @@ from method_bodies import hang
 
 from verify.methods import cut_by
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])

@@ -13,15 +13,15 @@ from verify.methods.tip_nodes import with_tip_nodes
 from verify.scene import Scene, load_scene
 from verify.solution import Regularisation
 from verify.solvers import find_solver
-from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
+from verify.xfem.explicit import critical_step
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 SOFT = isotropic(1.0, 0.3, "plane strain")
 SEEDS = [*range(10), *(pytest.param(n, marks=pytest.mark.heavy) for n in range(10, 50))]

@@ -15,8 +15,8 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.xfem.cuts import ImplicitCut, Polyline
 from verify.xfem.mass import consistent_mass, second_moments
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 BODIES = [lambda: cut_body(2), lambda: cut_body(3), cut_membrane]
 XFEM = find_solver("xfem")

@@ -16,7 +16,7 @@ from verify.compare.mass import kinetic
 from verify.judge.quantities import Measured
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
-from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.mesh import rectangle_mesh
 
 pytestmark = needs_fenicsx
 

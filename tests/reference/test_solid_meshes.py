@@ -16,7 +16,7 @@ from reference.meshing import (
 from reference.meshing.edge_splitting import split_edges
 from reference.meshing.opening import cell_facets
 from verify.errors import InputError, UnsupportedSceneError
-from verify.geometry.refinement import mesh_edges, refine_uniformly
+from verify.geometry.simplices import mesh_edges, refine_uniformly
 
 UNIFORM = Grading(0.15, np.zeros((0, 3)))
 

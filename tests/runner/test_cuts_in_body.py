@@ -15,7 +15,7 @@ from verify.errors import InputError
 from verify.runner.checking import check_scene
 from verify.runner.mesh_checks import check_places_in_mesh
 from verify.solvers.body_of_scene import background_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from case_texts import cut_text, support_text
 
 from verify.cli import main
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.mesh import box_mesh
 
 TEXT = (
     'title = "t"\nrequirement = "r"\n[geometry]\nkind = "file"\nfile = "{file}"\ndimension = 3\n'

@@ -16,7 +16,7 @@ from verify.exchange import export_case, problem_of
 from verify.scene import load_scene, read_mesh, restore_scene, scene_content
 from verify.scene.mesh_file import read_body
 from verify.solvers.xfem import XfemSolver
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.mesh import box_mesh
 
 CASE = """
 title = "A body of one's own"

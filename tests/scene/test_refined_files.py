@@ -6,13 +6,13 @@ import pytest
 
 from verify.errors import InputError
 from verify.exchange import problem_of
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import measures
 from verify.scene import load_scene, read_mesh
 from verify.scene.parts import pieces_on_part
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.xfem import XfemSolver
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 CASE = """
 title = "A body from a file, refined"

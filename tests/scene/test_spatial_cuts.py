@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_triangles
-from verify.geometry.spatial import area_inside, ear_clipping, overlap_area
+from verify.geometry.simplices import area_inside, distance_to_triangles, ear_clipping, overlap_area
 from verify.scene import (
     CylinderCut,
     DiscCut,

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
+from verify.geometry.simplices import distance_to_outline
 from verify.scene import Rotation, Support, ToolPathCut, load_scene
 from verify.scene.physics import factor_at, first_factor, jumps, slope_at
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from verify.simulator import Hook, Session, Stage, quality_of
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
 
 _STEPS = 24  # a third each: cutting, pulling, at rest
 _ROUND_OFF = 1e-12

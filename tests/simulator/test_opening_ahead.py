@@ -10,9 +10,8 @@ from verify.simulator import Hold, Session, Stage
 from verify.simulator import session as played
 from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.cuts import ToolPath
-from verify.xfem.elasticity import isotropic
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.element import isotropic
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 
 STEP = 0.004  # s
 

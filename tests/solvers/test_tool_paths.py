@@ -23,8 +23,8 @@ from verify.solvers.interface import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.cuts import Polyline
+from verify.xfem.mesh import rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import rectangle_mesh
 
 
 def solve(folder, text, **parameters):

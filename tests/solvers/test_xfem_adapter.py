@@ -13,7 +13,7 @@ from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
-from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.mesh import rectangle_mesh
 
 STRIP = (
     body_text(

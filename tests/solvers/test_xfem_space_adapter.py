@@ -7,7 +7,7 @@ from case_texts import body_text, cut_text, sheet_text, support_text, weight_tex
 
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
-from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.mesh import rectangle_mesh
 
 CUBE = body_text(
     "A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[4, 4, 4], [8, 8, 8]], density="1.0"

@@ -5,15 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mass import Mass, side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 SOFT = 1e4  # Pa, the thesis' material
 DENSITY = 1000.0  # kg/m³

@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 
 _Floats = NDArray[np.float64]
 

@@ -2,10 +2,9 @@
 
 from hypothesis import strategies as st
 
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 
 _ANYWHERE = st.floats(-0.4, 1.4, allow_subnormal=False)
 # on nodes, edges and faces of the meshes below, and next to them

@@ -5,15 +5,14 @@ from cut_bodies import DENSITY, material, shaken
 
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody
-from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
-from verify.xfem.explicit import CentralDifferences
+from verify.xfem.explicit import CentralDifferences, critical_step
 from verify.xfem.internal_force import InternalForce, inverted_cells
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 STRAIN, POISSON = 0.15, 0.3
 

@@ -10,17 +10,21 @@ from time_schemes import SCHEMES
 from verify.methods.mass_variants import shifted_mass
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, MotionState
-from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.energy_balance import BalanceRecorder, run
 from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.explicit import CentralDifferences, ForwardEuler
-from verify.xfem.inherit import ancestors, inherit_state
+from verify.xfem.explicit import (
+    CentralDifferences,
+    ForwardEuler,
+    critical_step,
+    element_critical_steps,
+)
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
+from verify.xfem.release import ancestors, inherit_state
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.supports import Supports
 
 
 def moving(phantom, top_held=False):

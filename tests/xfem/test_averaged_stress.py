@@ -14,11 +14,10 @@ from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import StepEnds, averaged_moduli, averaged_stress
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.polar import nearest_rotations
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.structured_meshes import box_mesh
 
 LAM, MU = 1.3, 0.7
 

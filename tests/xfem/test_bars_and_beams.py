@@ -14,8 +14,8 @@ from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 HALF, STRAIN = 0.5, 0.01
 

@@ -7,12 +7,11 @@ from thesis_blocks import shifted_stiffness, transformation, transformed_matrix
 from xfem_bodies import boundary_nodes, sparse_stiffness
 
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
-from verify.xfem.elasticity import isotropic
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 CASES = {
     "through": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.0], [2.0, 1.0]])),

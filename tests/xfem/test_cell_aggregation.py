@@ -7,19 +7,18 @@ from cut_bodies import rotation, shaken
 from test_sliver_policies import degenerate_cuts
 from xfem_bodies import boundary_nodes, relative_l2_error
 
+from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import body_pattern, find_places
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force, simplex_rule
+from verify.xfem.loads_and_supports import Supports, body_force, simplex_rule
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 SOFT = {2: isotropic(1.0, 0.3, "plane strain"), 3: isotropic(1.0, 0.3, "solid")}
 

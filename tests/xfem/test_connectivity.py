@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from xfem_bodies import zero_modes
 
 from verify.xfem.cuts import Plane, PolygonPatch, Polyline
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 SQUARE = rectangle_mesh((4, 4))
 CUBE = box_mesh((2, 2, 2))

@@ -9,13 +9,13 @@ from verify.accelerated.one_pass import rotation_matrices
 from verify.xfem import statics
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.linear_solvers import PLAIN
+from verify.xfem.mesh import rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.polar import largest_eigenvector, nearest_rotations, rotations_in_space
-from verify.xfem.structured_meshes import rectangle_mesh
 
 
 def _bodies():

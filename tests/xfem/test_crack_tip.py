@@ -7,13 +7,12 @@ from thesis_blocks import shifted_stiffness
 from xfem_bodies import boundary_nodes
 
 from verify.xfem.cuts import Polyline
-from verify.xfem.elasticity import isotropic
-from verify.xfem.loads import simplex_rule
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports, simplex_rule
+from verify.xfem.mesh import rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 KOLOSOV = 3.0 - 4.0 * exact.POISSON
 

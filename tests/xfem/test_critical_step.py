@@ -7,14 +7,12 @@ from cut_bodies import DENSITY, cut_body, material
 from verify.methods.mass_variants import shifted_mass
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody, StepFailedError
-from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
-from verify.xfem.explicit import CentralDifferences
+from verify.xfem.explicit import CentralDifferences, critical_step, element_critical_steps
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 EPSILONS = (0.5, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)
 MASSES = {

@@ -15,11 +15,10 @@ from verify.compare.simplices import measures
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.surfaces import SurfaceCollider
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
-from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import nearest_on_facet
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.mesh import SimplexMesh, box_mesh
 
 COORDINATE = st.floats(-3.0, 3.0)
 

@@ -5,11 +5,10 @@ import pytest
 from cut_comparison import assert_same_cut
 
 from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 PLANE_STROKES = [
     ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),

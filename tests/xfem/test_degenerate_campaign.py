@@ -13,9 +13,8 @@ from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 STROKES = 4  # a body; each one meets what those before have left
 

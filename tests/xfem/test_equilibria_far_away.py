@@ -6,19 +6,16 @@ from cut_bodies import material
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
+from verify.xfem.arrays import SingularStiffnessError
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.loads_and_supports import Supports, body_force
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.static_newton import Newton, NotInEquilibriumError, collapsed_cells
-from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
+from verify.xfem.statics import Newton, NotInEquilibriumError, collapsed_cells, solve_static
 
 YOUNG = 1e4
 

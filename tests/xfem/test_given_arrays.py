@@ -5,21 +5,18 @@ import pytest
 from cut_bodies import cut_body, cut_membrane, material
 
 from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath, TriangulatedSurface
-from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
+from verify.xfem.element import isotropic
+from verify.xfem.explicit import critical_step, element_critical_steps
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force, traction
+from verify.xfem.loads_and_supports import Supports, body_force, traction
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.static_newton import collapsed_cells
-from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
+from verify.xfem.statics import collapsed_cells, solve_static
 
 PLATE, BLOCK = rectangle_mesh((4, 4)), box_mesh((2, 2, 2))
 CUT = cut_mesh(PLATE, [Plane([0.5, 0.53], [0.0, 1.0])])

@@ -8,7 +8,7 @@ from verify.simulator.embedded_surface import EmbeddedSurface
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 
 THROUGH = [
     ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [0.0, 1.0], [0.0, 1.4, 0.05]),

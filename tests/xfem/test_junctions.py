@@ -9,18 +9,15 @@ from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch
-from verify.xfem.elasticity import isotropic
+from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath
+from verify.xfem.element import isotropic
 from verify.xfem.faceted_cuts import Polyline
-from verify.xfem.loads import body_force
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.loads_and_supports import Supports, body_force
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
-from verify.xfem.tool_path import ToolPath
 
 
 def sectors(rng, count, least=0.35):

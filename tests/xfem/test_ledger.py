@@ -7,10 +7,9 @@ from time_schemes import SCHEMES
 
 from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.body import DynamicBody, MovingSupports, RayleighDamping
-from verify.xfem.critical_step import critical_step
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler, critical_step
 from verify.xfem.implicit import ImplicitEuler
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass

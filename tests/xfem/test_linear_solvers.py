@@ -13,19 +13,18 @@ from verify.accelerated.cholesky import Cholesky, NearlySymmetric
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.accelerated.solver_by_cost import DirectBySize
 from verify.methods.generalised_alpha import GeneralisedAlpha
+from verify.xfem.arrays import NotConvergedError, SingularStiffnessError
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import BlockJacobiCG, SparseLU
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 LU = partial(SparseLU, definite=True)
 

@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.elasticity import isotropic
-from verify.xfem.loads import body_force, simplex_rule, traction
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import (
+    Supports,
+    UnsupportedBodyError,
+    body_force,
+    simplex_rule,
+    traction,
+)
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports, UnsupportedBodyError
 
 LINE = Polyline([[-1.0, 0.1], [2.0, 1.1]])
 PLATE = cut_mesh(rectangle_mesh((5, 5)), [LINE])

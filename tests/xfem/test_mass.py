@@ -7,8 +7,8 @@ from cut_bodies import DENSITY, cut_body, cut_membrane
 from verify.methods.mass_variants import shifted_mass
 from verify.xfem.cuts import Plane
 from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import extrapolation, subdivide
 
 LUMPINGS = ("enrichment", "row sum", "weighted diagonal")

@@ -7,13 +7,16 @@ from swings import aggregated, cube, let_go, plate, uniform
 
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody, StepFailedError
-from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
-from verify.xfem.explicit import CentralDifferences
+from verify.xfem.explicit import (
+    RESONANCE_FREE,
+    CentralDifferences,
+    critical_step,
+    element_critical_steps,
+)
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh
 
 STATES = {(2, 2): "plane strain", (3, 3): "solid", (2, 3): "plane stress"}
 

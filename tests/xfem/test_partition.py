@@ -12,15 +12,14 @@ from scipy.spatial import Delaunay
 
 from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.join import join_parts
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.loads_and_supports import Supports
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 1, 2, 3]])

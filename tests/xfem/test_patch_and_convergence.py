@@ -5,14 +5,13 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, relative_l2_error
 
+from verify.xfem.arrays import NotConvergedError
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import NotConvergedError
-from verify.xfem.loads import body_force
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports, body_force
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 LINE = Polyline([[-1.0, 0.0], [2.0, 1.0]])
 PLANE = Plane([0.5, 0.5, 0.5], exact.NORMAL)

@@ -5,23 +5,21 @@ import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, penalised, rotation
 from swings import let_go, rest_step, stretched
 
+from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
-from verify.xfem.critical_step import RESONANCE_FREE
 from verify.xfem.cuts import Plane
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.errors import XfemError
-from verify.xfem.explicit import CentralDifferences, SymplecticEuler
+from verify.xfem.explicit import RESONANCE_FREE, CentralDifferences, SymplecticEuler
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce, inverted_cells
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 SCHEMES = [
     CentralDifferences,

@@ -19,14 +19,13 @@ from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import PLAIN
-from verify.xfem.loads import body_force
+from verify.xfem.loads_and_supports import Supports, body_force
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 # the plain one otherwise, of bodies as small as these
 KERNELS = {"plain": PLAIN, "fast": replace(FAST, direct=Cholesky)}

@@ -6,14 +6,14 @@ from degenerate_strokes import NEARNESS, body
 from xfem_bodies import boundary_nodes, zero_modes
 
 from verify.simulator.semi_progressive import SemiProgressiveCutter
+from verify.xfem.arrays import SingularStiffnessError, XfemError
 from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.cuts import Plane, ToolPath
-from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports, UnsupportedBodyError
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports, UnsupportedBodyError
 
 RIGID = {2: 3, 3: 6}
 FAR = 3.0  # half the length of a stroke that goes through the unit body

@@ -10,19 +10,18 @@ from thesis_blocks import transformed_matrix
 from xfem_bodies import boundary_nodes, relative_l2_error, scaled_dense_stiffness, sparse_stiffness
 
 from verify.xfem.body import DynamicBody
-from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.explicit import critical_step, element_critical_steps
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 SLIVERS = [0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12, 0.0, -1e-12, -1e-6]
 

@@ -10,15 +10,14 @@ from test_sliver_conditioning import SLIVERS, body, clamped
 from xfem_bodies import boundary_nodes, relative_l2_error
 
 from verify.xfem.cuts import ImplicitCut, Plane
-from verify.xfem.elasticity import isotropic
-from verify.xfem.loads import traction
+from verify.xfem.element import isotropic
+from verify.xfem.loads_and_supports import Supports, traction
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import DEFAULT_THRESHOLD, treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 POLICIES = ["keep", "drop", "merge"]
 

@@ -12,9 +12,9 @@ from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.supports import Supports
 
 
 def _replace_load(body, scheme):

@@ -10,9 +10,9 @@ from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.supports import Supports
 
 FALLEN = {  # after 50 steps of 0.01 s
     CentralDifferences: -1.225,

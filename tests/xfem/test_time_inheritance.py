@@ -10,14 +10,13 @@ from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.implicit import Trapezoidal
-from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
+from verify.xfem.release import inherit_state
 
 
 def _histories():

@@ -7,8 +7,8 @@ import pytest
 from test_sliver_policies import shaken
 
 from verify.xfem.cuts import PolygonPatch
+from verify.xfem.mesh import box_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.subdivision import subdivide
 
 

@@ -8,10 +8,10 @@ from turned_bodies import YOUNG, turn, turned_body, turned_sheet
 from verify.xfem import equilibrium
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.rigid_motion import RigidMotions, nearest_rotation
-from verify.xfem.static_newton import NotInEquilibriumError
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.statics import NotInEquilibriumError
 
 ANGLES = range(15, 346, 15)
 # E L^d, with the longest side 1.3 m: what round-off and the tolerance of forces leave is far below

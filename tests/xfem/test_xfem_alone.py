@@ -37,7 +37,7 @@ def test_in_the_order_of_reading_no_module_needs_one_that_comes_later():
         and str(node.module).startswith("verify.xfem.")
         and node.module.removeprefix("verify.xfem.") not in order[:k]
     }
-    assert later == {("cuts", "faceted_cuts"), ("cuts", "tool_path")}
+    assert later == {("cuts", "faceted_cuts")}
 
 
 def test_kernels_are_written_without_private_parts_of_the_compiler():

@@ -10,17 +10,15 @@ from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, ToolPath
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.static_newton import NotInEquilibriumError
-from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.supports import Supports
+from verify.xfem.statics import NotInEquilibriumError, solve_static
 
 MATERIAL = isotropic(1e4, 0.3, "plane stress")
 TURN = rotation(3, 0.8)

@@ -7,7 +7,7 @@ only, without cut-cell parts. For checks; dense loops, one cut.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.elasticity import Material
+from verify.xfem.element import Material
 from verify.xfem.mesh import SimplexMesh
 
 _Floats = NDArray[np.float64]

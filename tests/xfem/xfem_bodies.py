@@ -3,9 +3,9 @@
 import numpy as np
 
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import simplex_rule
+from verify.xfem.loads_and_supports import simplex_rule
 from verify.xfem.subdivision import subdivide
 
 

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fronts
 from verify.accelerated.fronts import plan_fronts, stack_depths
-from verify.xfem.arrays import Floats, check_floats
+from verify.xfem.arrays import Floats, SingularStiffnessError, XfemError, check_floats
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, SparseLU, nodal_vector
 
 

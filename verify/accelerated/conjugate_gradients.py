@@ -13,9 +13,14 @@ stay in registers; smaller ones are filled up with zeros.
 import numpy as np
 from numba import njit
 
-from verify.xfem.arrays import Floats, check_floats
+from verify.xfem.arrays import (
+    Floats,
+    NotConvergedError,
+    SingularStiffnessError,
+    XfemError,
+    check_floats,
+)
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 _SMALLEST, _LARGEST = 1e-200, 1e200  # squares of loads that are solved for as they are

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, NotConvergedError
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import NotConvergedError
 from verify.xfem.linear_solvers import LinearSolver, SparseLU
 
 # measured on one core (AVX-512): in ns, per operation and entry of the factor of a

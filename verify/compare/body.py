@@ -9,8 +9,8 @@ from verify.compare.sides import distance_to_cut, distance_to_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, membrane_of, solid_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
-from verify.geometry.nearest import distance_to_outline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.simplices import distance_to_outline
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 
 Array = NDArray[np.float64]

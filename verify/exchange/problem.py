@@ -33,7 +33,7 @@ from verify.scene.parts import HeldFacets, Pieces, pieces_on_part
 from verify.scene.physics import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_conditions import Boundary, ForceDensity, is_moving
-from verify.xfem.loads import simplex_rule
+from verify.xfem.loads_and_supports import simplex_rule
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.geometry.nearest import shares
+from verify.geometry.simplices import shares
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.geometry.curves import Arc
-from verify.geometry.nearest import feet
-from verify.geometry.spatial import frame
+from verify.geometry.simplices import feet, frame
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.geometry.nearest import distance_to_outline
+from verify.geometry.simplices import distance_to_outline
 
 Array = NDArray[np.float64]
 

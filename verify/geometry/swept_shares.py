@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import measures
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

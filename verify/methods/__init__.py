@@ -23,7 +23,7 @@ Example
 -------
 >>> from verify.methods import cut_by
 >>> from verify.xfem.cuts import Polyline
->>> from verify.xfem.structured_meshes import rectangle_mesh
+>>> from verify.xfem.mesh import rectangle_mesh
 >>> body = cut_by("snapping", rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
 >>> body.counts.nodes - body.counts.nodes_before
 4
@@ -36,8 +36,8 @@ from verify.methods.cut_body import Change, Counts, CutBody, make_body
 from verify.methods.removal import removal, removal_refined
 from verify.methods.snapping import snapping, snapping_subdivision, subdivision
 from verify.methods.virtual_nodes import virtual_node, virtual_node_arbitrary
+from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 

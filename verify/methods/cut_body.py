@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.elasticity import Material
+from verify.xfem.element import Material
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, SubCells, cut_mesh
 from verify.xfem.subdivision import Subdivision, subdivide

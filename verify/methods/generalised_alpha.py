@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.body import DynamicBody, FreeMass, MotionState, RayleighDamping, StepForces
-from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator, Resistance
 from verify.xfem.linear_solvers import LinearSolver
 

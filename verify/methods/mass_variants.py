@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from verify.xfem.arrays import Floats, Ints, check_choice
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Floats, Ints, XfemError, check_choice
 from verify.xfem.mass import (
     Mass,
     assembled_mass,

@@ -30,11 +30,10 @@ from verify.methods.cut_body import (
     make_body,
     whole_cells,
 )
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.contacts import face_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 

@@ -34,10 +34,9 @@ from verify.methods.cut_body import (
     whole_cells,
 )
 from verify.methods.tip_nodes import add_tip_points
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.subdivision import subdivide

@@ -22,10 +22,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays import Floats, check_choice
+from verify.xfem.arrays import Floats, XfemError, check_choice
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.elasticity import Material
-from verify.xfem.errors import XfemError
+from verify.xfem.element import Material
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.linear_solvers import PLAIN, Kernels
 from verify.xfem.mesh import SimplexMesh

@@ -16,10 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.cuts import Cut, Polyline
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import nodal_values
 

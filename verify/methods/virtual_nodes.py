@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.methods.cut_body import Change, CutBody, OpenedCells, cut_so_far, make_body, whole_cells
+from verify.xfem.arrays import XfemError
 from verify.xfem.contacts import absorb, sibling_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import subdivide

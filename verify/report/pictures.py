@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline, distance_to_polyline
 from verify.geometry.planar import inside_polygon
+from verify.geometry.simplices import distance_to_outline, distance_to_polyline
 from verify.report.bodies import (
     Body,
     View,

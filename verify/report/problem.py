@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from verify.errors import InputError
-from verify.geometry.spatial import rim_edges
+from verify.geometry.simplices import rim_edges
 from verify.report.blocks import Drawing
 from verify.report.plots import drawing
 from verify.scene.tool_path import Cut

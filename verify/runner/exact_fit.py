@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_pieces
-from verify.geometry.spatial import measures, unit_normals
+from verify.geometry.simplices import distance_to_pieces, measures, unit_normals
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at

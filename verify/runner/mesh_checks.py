@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.planar import overlap_length
-from verify.geometry.spatial import measures, rim_edges
+from verify.geometry.simplices import measures, rim_edges
 from verify.runner import exact_fit as samples
 from verify.runner.cost import mesh_of_level
 from verify.runner.exact_fit import holds
@@ -28,11 +28,11 @@ from verify.scene.physics import field_values
 from verify.scene.placement import misplaced_point
 from verify.solvers.body_of_scene import background_mesh, cuts_of
 from verify.solvers.boundary_conditions import supports_of
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import XfemError
+from verify.xfem.loads_and_supports import UnsupportedBodyError, check_bodies
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import join_fragments
-from verify.xfem.supports import UnsupportedBodyError, check_bodies
 
 Array = NDArray[np.float64]
 _Values = Callable[[Array, float], Any]

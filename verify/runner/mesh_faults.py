@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import feet
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import feet, measures
 from verify.result import Notice, NoticeKind
 from verify.scene import Gravity, MeshFile, Scene, read_mesh
 from verify.scene.geometry import GROUP

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from verify.geometry.curves import Arc, Piece, Segment
-from verify.geometry.nearest import feet, nearest_parts
 from verify.geometry.patches import CylinderPatch, DiscPatch, Patch, PlanePatch, SpherePatch
 from verify.geometry.planar import polygon_defect, polyline_defect
-from verify.geometry.spatial import ear_clipping, frame, unit_normals
+from verify.geometry.simplices import ear_clipping, feet, frame, nearest_parts, unit_normals
 from verify.scene.strict import (
     Finite,
     Line,

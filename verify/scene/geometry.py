@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
-from verify.geometry.nearest import distance_to_outline, feet
 from verify.geometry.planar import inside_polygon, polygon_defect
+from verify.geometry.simplices import distance_to_outline, feet
 from verify.scene.mesh_file import FileBody, read_body
 from verify.scene.strict import (
     Count,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from verify.errors import InputError
-from verify.geometry.refinement import refine_uniformly
+from verify.geometry.simplices import refine_uniformly
 from verify.json_files import deeper_than
 from verify.printable import one_line, shown, words_of
 from verify.scene.acceptance import RatioCheck

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import on_simplices
+from verify.geometry.simplices import on_simplices
 from verify.read_mesh import RawMesh, base_of, dimension_of, read_raw
 from verify.scene.strict import nearest
 

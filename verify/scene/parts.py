@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import feet, nearest_parts
+from verify.geometry.simplices import feet, nearest_parts
 from verify.records import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.regions import Side, comparisons, is_affine, parse_region

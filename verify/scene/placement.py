@@ -11,9 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.nearest import distance_to_outline, distance_to_pieces
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
-from verify.geometry.spatial import area_inside, length_inside, overlap_area, rim_edges
+from verify.geometry.simplices import (
+    area_inside,
+    distance_to_outline,
+    distance_to_pieces,
+    length_inside,
+    overlap_area,
+    rim_edges,
+)
 from verify.scene.acceptance import FractureQuantity, SectionQuantity, StressQuantity
 from verify.scene.cuts import ArcCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import model_validator
 
-from verify.geometry.nearest import feet
+from verify.geometry.simplices import feet
 from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, OF_MOVING_PARTS, OVERLAP
 from verify.scene.cuts import DiscCut, PolygonCut
 from verify.scene.geometry import GROUP, MeshFile, Polygon, Skin

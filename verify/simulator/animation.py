@@ -24,9 +24,8 @@ from verify.simulator.session import Session
 from verify.simulator.stage import Stage
 from verify.simulator.surfaces import Picture
 from verify.whole_files import whole_file, write_whole
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
 
 _SKIN, _FLESH, _FAT, _STEEL = "#e8b79b", "#a8322a", "#e8bf62", "#8b98a5"
 _BED = 1.0  # of the width that is seen, along the line of sight: behind every fold of a skin

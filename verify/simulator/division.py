@@ -134,7 +134,7 @@ class StoredPieces(NamedTuple):
 
 
 class TiedParts:
-    """Which stored pieces are tied, though planes of cuts divide them: see `verify.xfem.junctions`.
+    """Which stored pieces are tied, though planes of cuts divide them: see `verify.xfem.crossing`.
 
     Parameters
     ----------

@@ -28,8 +28,7 @@ from verify.simulator.point_numbers import (
     ranges,
 )
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.xfem.arrays import Bools, Floats, Ints, Sides
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, XfemError
 from verify.xfem.pieces import ROUND_OFF, split_cells
 
 _INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is looked up

@@ -23,10 +23,9 @@ from verify.simulator.division import (
     slots_before,
 )
 from verify.simulator.point_numbers import GrowingArray, PointNumbers, distinct, ranges
-from verify.xfem.arrays import Bools, Floats, Ints, Sides
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, XfemError
 from verify.xfem.clip import Partition
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, SubCells

@@ -20,8 +20,7 @@ from scipy.sparse import csr_array
 from verify.simulator.exposed_kernels import cut_elements, exposed_facets, sub_simplices
 from verify.simulator.growing_body import GrowingBody, Increment
 from verify.simulator.point_numbers import EdgePoints, GrowingArray, RowNumbers, ranges
-from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 
 
 class MovingSurface:

@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.zero_points import ZeroPoints
 
 

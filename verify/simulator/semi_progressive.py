@@ -17,14 +17,12 @@ from verify.simulator.division import Division, MeshPatch
 from verify.simulator.growing_body import GrowingBody, Increment, whole_mesh
 from verify.simulator.places import BoundingTree
 from verify.simulator.point_numbers import distinct
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.crossing import AT_END, REACH
-from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
+from verify.xfem.cuts import Cut, Sweep, ToolPath
 from verify.xfem.faceted_cuts import FacetArrays
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.tool_path import Sweep, ToolPath
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.pieces`
 # longest edges: so near to the sweep is every cell that it may part, alone (`REACH` off its facets)

@@ -18,7 +18,7 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.compare.blade import driving_force
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import measures
 from verify.geometry.swept_shares import SweptShares, swept_measure
 from verify.simulator.semi_progressive import SemiProgressiveCutter, Stroke
 from verify.simulator.stage import Grips, Stage, gripped, held_facets

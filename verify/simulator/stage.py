@@ -17,11 +17,10 @@ from verify.simulator.moving_surface import BodySurface
 from verify.simulator.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_conditions import Boundary
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.body import MovingSupports, RayleighDamping
 from verify.xfem.cuts import ToolPath
-from verify.xfem.elasticity import Material, isotropic
-from verify.xfem.errors import XfemError
+from verify.xfem.element import Material, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 

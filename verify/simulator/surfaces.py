@@ -15,8 +15,7 @@ from verify.simulator.growing_body import Increment
 from verify.simulator.moving_surface import BodySurface, MovingSurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.stage import Stage
-from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.phantom import PhantomMesh
 

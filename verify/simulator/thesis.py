@@ -26,14 +26,13 @@ from verify.simulator.semi_progressive import Crossings, SemiProgressiveCutter
 from verify.simulator.session import LIMITS
 from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline, ToolPath
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
+from verify.xfem.explicit import critical_step
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import rectangle_mesh
 
 THRESHOLDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)  # of an edge: nodes as near as that are snapped
 _HEIGHT = 0.43  # of the strip: away from nodes and from the middles of edges

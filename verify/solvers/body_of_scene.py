@@ -32,13 +32,12 @@ from verify.scene import (
 )
 from verify.solution import Regularisation
 from verify.solvers.runs import Timeline, grid_of
+from verify.xfem.arrays import XfemError
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
-from verify.xfem.elasticity import Material, State, isotropic
-from verify.xfem.errors import XfemError
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.element import Material, State, isotropic
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]

@@ -24,10 +24,16 @@ from verify.scene.physics import Load, PrescribedMotion, factor_at, first_factor
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import volumetric_mass
 from verify.xfem.body import MovingSupports
-from verify.xfem.loads import body_force, facet_parts, facet_places, simplex_rule, traction
+from verify.xfem.loads_and_supports import (
+    Supports,
+    body_force,
+    facet_parts,
+    facet_places,
+    simplex_rule,
+    traction,
+)
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import Subdivision, subdivide
-from verify.xfem.supports import Supports
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]

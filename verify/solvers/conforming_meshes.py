@@ -24,7 +24,7 @@ from reference.meshing import (
 from reference.meshing.edge_splitting import graded_to
 from reference.meshing.inner_lines import singular_lines, split_at_part_ends
 from verify.errors import InputError
-from verify.geometry.refinement import mesh_edges, refine_uniformly
+from verify.geometry.simplices import mesh_edges, refine_uniformly
 from verify.scene import (
     Box,
     MeshFile,

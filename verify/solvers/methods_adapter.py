@@ -37,14 +37,13 @@ from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import Law, solution_on, solve_equilibrium, springs_left_out
 from verify.solvers.xfem_system import EXPLICIT, SCHEMES, elasticity_of, system_of
 from verify.system import System
+from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState
-from verify.xfem.errors import XfemError
-from verify.xfem.inherit import ancestors
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.release import parting_cuts
+from verify.xfem.release import ancestors, parting_cuts
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]

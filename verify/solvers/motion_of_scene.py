@@ -18,9 +18,9 @@ from verify.solvers.body_of_scene import Openings, density_of, material_of
 from verify.solvers.runs import LedgerRows, Record, Timeline, march, notes_of_steps, work_of_blades
 from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
 from verify.xfem.aggregation import AggregatedMass
+from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, Integrator, MotionState
 from verify.xfem.energy_balance import BalanceRecorder, EnergyBalance
-from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce

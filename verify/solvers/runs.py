@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.spatial import measures
+from verify.geometry.simplices import measures
 from verify.scene import Box, Rectangle, Scene, ToolPathCut, crossed_by_interfaces
 from verify.scene.physics import jumps
 from verify.solution import Regularisation, Solution

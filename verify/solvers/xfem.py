@@ -31,15 +31,14 @@ from verify.solvers.runs import OPENINGS, Record, check_steps, repeated, timelin
 from verify.solvers.xfem_answer import joined, penalised, solution_on, solve_equilibrium, treated
 from verify.solvers.xfem_system import MASSES, SCHEMES, elasticity_of, mass_of, system_of
 from verify.system import System
+from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState
-from verify.xfem.errors import XfemError
-from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import PLAIN, Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.release import parting_cuts
+from verify.xfem.release import ancestors, inherit_state, parting_cuts
 from verify.xfem.slivers import join_fragments
 
 _Floats = NDArray[np.float64]

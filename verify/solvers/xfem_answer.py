@@ -18,11 +18,11 @@ from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.linear_solvers import Kernels
+from verify.xfem.loads_and_supports import check_bodies
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import Fragments, treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.subdivision import Subdivision, extrapolation, subdivide
-from verify.xfem.supports import check_bodies
 
 
 def solution_on(

@@ -27,21 +27,27 @@ from verify.solvers.boundary_conditions import (
     supports_of,
 )
 from verify.system import System
+from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
-from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
-from verify.xfem.elasticity import Material
+from verify.xfem.element import Material
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.errors import XfemError
-from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.explicit import (
+    RESONANCE_FREE,
+    CentralDifferences,
+    ForwardEuler,
+    SymplecticEuler,
+    critical_step,
+    element_critical_steps,
+)
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.linear_solvers import Kernels
+from verify.xfem.loads_and_supports import check_bodies
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.supports import check_bodies
 
 _Floats = NDArray[np.float64]
 

@@ -83,32 +83,29 @@ number of corners of a cell; of a membrane, points have 3 components and cells 3
 for all of them count corners by c. Units are SI; in the plane they are per metre of thickness.
 
 In an order of reading, in which each module imports only those before it (but `cuts`, which hands
-on what the two after it define, and is easier read first):
+on what `faceted_cuts` defines, and is easier read first):
 
-`errors`, `arrays`
-    what is raised; types of arrays, and checks of what a user gives
-`mesh`, `structured_meshes`
-    simplices, their neighbours and gradients
-`cuts`, `faceted_cuts`, `tool_path`
-    what a cut is: a plane or polygon, a polyline, a triangulated surface, what a tool sweeps. The
+`arrays`, `mesh`
+    types of arrays, checks of what a user gives and what is raised; simplices, their neighbours and
+    gradients
+`cuts`, `faceted_cuts`
+    what a cut is: a plane or polygon, what a tool sweeps, a polyline, a triangulated surface. The
     solver asks a cut two things only
-`zero_points`, `clip`, `crossing`, `junctions`, `pieces`
+`zero_points`, `clip`, `crossing`, `pieces`
     exact division of cells at zero points of level sets; through which cells a cut goes, and which
     cells cuts part that end on one another. Begin with the docstring of `pieces`, which says what
-    the others are for; leave `junctions` out at first
-`join`, `sides`, `phantom`
-    which pieces share dof nodes (by contact across faces); on which side of the cuts pieces and dof
-    nodes lie; the result: standard finite elements with weights
-`elasticity`, `polar`, `loads`, `supports`
-    material, nearest rotations, load vectors, prescribed displacements
-`block_pattern`, `mass`
-    sparsity and supports in a matrix; masses, side-wise and consistent
-`element`, `membrane`, `linear_solvers`, `internal_force`
-    force and tangents of an element, linear elasticity being R = I; tension of membranes; SciPy
-    behind one protocol, and the operations that `verify.accelerated` replaces; force, energy and
-    stiffness of a body
-`statics`, `static_newton`
-    linear statics; Newton's method with a line search on the potential energy
+    the others are for; leave the junctions of `crossing` out at first
+`join`, `phantom`
+    which pieces share dof nodes (by contact across faces), and on which side of the cuts pieces and
+    dof nodes lie; the result: standard finite elements with weights
+`polar`, `element`, `loads_and_supports`
+    nearest rotations; material, force and tangents of an element, linear elasticity being R = I;
+    load vectors, prescribed displacements
+`block_pattern`, `mass`, `linear_solvers`, `internal_force`
+    sparsity and supports in a matrix; masses, side-wise and consistent; SciPy behind one protocol,
+    and the operations that `verify.accelerated` replaces; force, energy and stiffness of a body
+`statics`
+    linear; Newton's method with a line search on the potential energy
 `body`, `explicit`, `implicit`
     a body in motion, and its schemes
 
@@ -121,32 +118,29 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.s
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
 `rigid_motion`, `stability`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability, slack membranes
-`energy_balance`, `energy_momentum`, `real_time`, `inherit`, `release`
+`energy_balance`, `energy_momentum`, `real_time`, `release`
     energies of a motion; a scheme that keeps energy and momentum, one of a linear solve per step;
     the state of a body that is cut on the way, and forces that fade where it lets go
-`critical_step`, `subdivision`
-    largest step of explicit schemes; the cut body as a conforming mesh
+`subdivision`
+    the cut body as a conforming mesh
 """
 
+from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody
-from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane, Polyline, TriangulatedSurface
-from verify.xfem.elasticity import isotropic
+from verify.xfem.element import isotropic
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.errors import XfemError
-from verify.xfem.explicit import CentralDifferences
+from verify.xfem.explicit import CentralDifferences, critical_step
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force, traction
+from verify.xfem.loads_and_supports import Supports, body_force, traction
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.supports import Supports
 
 __all__ = [
     "CentralDifferences",

@@ -1,4 +1,4 @@
-"""Types of arrays, and checks of the arrays and words that a user gives.
+"""Types of arrays, checks of the arrays and words that a user gives, and what is raised.
 
 `what` and `name` say in the message which argument is wrong.
 """
@@ -8,12 +8,36 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.errors import XfemError
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]  # of cuts: +1 or −1, in labels also 0 where a cut does not divide
+
+
+class XfemError(ValueError):
+    """Bad input to the compact solver: what it was, where, and what was expected."""
+
+
+class SingularStiffnessError(XfemError):
+    """The matrix is not positive definite: something moves freely, or a sign is wrong.
+
+    Attributes
+    ----------
+    node : int or None
+        Node at which the factorisation stopped, where it is known.
+    """
+
+    def __init__(self, node: int | None) -> None:
+        self.node = node
+        where = "" if node is None else f" (at dof node {node})"
+        super().__init__(
+            f"the stiffness is not positive definite{where}: a free piece without support, "
+            "or a wrong sign"
+        )
+
+
+class NotConvergedError(XfemError):
+    """The iterations ran out before the residual was small enough."""
 
 
 def check_choice(given: str, choices: Any, what: str) -> None:

@@ -8,8 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.phantom import PhantomMesh
 
 _Places = NDArray[np.int32]

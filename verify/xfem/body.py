@@ -14,12 +14,11 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from verify.xfem.arrays import Bools, Floats, Ints, check_floats, finite_array
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError, check_floats, finite_array
 from verify.xfem.internal_force import Configuration, InternalForce
 from verify.xfem.linear_solvers import LinearSolver
+from verify.xfem.loads_and_supports import Supports, check_fixed
 from verify.xfem.mass import Mass
-from verify.xfem.supports import Supports, check_fixed
 
 
 @dataclass

@@ -1,8 +1,14 @@
-"""Crossing of pieces by one cut each: it divides those that it goes through.
+"""Through which pieces a cut goes, and which pieces cuts part that end on one another.
 
-That is read off the zero points on the edges of a piece: are they inside the extent of the cut?
-A branch on a stem that goes through is decided here, too: it splits what the stem leaves. Cuts
-that part a cell only together are the matter of `verify.xfem.junctions`.
+A cut divides the pieces that it goes through. That is read off the zero points on the edges of a
+piece: are they inside the extent of the cut? A branch on a stem that goes through is decided so,
+too: it splits what the stem leaves.
+
+At a junction cuts end on one another inside an element: each of them alone divides nothing there,
+and yet together they part the material. There every cut divides whatever its plane crosses. Of the
+facets between the pieces that this leaves, those inside the extent of a cut keep apart; pieces that
+meet in another facet are one part. Several cuts make a junction of a cell if that leaves more parts
+than what each goes through by itself.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,9 +16,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError
+from verify.xfem.clip import Partition, facets_between
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError
+from verify.xfem.mesh import connected
+from verify.xfem.zero_points import ZeroPoints
 
 TipRule = Literal["inside", "through", "nearest"]
 Reached = Callable[[Ints, Ints, Floats], Bools]
@@ -139,3 +147,188 @@ def _mostly_crossed(cuts: Sequence[Cut], positions: Floats, crossing: Crossing) 
     mostly = np.zeros(crossing.pieces, dtype=bool)
     mostly[found] = inside
     return mostly
+
+
+_ASIDE = 1e-4  # element sizes: steps of difference quotients, and to beside the end of a cut
+
+
+class _Facets(NamedTuple):
+    """Facets between two pieces of one cell: points (f, d), pieces (f,) and (f,)."""
+
+    points: Ints
+    first: Ints
+    second: Ints
+
+
+def junction_cuts(
+    partition: Partition,
+    ends: tuple[Ints, Ints],
+    divide_all: Callable[[Ints, Bools], Partition],
+    cuts: Sequence[Cut],
+    boxes: Floats,
+    sizes: Floats,
+    known: Bools | None = None,
+) -> Bools:
+    """Which cuts (m, cuts) part which cells at a junction.
+
+    Parameters
+    ----------
+    partition : Partition
+        Cells divided by the cuts that go through them.
+    ends : (e,), (e,) int arrays
+        Cells in pieces of which cuts end, and which cut.
+    divide_all : callable
+        Divides the cells (q,) by the cuts (m, cuts) whatever their ends.
+    cuts : sequence of Cut
+    boxes : (cuts, 2, space) float array
+        From `verify.xfem.cuts.boxes_of`.
+    sizes : (m,) float array
+        Longest edges of the cells, in metres.
+    known : (m,) bool array, optional
+        Cells with a junction before: they keep one as cuts grow.
+    """
+    meets = np.zeros((len(sizes), len(cuts)), dtype=bool)
+    meets[ends] = True
+    _add_meeting_cuts(meets, partition, known)
+    suspects = meets.any(axis=1)
+    if not suspects.any():
+        return meets
+    divided = divide_all(np.flatnonzero(suspects), meets)
+    # facets outside the extent of every cut join their pieces to parts
+    facets = _inner_facets(divided, suspects)
+    inside = _inside_extent(divided, facets, cuts, boxes, sizes)
+    joining = ~inside.any(axis=1)
+    part = connected(len(divided.parent), facets.first[joining], facets.second[joining])
+    solid = divided.solid
+    first = np.unique(part[solid], return_index=True)[1]
+    parts = np.bincount(divided.parent[solid][first], minlength=len(sizes))
+    more = parts > np.bincount(partition.parent[partition.solid], minlength=len(sizes))
+    if known is not None:
+        more |= known & suspects
+    # of the cuts those that keep two parts asunder
+    forced = np.zeros_like(meets)
+    apart = part[facets.first] != part[facets.second]
+    facet, cut = np.nonzero(inside & apart[:, None])
+    forced[divided.parent[facets.first[facet]], cut] = True
+    forced[~more] = False
+    return forced
+
+
+def pieces_of_one_part(
+    partition: Partition, cuts: Sequence[Cut], boxes: Floats, sizes: Floats, cells: Bools
+) -> Ints:
+    """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
+    if not cells.any():
+        return np.empty((0, 2), dtype=np.int64)
+    facets = _inner_facets(partition, cells)
+    joining = ~_inside_extent(partition, facets, cuts, boxes, sizes).any(axis=1)
+    pairs = np.stack([facets.first[joining], facets.second[joining]], axis=1)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def _add_meeting_cuts(meets: Bools, partition: Partition, known: Bools | None) -> None:
+    """Add to the cuts (m, cuts) that end in cells those that divide them; leave single ones out."""
+    ending = meets.any(axis=1) if known is None else meets.any(axis=1) | known
+    piece, cut = np.nonzero((partition.label != 0) & ending[partition.parent, None])
+    meets[partition.parent[piece], cut] = True
+    meets[meets.sum(axis=1) < 2] = False
+
+
+def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
+    """Facets between sub-simplices in different solid pieces of one of some cells (m,)."""
+    sub = partition.simplices
+    sub = sub[
+        cells[partition.parent[sub.piece]] & partition.solid[sub.piece] & (sub.fraction > 0.0)
+    ]
+    return _Facets(*facets_between(partition.parent, sub.piece, sub.points))
+
+
+def _inside_extent(
+    partition: Partition, facets: _Facets, cuts: Sequence[Cut], boxes: Floats, sizes: Floats
+) -> Bools:
+    """Which facets lie inside the extent of each cut that has their pieces on its two sides."""
+    label, zero = partition.label, partition.points
+    found = np.zeros((len(facets.points), len(cuts)), dtype=bool)
+    facet, cut = np.nonzero(label[facets.first] * label[facets.second] < 0)
+    points = facets.points[facet]
+    size = sizes[partition.parent[facets.first[facet]]][:, None]
+    at, of = zero.positions[points.ravel()], np.repeat(cut, points.shape[1])
+    level, depth = (x.reshape(points.shape) for x in levels_and_depths(cuts, of, at))
+    inside = depth >= -AT_END * size
+    # corners past the end of a facet that begins inside the extent
+    past = ~inside & (depth > depth.max(axis=1, keepdims=True, initial=-np.inf) - size)
+    past &= (depth > AT_END * size).any(axis=1, keepdims=True)
+    row, corner = np.nonzero(past)
+    inside[row, corner] = reached(cuts, boxes, zero, cut[row], points[row, corner], size[row, 0])
+    found[facet, cut] = (inside & (np.abs(level) <= REACH * size)).all(axis=1)
+    return found
+
+
+def reached(
+    cuts: Sequence[Cut], boxes: Floats, zero: ZeroPoints, own: Ints, points: Ints, size: Floats
+) -> Bools:
+    """Which points past the end of a cut it reaches all the same: it ends on another cut there.
+
+    A cut that is bent inside an element is realised a little beside where it was given. A branch
+    that ends on the given one goes on to the realised one, over the points between the two.
+
+    ::
+
+        branch ──────────┤     ×     ┆
+                 its end, on   point  realised stem
+              the given stem
+
+    So a point × counts if the stem as given and as realised lie on its two sides, the end is on the
+    given stem, and what is just inside of the end lies beyond the given stem, seen from ×.
+    Plain branches need this as well as junctions.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+    boxes : (cuts, 2, space) float array
+    zero : ZeroPoints
+    own : (q,) int array
+        Cuts that end.
+    points : (q,) int array
+        Numbers of points of their planes past their ends.
+    size : (q,) float array
+        Of the cells in which they lie, in metres.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    near = np.abs(zero.values[points]) <= size[:, None]
+    near[np.arange(len(own)), own] = False
+    row, other = np.nonzero(near)
+    # the end is on the other cut, and no farther from the point than the size
+    at = zero.positions[points[row]]
+    gap = np.maximum(boxes[other, 0] - at, at - boxes[other, 1]).max(axis=1)
+    close = gap <= 2.0 * size[row]
+    row, other, at = row[close], other[close], at[close]
+    given, realised = levels_and_depths(cuts, other, at)[0], zero.values[points[row], other]
+    between = (given * realised <= 0.0) & (np.abs(given - realised) > AT_END * size[row])
+    row, other, at, given = row[between], other[between], at[between], given[between]
+    mine, size = own[row], size[row]
+    end, inwards = _end(cuts, mine, at, size)
+    off = AT_END * size + np.abs(levels_and_depths(cuts, mine, end)[0])
+    level, depth = levels_and_depths(cuts, other, end)
+    before = levels_and_depths(cuts, other, end + _ASIDE * size[:, None] * inwards)[0]
+    found[row[(np.abs(level) <= off) & (depth >= -off) & (before * given < 0.0)]] = True
+    return found
+
+
+def _end(cuts: Sequence[Cut], of: Ints, points: Floats, size: Floats) -> tuple[Floats, Floats]:
+    """Nearest ends (q, space) of cuts to points past them, and unit vectors that lead inwards.
+
+    The depth t is a distance from the end, negative here: its slope is that direction, and the end
+    x − t ∇t/‖∇t‖. Where two ends are equally near, the difference quotient is a mean of both.
+    """
+    step = _ASIDE * size
+    slope = np.empty_like(points)
+    for axis, unit in enumerate(np.eye(points.shape[1])):
+        ahead, behind = (
+            levels_and_depths(cuts, of, points + way * step[:, None] * unit)[1]
+            for way in (0.5, -0.5)
+        )
+        slope[:, axis] = (ahead - behind) / step
+    length = np.linalg.norm(slope, axis=1)
+    slope /= np.where(length > 0.0, length, 1.0)[:, None]
+    return points - levels_and_depths(cuts, of, points)[1][:, None] * slope, slope

@@ -11,22 +11,27 @@ A cut is a geometric object in the material frame. The solver asks it two things
     lies the *extent* of the cut.
 
 One nodal φ per cut, interpolated linearly, makes the realised cut planar in every element and the
-same on shared faces. Cuts made of facets and tool paths have modules of their own and are handed
-on here.
+same on shared faces. Cuts made of facets have a module of their own and are handed on here.
+
+The blade of a tool is a polyline (in the plane: a point) with a position at each time. Between two
+positions every point of it moves along a straight line; the sweep is made of the segments (2D) or
+triangles (3D) in between. How far the blade has come is measured by the *travel*: the length of
+the path, of the fastest point of the blade.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from verify.xfem.arrays import Floats, finite_array
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Floats, Ints, XfemError, finite_array
+from verify.xfem.faceted_cuts import FacetArrays, FacetCut, facet_arrays
 from verify.xfem.faceted_cuts import Polyline as Polyline
 from verify.xfem.faceted_cuts import TriangulatedSurface as TriangulatedSurface
-from verify.xfem.tool_path import ToolPath as ToolPath
+from verify.xfem.mesh import neighbours_across
 
 
 class Cut(Protocol):
@@ -196,3 +201,194 @@ def boxes_of(cuts: Sequence[Cut], space: int) -> Floats:
             continue
         box[:] = corners.min(axis=0), corners.max(axis=0)
     return boxes
+
+
+_FLAT = 1e-12  # area over squared edge below which a swept triangle counts as not swept
+_STILL = 1e-14  # of the length of the path: shorter moves are none
+_TURNED_BACK = -1.0 + 1e-9  # cosine between the normals of neighbouring facets
+
+
+class SweepSurface(NamedTuple):
+    """Vertices (v, s), facets (t, k), and the arrays for kernels."""
+
+    points: Floats
+    facets: Ints
+    arrays: FacetArrays
+
+
+@dataclass(frozen=True)
+class ToolPath:
+    """Positions of a blade in time, in the material frame.
+
+    Parameters
+    ----------
+    blades : (k, b, s) array_like
+        Points of the blade at each time, in metres: b = 1 in the plane, b ≥ 2 in space.
+    times : (k,) array_like
+        In seconds, never decreasing.
+
+    Raises
+    ------
+    XfemError
+        If shapes do not match, a number is not finite, time runs backwards, the blade turns back
+        on its path, or a path in the plane intersects itself (begin a new stroke instead).
+    """
+
+    blades: Floats
+    times: Floats
+
+    def __init__(self, blades: ArrayLike, times: ArrayLike) -> None:
+        positions = finite_array(blades, "blades", (None, None, 2), (None, None, 3))
+        moments = finite_array(times, "times", positions.shape[:1])
+        _check(positions, moments)
+        object.__setattr__(self, "blades", positions)
+        object.__setattr__(self, "times", moments)
+        if self.length > 0.0:
+            if positions.shape[2] == 2:
+                moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > _STILL * self.length)
+                Polyline(positions[moves, 0])  # raises if it turns back or intersects itself
+            _ = self.surface  # raises if the blade turns back on its sweep
+
+    @classmethod
+    def of_tip(
+        cls, tips: ArrayLike, times: ArrayLike, depth: ArrayLike | None = None
+    ) -> "ToolPath":
+        """Path of a straight blade, given by its tip and, in space, the vector to its other end.
+
+        Parameters
+        ----------
+        tips : (k, s) array_like
+            In metres.
+        times : (k,) array_like
+            In seconds.
+        depth : (3,) or (k, 3) array_like, optional
+            Vector from the tip to the other end of the blade, in metres; none in the plane.
+        """
+        points = finite_array(tips, "tip points", (None, 2), (None, 3))
+        if depth is None:
+            return cls(points[:, None], times)
+        vector = finite_array(depth, "depth", points.shape[1:], points.shape)
+        return cls(np.stack([points, points + vector], axis=1), times)
+
+    @cached_property
+    def travel(self) -> Floats:
+        """(k,) length of the path up to each position, in metres."""
+        steps = np.linalg.norm(np.diff(self.blades, axis=0), axis=2).max(axis=1, initial=0.0)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def length(self) -> float:
+        """Length of the whole path, in metres; zero if the blade does not move."""
+        return float(self.travel[-1])
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it sweeps anything: a blade may stay, or move along itself."""
+        return self.length > 0.0 and len(self.surface.facets) > 0
+
+    @cached_property
+    def surface(self) -> SweepSurface:
+        """The swept segments or triangles."""
+        return _sweep_surface(self.blades, self.travel)
+
+    @property
+    def sweep(self) -> "Sweep":
+        """The whole swept cut, as `verify.xfem.phantom.cut_mesh` takes it."""
+        return Sweep(self)
+
+    def travel_at(self, time: float) -> float:
+        """How far the blade has come at a time, in metres; negative before the first."""
+        if time < self.times[0]:
+            return -1.0
+        return float(np.interp(time, self.times, self.travel))
+
+    def time_at(self, travel: ArrayLike) -> Floats:
+        """When the blade first comes that far, in seconds."""
+        wanted = np.clip(np.asarray(travel, dtype=float), 0.0, self.length)
+        at = np.searchsorted(self.travel, wanted)
+        # a blade that waits has been there since it arrived
+        between = np.interp(wanted, self.travel, self.times)
+        return np.where(self.travel[at] == wanted, self.times[at], between)
+
+    def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
+        """Append positions (k, b, s) at times (k,): for a tool whose path is not known ahead."""
+        more = finite_array(blades, "further blades", (None, *self.blades.shape[1:]))
+        later = np.atleast_1d(finite_array(times, "further times", (), (None,)))
+        return ToolPath(np.concatenate([self.blades, more]), np.concatenate([self.times, later]))
+
+
+@dataclass(frozen=True)
+class Sweep(FacetCut):
+    """The surface swept by a path, as a cut.
+
+    In the plane the positive side is on the left of the path, in space it is that of (direction
+    of motion) × (blade).
+    """
+
+    path: ToolPath
+    _name = "sweep"
+
+    @cached_property
+    def arrays(self) -> FacetArrays:
+        """Its facets, as kernels take them."""
+        return self.path.surface.arrays
+
+    def level_set(self, points: Floats) -> Floats:
+        """Signed distance (n,) to what is swept, to its tangent plane past the rim."""
+        return super().level_set(points) if self.path.sweeps else self.probed(points)[:, 0]
+
+    def probed(self, points: Floats) -> Floats:
+        """(n, 3): level set, depth, and how far the blade has come as it passes, in metres."""
+        if self.path.sweeps:
+            return super().probed(points)
+        # nothing is swept: one side everywhere, and no point of the cut anywhere
+        at = finite_array(points, "sweep: points", (None, self.path.blades.shape[2]))
+        return np.tile([1.0, -np.inf, 0.0], (len(at), 1))
+
+
+def _check(blades: Floats, times: Floats) -> None:
+    if len(blades) == 0:
+        raise XfemError(f"blades of shape {blades.shape}; expected one position or more")
+    if blades.shape[2] == 2 and blades.shape[1] != 1:
+        raise XfemError(f"blade of {blades.shape[1]} points in the plane; expected one, its tip")
+    if blades.shape[2] == 3 and blades.shape[1] < 2:
+        raise XfemError("blade of one point in space; expected two or more (give its depth)")
+    if (np.diff(times) < 0.0).any():
+        raise XfemError(f"time runs backwards after position {int(np.diff(times).argmin())}")
+    if (np.linalg.norm(np.diff(blades, axis=1), axis=2) == 0.0).any():
+        raise XfemError("blade with two neighbouring points in one place; expected a length")
+
+
+def _sweep_surface(blades: Floats, travel: Floats) -> SweepSurface:
+    """Triangulate the sweep of blades (k, b, s) with the travel (k,) of each position."""
+    points, lengths, facets = _facets(blades, travel)
+    arrays = facet_arrays(points, facets, lengths)
+    if facets.shape[1] == 3:
+        across = neighbours_across(facets)
+        cosine = (arrays.normals[:, None] * arrays.normals[np.maximum(across, 0)]).sum(axis=2)
+        back = (across >= 0) & (cosine < _TURNED_BACK)
+        if back.any():
+            where = points[facets[back.any(axis=1)][0]].mean(axis=0)
+            raise XfemError(f"the blade turns back on its own sweep near {where.tolist()}")
+    return SweepSurface(points, facets, arrays)
+
+
+def _facets(blades: Floats, travel: Floats) -> tuple[Floats, Floats, Ints]:
+    """Vertices, their travel, and the facets that have a length or an area."""
+    count, width, space = blades.shape
+    ids = np.arange(count * width).reshape(count, width)
+    for k in range(1, count):
+        # a point of the blade that stays, up to round-off of the path, is one vertex: what turns
+        # around it is connected
+        still = np.linalg.norm(blades[k] - blades[k - 1], axis=1) <= _STILL * travel[-1]
+        ids[k, still] = ids[k - 1, still]
+    points = blades.reshape(-1, space)
+    lengths = np.repeat(travel, width)
+    if width == 1:
+        facets = np.stack([ids[:-1, 0], ids[1:, 0]], axis=1)
+        return points, lengths, facets[facets[:, 0] != facets[:, 1]]
+    a, b, c, d = ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]
+    both = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2).reshape(-1, 3)
+    edges = points[both][:, [1, 2, 0]] - points[both]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return points, lengths, both[area > _FLAT * (edges**2).sum(axis=2).max(axis=1)]

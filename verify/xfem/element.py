@@ -1,4 +1,4 @@
-"""Force and tangent of corotational linear elements, per cell of a cut body.
+"""Isotropic elasticity; force and tangent of corotational linear elements, per cell of a cut body.
 
 With b_i the material gradient of shape function i, w the volume of a piece,
 F = I + Σ u_i b_iᵀ = R U and E = sym(Rᵀ F) − I, the potential is w (μ‖E‖² + ½λ tr² E). The force
@@ -13,19 +13,111 @@ fixed R, where P is linear in E: its product with a vector v is the force of E =
 without I. A law that is not linear in E would need another `add_force` for it.
 
 A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane, and in
-the first A with δ_kl − n_k n_l for δ_kl, n the turned normal. What holds it across its plane is in
-`verify.xfem.membrane`.
+the first A with δ_kl − n_k n_l for δ_kl, n the turned normal. It
+has no stiffness against the displacement φ along n but w (∇φ · S ∇φ) of its tension S, the second
+Piola–Kirchhoff stress with principal values (2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches
+λ_k. The geometric stiffness takes its positive part alone, so that it has no negative mode.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
-from verify.xfem.arrays import Bools, Floats, Ints
-from verify.xfem.elasticity import Material
+from verify.xfem.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    XfemError,
+    check_choice,
+    finite_array,
+    real_array,
+)
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import SPINS, adjugate
+
+State = Literal["plane strain", "plane stress", "solid"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """σ = λ tr(ε) I + 2 μ ε, with the λ that suits the state.
+
+    There is no seam for another law. This one is written out here, in `energy_momentum` (for it
+    alone), `explicit`, `ghost_penalty`, and the kernels of `verify.accelerated`. That K is constant
+    in linear kinematics is relied on by `solve_static` and `implicit`; that P is linear in E, by
+    every product with the rotation-fixed tangent.
+
+    Attributes
+    ----------
+    lam, mu : (m,) or () float array
+        Lamé parameters in pascal (of membranes times the thickness, in N/m), for all cells of the
+        uncut mesh or one for each.
+    """
+
+    lam: Floats
+    mu: Floats
+
+    def of_cells(self, count: int) -> tuple[Floats, Floats]:
+        """λ and μ (m,) of so many cells of the uncut mesh, in pascal.
+
+        Raises
+        ------
+        XfemError
+            If there is neither one value nor one for each, one is not finite, or a change of shape
+            or of size in the plane stores no energy (μ ≤ 0, λ ≤ -μ).
+        """
+        for name, values in (("λ", self.lam), ("μ", self.mu)):
+            finite_array(values, name, (), (count,))
+        if not ((self.mu > 0.0) & (self.lam + self.mu > 0.0)).all():
+            raise XfemError(
+                f"Lamé parameters λ down to {np.min(self.lam):g} and μ down to "
+                f"{np.min(self.mu):g} Pa; expected μ > 0 and λ > -μ"
+            )
+        lam, mu = (np.broadcast_to(values, count).astype(float) for values in (self.lam, self.mu))
+        return lam, mu
+
+
+def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
+    """Lamé parameters from Young's modulus and Poisson's ratio.
+
+    Parameters
+    ----------
+    young : float or (m,) array_like
+        Young's modulus in pascal.
+    poisson : float or (m,) array_like
+        Poisson's ratio, in (−1, ½); in plane stress in (−1, 1).
+    state : {"plane strain", "plane stress", "solid"}
+        In plane stress λ becomes 2λμ/(λ + 2μ) = Eν/(1 − ν²).
+
+    Raises
+    ------
+    XfemError
+        If a parameter is outside its bounds, shapes do not match or the state is unknown.
+
+    Examples
+    --------
+    >>> import verify.xfem as xfem
+    >>> round(float(xfem.isotropic(2.6e3, 0.3, "plane strain").mu), 9)
+    1000.0
+    """
+    E, nu = real_array(young, "Young's modulus"), real_array(poisson, "Poisson's ratio")
+    check_choice(state, State, "state")
+    if not (np.isfinite(E).all() and (E > 0.0).all()):
+        raise XfemError(f"Young's modulus {E.min():g} Pa; expected positive and finite")
+    bound = 1.0 if state == "plane stress" else 0.5
+    if not ((nu > -1.0) & (nu < bound)).all():
+        worst = nu.flat[int(np.argmax(np.abs(nu)))]
+        raise XfemError(f"Poisson's ratio {worst:g}; expected within (-1, {bound:g}) in {state}")
+    if E.shape != nu.shape and () not in (E.shape, nu.shape):
+        raise XfemError(f"Young's modulus of shape {E.shape}, Poisson's ratio of {nu.shape}")
+    mu = E / (2.0 * (1.0 + nu))
+    if state == "plane stress":
+        return Material(E * nu / (1.0 - nu**2), mu)
+    return Material(E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), mu)
+
 
 _SINGULAR = 1e-8  # determinant over the power of the trace: a rotation without a derivative
 
@@ -305,3 +397,54 @@ def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats,
         A[without] = mu[without, None, None, None, None] * fixed
     A += np.einsum("pkn,plm->pknlm", lam[:, None, None] * R, R)
     return A, int(without.sum())
+
+
+_COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
+
+
+def turned_normals(elements: Elements, R: Floats) -> Floats:
+    """Turn the normals of membranes by rotations (p, 3, 3): n (p, 3)."""
+    return np.einsum("pkl,pl->pk", R, elements.normals[elements.parent])
+
+
+def tension_moduli(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
+    """Moduli A (p, 3, 3, 3, 3) of the geometric stiffness, as of a tangent of `element`."""
+    n = turned_normals(elements, R)
+    # A_knlm = n_k n_l S_nm
+    return np.einsum("pk,pl,pnm->pknlm", n, n, positive_tension(elements, R, F, least))
+
+
+def tension_forces(elements: Elements, R: Floats, F: Floats, vectors: Floats) -> Floats:
+    """Geometric stiffness times vectors (p, 3, 3) at the corners of cells: forces (p, 3, 3)."""
+    n, S = turned_normals(elements, R), positive_tension(elements, R, F, 0.0)
+    b, w = elements.gradients[elements.parent], elements.volumes
+    # f_i = w n (b_i · S ∇φ), ∇φ = Σ_j b_j (n · v_j)
+    slope = b.transpose(0, 2, 1) @ (vectors @ n[:, :, None])
+    return w[:, None, None] * (b @ S @ slope) * n[:, None, :]
+
+
+def positive_tension(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
+    """Positive part (p, 3, 3) of the tension of membranes, α I + β U in the tangent plane.
+
+    Principal values below `least` times μ are taken as that: without it what is slack has no
+    stiffness.
+    """
+    lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
+    U = R.transpose(0, 2, 1) @ F
+    U = 0.5 * (U + U.transpose(0, 2, 1))
+    trace, square = np.einsum("pkk->p", U), np.einsum("pkl,pkl->p", U, U)
+    gap = np.sqrt(np.maximum(2.0 * square - trace**2, 0.0))
+    high, low = 0.5 * (trace + gap), 0.5 * (trace - gap)
+
+    def tension(stretch: Floats) -> Floats:
+        carries = stretch > _COLLAPSED
+        value = 2.0 * mu * (stretch - 1.0) + lam * (trace - 2.0)
+        return np.maximum(
+            least * mu, np.where(carries, value / np.where(carries, stretch, 1.0), -np.inf)
+        )
+
+    first, second = tension(high), tension(low)
+    apart = gap > 1e-12 * trace
+    beta = np.where(apart, (first - second) / np.where(apart, gap, 1.0), 0.0)
+    alpha = np.where(apart, first - beta * high, 0.5 * (first + second))
+    return alpha[:, None, None] * np.eye(3) + beta[:, None, None] * U

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.body import DynamicBody, Integrator, MotionState, StepForces
-from verify.xfem.errors import XfemError
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats
+from verify.xfem.arrays import Bools, Floats, XfemError
 from verify.xfem.body import DynamicBody, StepForces
 from verify.xfem.element import Elements, add_moduli, polar_slope, restricted
-from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator, Resistance
 from verify.xfem.internal_force import Configuration, TangentKind
 from verify.xfem.linear_solvers import LinearSolver, OnePass

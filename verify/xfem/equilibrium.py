@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats, finite_array
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, XfemError, finite_array
 from verify.xfem.internal_force import InternalForce, inverted_cells
+from verify.xfem.loads_and_supports import check_fixed
 from verify.xfem.rigid_motion import RigidMotions
 from verify.xfem.stability import Descent, is_stable, way_out
-from verify.xfem.static_newton import ROUND_OFF, Newton, NotInEquilibriumError
-from verify.xfem.supports import check_fixed
+from verify.xfem.statics import ROUND_OFF, Newton, NotInEquilibriumError
 
 _HALVINGS = 6  # of a load step
 _COMPARED = 2  # of them, on a second path

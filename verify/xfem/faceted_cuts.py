@@ -21,8 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from verify.xfem.arrays import Bools, Floats, Ints, finite_array, index_array
-from verify.xfem.errors import XfemError
+from verify.xfem.arrays import Bools, Floats, Ints, XfemError, finite_array, index_array
 from verify.xfem.mesh import facets_of, neighbours_across
 
 _FLAT = 1e-12  # area over squared edge below which a triangle has none

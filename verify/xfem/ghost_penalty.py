@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Floats, Ints, XfemError
 from verify.xfem.block_pattern import BlockPattern, pattern_places
 from verify.xfem.contacts import face_contacts
-from verify.xfem.elasticity import Material
-from verify.xfem.errors import XfemError
+from verify.xfem.element import Material
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.phantom import PhantomMesh
 

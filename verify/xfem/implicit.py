@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, SingularStiffnessError, XfemError
 from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
@@ -16,7 +16,6 @@ from verify.xfem.body import (
     check_state,
     check_step,
 )
-from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import Configuration, TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
 

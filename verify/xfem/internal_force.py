@@ -15,20 +15,20 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
-from verify.xfem.arrays import Floats, Ints, check_choice, check_floats
+from verify.xfem.arrays import Floats, Ints, XfemError, check_choice, check_floats
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.elasticity import Material
 from verify.xfem.element import (
+    Material,
     add_force,
     add_moduli,
     add_rotation_fixed,
     consistent_moduli,
     deform,
     elements_of,
+    tension_forces,
+    tension_moduli,
 )
-from verify.xfem.errors import XfemError
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
-from verify.xfem.membrane import tension_forces, tension_moduli
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 

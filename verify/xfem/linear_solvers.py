@@ -15,10 +15,16 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
 
-from verify.xfem.arrays import Bools, Floats, check_floats
+from verify.xfem.arrays import (
+    Bools,
+    Floats,
+    NotConvergedError,
+    SingularStiffnessError,
+    XfemError,
+    check_floats,
+)
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
 _SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than iterations

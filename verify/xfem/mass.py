@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from verify.xfem.arrays import Floats, Ints, finite_array
+from verify.xfem.arrays import Floats, Ints, XfemError, finite_array
 from verify.xfem.block_pattern import BlockPattern, body_pattern, find_places, pattern_places
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 

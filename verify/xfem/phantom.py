@@ -16,10 +16,9 @@ from scipy.sparse import csr_array
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.join import join_parts, number_nodes
+from verify.xfem.join import join_parts, node_sides, number_nodes, piece_sides
 from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.pieces import split_cells
-from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.zero_points import ZeroPoints
 
 

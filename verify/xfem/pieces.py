@@ -24,7 +24,7 @@ the tip of a cut     `crossing`: not through   0: one piece             `join`: 
 a branch that ends   `crossing`: the branch    ±1 of the stem, and of   `join`, across faces
 on a stem that goes  goes through the pieces   the branch on one side
 through              on its side of the stem   of the stem only
-cuts that together   `junctions`: those cuts   ±1 of each, also past    `one_part`, inside the
+cuts that together   `crossing`: those cuts    ±1 of each, also past    `one_part`, inside the
 part what none goes  divide all that they      its end                  cell; `join`, across faces
 through by itself    meet in this cell
 ===================  ========================  =======================  ==========================
@@ -37,12 +37,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats, Ints, Sides, check_choice, finite_array
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, XfemError, check_choice, finite_array
 from verify.xfem.clip import ROUND_OFF_SHARE, Partition, bisected, divided
-from verify.xfem.crossing import Crossing, TipRule, crossed_through
+from verify.xfem.crossing import (
+    Crossing,
+    TipRule,
+    crossed_through,
+    junction_cuts,
+    pieces_of_one_part,
+    reached,
+)
 from verify.xfem.cuts import Cut, boxes_of
-from verify.xfem.errors import XfemError
-from verify.xfem.junctions import junction_cuts, pieces_of_one_part, reached
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 

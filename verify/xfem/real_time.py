@@ -7,7 +7,7 @@ that the step always has a solution.
 
 import numpy as np
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Floats, Ints, XfemError
 from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
@@ -17,10 +17,9 @@ from verify.xfem.body import (
     check_state,
     check_step,
 )
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import Configuration
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.supports import Supports
+from verify.xfem.loads_and_supports import Supports
 
 _EXACT = 1e-10  # residual that conjugate gradients leave of the right-hand side of a step
 

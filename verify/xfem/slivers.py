@@ -29,12 +29,11 @@ import numpy as np
 from scipy.sparse import csr_array, identity
 
 from verify.xfem.aggregation import aggregate
-from verify.xfem.arrays import Bools, Ints, check_choice
+from verify.xfem.arrays import Bools, Ints, XfemError, check_choice
 from verify.xfem.contacts import absorb, face_contacts, sibling_contacts
-from verify.xfem.errors import XfemError
+from verify.xfem.loads_and_supports import Supports, loose_bodies
 from verify.xfem.mesh import connected
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.supports import Supports, loose_bodies
 
 SliverPolicy = Literal["keep", "drop", "merge"]
 

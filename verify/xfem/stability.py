@@ -6,10 +6,9 @@ to no stiffness: its tangent gets a tension that falls to nothing.
 
 import numpy as np
 
-from verify.xfem.arrays import Bools, Floats
-from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.arrays import Bools, Floats, SingularStiffnessError
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.static_newton import SHARES, UNSEEN, Newton, Place
+from verify.xfem.statics import SHARES, UNSEEN, Newton, Place
 
 _INVERSE_ITERATIONS = 12
 _FIRST_WAY_OUT = 0.1  # of the size of the body, along the softest mode

@@ -20,7 +20,7 @@ from verify.compare.body import Body
 from verify.compare.cut_deviation import polylines_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
-from verify.geometry.nearest import feet
+from verify.geometry.simplices import feet
 from verify.judge.changed_scenes import coarsest
 from verify.judge.quantities import unit_of
 from verify.judge.reference import ExactField

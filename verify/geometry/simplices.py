@@ -1,0 +1,377 @@
+"""Segments, triangles and tetrahedra: measures, nearest points, areas in a box, refinement.
+
+Refinement is uniform (red): every edge is halved, and shapes stay bounded. The octahedron that is
+left of a tetrahedron is split along the diagonal 02–13; its descendants then have at most three
+shapes, on any level (Bey, Tetrahedral grid refinement, Computing 55, 1995).
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import factorial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_TOLERANCE = 1e-9  # of the body's size
+
+
+def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
+    """Right-handed orthonormal frame, as rows (3, 3), whose third vector is along `normal`.
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Not zero.
+    axis : (3,) array_like, optional
+        The first vector is along its projection; by default along the projection of the
+        coordinate direction that is farthest from the normal.
+    """
+    third = np.asarray(normal, dtype=float)
+    third = third / np.linalg.norm(third)
+    guide = np.eye(3)[np.argmin(np.abs(third))] if axis is None else np.asarray(axis, dtype=float)
+    first = guide - (guide @ third) * third
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(third, first), third])
+
+
+def measures(simplices: Array) -> Array:
+    """Lengths, areas, volumes (m,) of segments, triangles, tetrahedra (m, c, d); of a point 1."""
+    count = simplices.shape[1] - 1
+    if count in (0, simplices.shape[2]):
+        sides = simplices[:, 1:] - simplices[:, :1]
+        return np.abs(np.linalg.det(sides)) / factorial(count) if count else np.ones(len(sides))
+    edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
+    across = 0.5 * np.cross(*edges) if len(edges) == 2 else edges[0]
+    return np.asarray(np.linalg.norm(across, axis=1))
+
+
+def unit_normals(simplices: Array) -> Array:
+    """Return unit normals (m, d) of segments (m, 2, 2), to the left, or of triangles (m, 3, 3)."""
+    edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
+    across = np.cross(*edges) if len(edges) == 2 else edges[0][:, ::-1] * [-1.0, 1.0]
+    return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+
+
+def ear_clipping(corners: Array) -> Ints:
+    """Triangles (n - 2, 3) of a plane simple polygon (n, 3), turned as the polygon is."""
+    spokes = corners - corners[0]
+    plane = corners @ frame(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))[:2].T
+    left = list(range(len(corners)))
+    triangles = []
+    while len(left) > 3:
+        areas = []
+        for k in range(len(left)):
+            ear = plane[[left[k - 1], left[k], left[(k + 1) % len(left)]]]
+            area = _area(ear)
+            others = plane[[i for j, i in enumerate(left) if abs(j - k) > 1]]
+            blocked = area > 0.0 and len(others) > 0 and bool(_strictly_inside(others, ear).any())
+            areas.append(-np.inf if blocked else area)
+        k = int(np.argmax(areas))
+        triangles.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
+        del left[k]
+    return np.array([*triangles, tuple(left)], dtype=np.int64)
+
+
+def _area(triangle: Array) -> float:
+    (ax, ay), (bx, by), (cx, cy) = triangle
+    return 0.5 * float((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
+
+
+def _strictly_inside(points: Array, triangle: Array) -> NDArray[np.bool_]:
+    """Whether points (n, 2) other than its corners lie in an anticlockwise triangle (3, 2)."""
+    inside = (points[:, None] != triangle).any(axis=2).all(axis=1)
+    for k in range(3):
+        a, b = triangle[k], triangle[(k + 1) % 3]
+        inside &= (b[0] - a[0]) * (points[:, 1] - a[1]) - (points[:, 0] - a[0]) * (
+            b[1] - a[1]
+        ) >= 0.0
+    return inside
+
+
+def area_inside(surface: tuple[Array, Ints], lower: Array, upper: Array) -> float:
+    """Area of a triangulated surface inside an open box; what lies along its faces is not."""
+    points, triangles = surface
+    tolerance = _TOLERANCE * float(np.max(upper - lower))
+    total = 0.0
+    for triangle in points[triangles]:
+        polygon = _clipped(triangle, lower, upper)
+        if len(polygon) >= 3:
+            middle = polygon.mean(axis=0)
+            if ((middle > lower + tolerance) & (middle < upper - tolerance)).all():
+                total += _polygon_area(polygon)
+    return total if total > tolerance**2 else 0.0
+
+
+def length_inside(edges: Array, lower: Array, upper: Array) -> float:
+    """Length of segments (r, 2, 3) inside an open box."""
+    tolerance = _TOLERANCE * float(np.max(upper - lower))
+    total = 0.0
+    for a, b in edges:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = np.concatenate(
+                [(lower + tolerance - a) / (b - a), (upper - tolerance - a) / (b - a)]
+            )
+        stops = np.unique(np.concatenate([s[(s > 0) & (s < 1)], [0.0, 1.0]]))
+        middle = a + 0.5 * (stops[1:] + stops[:-1])[:, None] * (b - a)
+        inside = ((middle > lower + tolerance) & (middle < upper - tolerance)).all(axis=1)
+        total += float(np.diff(stops)[inside].sum() * np.linalg.norm(b - a))
+    return total if total > tolerance else 0.0
+
+
+def rim_edges(surface: tuple[Array, Ints]) -> Array:
+    """Edges (r, 2, 3) that belong to one triangle only."""
+    points, triangles = surface
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    distinct, count = np.unique(edges, axis=0, return_counts=True)
+    return points[distinct[count == 1]]
+
+
+def overlap_area(one: tuple[Array, Ints], other: tuple[Array, Ints]) -> float:
+    """Area over which two triangulated surfaces lie on each other, m²."""
+    first, second = one[0][one[1]], other[0][other[1]]
+    scale = float(np.ptp(np.vstack([one[0], other[0]]), axis=0).max())
+    tolerance = _TOLERANCE * scale
+    total = 0.0
+    normals = np.cross(second[:, 1] - second[:, 0], second[:, 2] - second[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    for triangle in first:
+        off = np.abs(np.einsum("tij,tj->ti", triangle - second[:, :1], normals)).max(axis=1)
+        apart = (triangle.min(axis=0) > second.max(axis=1) + tolerance) | (
+            triangle.max(axis=0) < second.min(axis=1) - tolerance
+        )
+        for k in np.flatnonzero((off <= tolerance) & ~apart.any(axis=1)):
+            total += _common_area(triangle, second[k], normals[k])
+    return total if total > tolerance * scale else 0.0
+
+
+def _common_area(one: Array, other: Array, normal: Array) -> float:
+    polygon = one
+    for k in range(3):
+        a, b = other[k], other[(k + 1) % 3]
+        inward = np.cross(normal, b - a)
+        polygon = _half(polygon, (polygon - a) @ inward)
+    return _polygon_area(polygon) if len(polygon) >= 3 else 0.0
+
+
+def _clipped(polygon: Array, lower: Array, upper: Array) -> Array:
+    """Part (k, 3) of a plane polygon inside a closed box (Sutherland & Hodgman 1974)."""
+    for axis in range(3):
+        polygon = _half(polygon, polygon[:, axis] - lower[axis])
+        polygon = _half(polygon, upper[axis] - polygon[:, axis])
+    return polygon
+
+
+def _half(polygon: Array, height: Array) -> Array:
+    """Part of a polygon (k, 3) where the linear function with these corner values is ≥ 0."""
+    kept = []
+    for i in range(len(polygon)):
+        j = (i + 1) % len(polygon)
+        if height[i] >= 0.0:
+            kept.append(polygon[i])
+        if (height[i] >= 0.0) != (height[j] >= 0.0):
+            share = height[i] / (height[i] - height[j])
+            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
+    return np.array(kept).reshape(-1, 3)
+
+
+def _polygon_area(polygon: Array) -> float:
+    spokes = polygon - polygon[0]
+    return 0.5 * float(np.linalg.norm(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0)))
+
+
+_AT_ONCE = 2**20  # pairs of a point and a part
+
+
+def shares(points: Array, starts: Array, ends: Array) -> Array:
+    """Where on segments the nearest points are: 0 at the start, 1 at the end.
+
+    The arrays (..., d) are broadcast against each other; a segment may have no length.
+    """
+    along = ends - starts
+    square = np.maximum(np.sum(along**2, axis=-1), np.finfo(float).tiny)
+    found: Array = np.clip(np.sum((points - starts) * along, axis=-1) / square, 0.0, 1.0)
+    return found
+
+
+def feet(points: Array, starts: Array, ends: Array) -> Array:
+    """Nearest points (..., d) on segments; the arrays are broadcast against each other."""
+    found: Array = starts + shares(points, starts, ends)[..., None] * (ends - starts)
+    return found
+
+
+def nearest_parts(points: Array, parts: Array) -> tuple[Array, Ints]:
+    """Distances (n,) of points (n, d) to the nearest of segments or triangles, and its number.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    parts : (m, 2, d) or (m, 3, 3) array
+        Ends of segments, or corners of triangles in space, m > 0.
+    """
+    distance, number = np.empty(len(points)), np.empty(len(points), dtype=np.int64)
+    step = max(1, _AT_ONCE // len(parts))
+    for start in range(0, len(points), step):
+        here = slice(start, start + step)
+        away = _distances(points[here, None], parts)
+        number[here] = away.argmin(axis=1)
+        distance[here] = away.min(axis=1)
+    return distance, number
+
+
+def distance_to_outline(points: Array, corners: Array) -> Array:
+    """Distance (n,) of each of `points` (n, d) to the closed outline `corners` (k, d)."""
+    return nearest_parts(points, np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))[0]
+
+
+def distance_to_polyline(points: Array, vertices: Array) -> Array:
+    """Distance (n,) of each of `points` (n, d) to the polyline `vertices` (k, d)."""
+    return nearest_parts(points, np.stack([vertices[:-1], vertices[1:]], axis=1))[0]
+
+
+def distance_to_triangles(points: Array, surface: tuple[Array, Ints]) -> Array:
+    """Distance (n,) of points (n, 3) to a triangulated surface, m."""
+    return nearest_parts(points, surface[0][surface[1]])[0]
+
+
+class HasFeet(Protocol):
+    """A piece of a curve or of a surface."""
+
+    def foot(self, points: Array, /) -> Array:
+        """Nearest points (n, d) to points (n, d)."""
+
+
+def distance_to_pieces(points: Array, pieces: Sequence[HasFeet]) -> Array:
+    """Distance (n,) of points (n, d) to the nearest of pieces of a cut, not cut into facets, m."""
+    away = [np.linalg.norm(points - one.foot(points), axis=1) for one in pieces]
+    return np.asarray(np.min(away, axis=0), dtype=float)
+
+
+def _distances(points: Array, parts: Array) -> Array:
+    """Distances (n, m) of points (n, 1, d) to segments or triangles."""
+    edges = [(0, 1)] if parts.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]
+    away = np.full((len(points), len(parts)), np.inf)
+    for i, j in edges:
+        start, end = parts[:, i], parts[:, j]
+        share = shares(points, start, end)[..., None]
+        off = np.linalg.norm(points - start - share * (end - start), axis=2)
+        away = np.minimum(away, off)
+    if len(edges) == 3:
+        normal = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
+        above = np.ones(away.shape, dtype=bool)
+        for i, j in edges:
+            inward = np.cross(normal, parts[:, j] - parts[:, i])
+            above &= np.sum((points - parts[:, i]) * inward, axis=2) >= 0.0
+        height = np.abs(np.sum((points - parts[:, 0]) * normal, axis=2))
+        height /= np.linalg.norm(normal, axis=1)
+        away = np.where(above, np.minimum(away, height), away)
+    return away
+
+
+def on_simplices(points: Array, corners: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Tell which points (n, d) lie on simplices (m, c, d) with c corners, within a tolerance, m."""
+    from scipy.spatial import cKDTree  # commands that only read cases shall not load scipy
+
+    found = np.zeros(len(points), dtype=bool)
+    start, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    # rates of the barycentric coordinates but the first
+    rates = np.linalg.pinv(edges) if edges.shape[1] else np.swapaxes(edges, 1, 2)
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1.0 + 1e-12)
+    for begin in range(0, len(points), _AT_ONCE // 16):
+        some = points[begin : begin + _AT_ONCE // 16]
+        near = cKDTree(some).query_ball_point(middle, reach + tolerance)
+        which = np.repeat(np.arange(len(near)), [len(one) for one in near])
+        point = np.concatenate([*near, []]).astype(np.int64)
+        away = some[point] - start[which]
+        share = np.einsum("nd,ndc->nc", away, rates[which])
+        on = np.linalg.norm(away - np.einsum("nc,ncd->nd", share, edges[which]), axis=1)
+        on = on <= tolerance
+        on &= (share >= -tolerance * np.linalg.norm(rates[which], axis=1)).all(axis=1)
+        last = np.linalg.norm(rates.sum(axis=2), axis=1)[which]
+        on &= 1.0 - share.sum(axis=1) >= -tolerance * last
+        found[begin + point[on]] = True
+    return found
+
+
+Cells = NDArray[np.int64]
+
+# children by corners (single digits) and middles of edges
+_CHILDREN = {
+    2: ["0 01", "01 1"],
+    3: ["0 01 02", "01 1 12", "02 12 2", "01 12 02"],
+    4: [
+        "0 01 02 03", "01 1 12 13", "02 12 2 23", "03 13 23 3",
+        "01 02 03 13", "01 02 12 13", "02 03 13 23", "02 12 13 23",
+    ],
+}  # fmt: skip
+
+
+def mesh_edges(simplices: Cells) -> Cells:
+    """Edges (e, 2) of simplices (m, k), each once, the smaller node first."""
+    pairs = np.concatenate(
+        [simplices[:, [i, j]] for i, j in combinations(range(simplices.shape[1]), 2)]
+    )
+    pairs.sort(axis=1)
+    count = int(pairs.max(initial=0)) + 1
+    return np.column_stack(np.divmod(np.unique(pairs[:, 0] * count + pairs[:, 1]), count))
+
+
+def oriented(points: Array, cells: Cells) -> Cells:
+    """Swap two corners of each cell of negative volume; triangles in space stay as they are."""
+    if cells.shape[1] <= points.shape[1]:
+        return cells
+    negative = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0
+    cells = cells.copy()
+    cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
+    return cells
+
+
+def refine_uniformly(
+    points: Array, cells: Cells, facets: Cells, times: int = 1
+) -> tuple[Array, Cells, Cells]:
+    """Halve all edges, once or several times.
+
+    All times in one call: the descendants of a tetrahedron have three shapes only if its corners
+    keep their order from level to level.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, k + 1) array
+        Of positive orientation, if k = d.
+    facets : (f, k) array
+        Marked facets, refined with the cells.
+    times : int
+
+    Returns
+    -------
+    points : (…, d) array
+        The given ones first.
+    cells : (2^(k·times) m, k + 1) array
+        Oriented as the given ones.
+    facets : (2^((k−1)·times) f, k) array
+    """
+    for _ in range(times):
+        edges, count = mesh_edges(cells), len(points)
+        keys = edges[:, 0] * count + edges[:, 1]
+        points = np.vstack([points, points[edges].mean(axis=1)])
+        cells, facets = _children(cells, keys, count), _children(facets, keys, count)
+    return points, oriented(points, cells), facets
+
+
+def _children(simplices: Cells, keys: Cells, count: int) -> Cells:
+    def node(name: str) -> Cells:
+        if len(name) == 1:
+            return simplices[:, int(name)]
+        ends = np.sort(simplices[:, [int(name[0]), int(name[1])]], axis=1)
+        return count + np.searchsorted(keys, ends[:, 0] * count + ends[:, 1])
+
+    parts = [
+        np.column_stack([node(name) for name in child.split()])
+        for child in _CHILDREN[simplices.shape[1]]
+    ]
+    return np.concatenate(parts)
