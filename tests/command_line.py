@@ -8,7 +8,7 @@ from subprocess import CompletedProcess
 from unittest.mock import patch
 
 from verify.cli import main
-from verify.json_files import read_json
+from verify.files import read_json
 from verify.runner import child
 
 

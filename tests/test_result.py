@@ -12,11 +12,21 @@ import pytest
 import verify
 from verify import provenance as module
 from verify.errors import InputError
+from verify.files import asked_place, whole_file, write_whole
 from verify.provenance import provenance, versions
-from verify.records import CutRecord, ReferenceRecord
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
-from verify.result_files import read_result, write_result
-from verify.whole_files import asked_place, whole_file, write_whole
+from verify.result import (
+    CaseResult,
+    CutRecord,
+    Metric,
+    Rate,
+    ReferenceRecord,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+    read_result,
+    write_result,
+)
 
 
 def judged(*verdicts):

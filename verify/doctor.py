@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from verify.printable import memory_text
+from verify.processes import ONE_THREAD
 from verify.provenance import provenance
-from verify.threads import ONE_THREAD
 
 _SECONDS = 120.0
 _FENICSX = (

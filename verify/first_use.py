@@ -23,7 +23,6 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.calibration import compile_times
 from verify.compare.cell_tree import build_cell_tree, find_cells
 from verify.compare.locate import (
     SolutionField,
@@ -35,8 +34,9 @@ from verify.compare.locate import (
 from verify.compare.overlap import OverlapSearch
 from verify.compare.sides import distance_to_segments
 from verify.compare.simplices import simplices
+from verify.processes import ONE_THREAD
+from verify.provenance import compile_times
 from verify.solution import Solution
-from verify.threads import ONE_THREAD
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.element import State, isotropic

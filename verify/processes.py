@@ -1,4 +1,9 @@
-"""First and last acts of processes that the runner starts, and the server that forks its own."""
+"""Processes that solve: one thread each, their first and last acts, the server that forks them.
+
+Parallel runs are processes, timings are one thread's. BLAS with a thread per core also costs: the
+quick sliver study took 82 s of two cores with it, and 35 s of one without (small matrices, whose
+threads wait for each other).
+"""
 
 import contextlib
 import ctypes
@@ -8,8 +13,6 @@ import signal
 import sys
 from multiprocessing import forkserver
 from pathlib import Path
-
-from verify.threads import ONE_THREAD
 
 PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 FORKED = multiprocessing.get_context("forkserver")
@@ -61,3 +64,25 @@ def peak_memory() -> float:
         if line.startswith("VmHWM:"):
             return float(line.split()[1]) * 1024.0
     return float("nan")
+
+
+# what the libraries read when they are loaded
+ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+    ),
+    "1",
+)
+
+
+def pin_to_one_thread() -> None:
+    """Pin this process, and those it starts, before numpy or numba is loaded.
+
+    Whatever the environment says: what is recorded of every run and study is one thread.
+    """
+    os.environ.update(ONE_THREAD)

@@ -1,16 +1,149 @@
 """The result model: one record per solve, one per judged requirement. Versioned JSON.
 
 `verify.report`, baselines and the pytest plugin read this and nothing else. A failed, refused
-or timed-out solve is a record like any other, with its reason.
+or timed-out solve is a record like any other, with its reason. First what solutions say too (what
+a solver dropped, its cut, its reference), then results, the ranking of solvers, and the files.
 """
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
+from functools import cache
 from math import inf
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
-from verify.records import CutRecord, ReferenceRecord, Regularisation
+from verify.errors import InputError
+from verify.files import plain, read_json, write_json
+from verify.printable import one_line, words_of
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Something the solver dropped, snapped, clamped, scaled or floored.
+
+    Parameters
+    ----------
+    kind : str
+        What was done, e.g. ``"zero-volume piece dropped"``.
+    count : int
+        How often.
+    size : float or None
+        Its largest contribution, in the unit of `unit`; None as read from JSON, which has no word
+        for what is not finite.
+    unit : str
+        Unit of `size`, e.g. ``"volume fraction"``.
+    """
+
+    kind: str
+    count: int
+    size: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class CutRecord:
+    """The realised cut of a solve beside the cut as asked.
+
+    Parameters
+    ----------
+    dimension : int
+        Of the cells, 2 or 3.
+    asked_to_realised, realised_to_asked : float
+        Largest distance of a point of one from the other, m, where the nearest point is no end.
+    missing, surplus : float
+        Of the cut as asked beyond the ends of the realised one, and the reverse: a length, m; of
+        surfaces in space an area, m².
+    swept : float
+        Between the two over their common part: an area, m², in space a volume, m³.
+    element : float
+        Largest longest edge of the cells at the realised cut, m.
+    limit : float
+        Lateral deviation of a facet up to which fields are continued across it, m.
+    radius : float or None
+        Least radius of curvature of the cuts as asked, m; None if all are straight or plane.
+    errors : dict of str to float
+        Relative errors that are not judged, by metric: without any continuation if those judged
+        are with it everywhere, else with it everywhere. Empty where both are the same.
+    """
+
+    dimension: int
+    asked_to_realised: float
+    realised_to_asked: float
+    missing: float
+    surplus: float
+    swept: float
+    element: float
+    limit: float
+    radius: float | None
+    errors: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def lateral(self) -> float:
+        """Larger of both lateral deviations, m."""
+        return max(self.asked_to_realised, self.realised_to_asked)
+
+    @property
+    def continued(self) -> bool:
+        """Whether what is judged is continued across all of the realised cut."""
+        return self.lateral <= self.limit
+
+    @property
+    def under_resolved(self) -> bool:
+        """Whether an arc is of less than two elements in radius."""
+        return self.radius is not None and self.radius < 2.0 * self.element
+
+
+@dataclass(frozen=True)
+class ReferenceRecord:
+    """What a result says about its reference; None where it says nothing.
+
+    Parameters
+    ----------
+    kind : {"exact", "conforming", "none"} or None
+        None: the comparison failed.
+    source : str
+        What it is, in words.
+    reason : str
+        Why there is none.
+    near : dict
+        ``radius`` (m) within which errors are near a tip, and its ``reason``.
+    levels : list of dict
+        ``level``, ``size`` (m) and ``unknowns`` of each conforming level.
+    time_to_accuracy : dict of str to dict
+        By level: ``unknowns``, ``seconds``, and bounds of the relative errors by metric.
+    metrics : dict of str to dict
+        ``values`` by level, ``extrapolated``, ``uncertainty``, ``order``, ``reason``; ``second``, a
+        second estimate, and its ``disagreement`` over the uncertainties.
+    missing : dict of str to str
+        Why it does not have a quantity of interest.
+    suffices : bool
+        Whether its uncertainty is at most a tenth of each error that it judges.
+    suffices_reason : str
+    judged_errors : dict of str to dict
+        The errors that it judges, largest share of uncertainty first.
+    overlap : dict
+        ``depth`` (m) and ``place`` of material of an exact solution that lies in other material.
+    """
+
+    kind: str | None = None
+    source: str | None = None
+    reason: str | None = None
+    near: dict[str, Any] | None = None
+    levels: list[dict[str, Any]] | None = None
+    time_to_accuracy: dict[str, dict[str, Any]] | None = None
+    metrics: dict[str, dict[str, Any]] | None = None
+    missing: dict[str, str] | None = None
+    suffices: bool | None = None
+    suffices_reason: str | None = None
+    judged_errors: dict[str, dict[str, Any]] | None = None
+    overlap: dict[str, Any] | None = None
+
+    def said(self) -> dict[str, Any]:
+        """Return what it says, by name."""
+        entries = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: entry for name, entry in entries.items() if entry is not None}
+
 
 SCHEMA_VERSION = 1
 REFERENCE = "reference"  #: solver that judges the others, where no exact solution does
@@ -397,3 +530,251 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict:
 def error_picture(solver: str) -> str:
     """Return the name under which `CaseResult.pictures` has the error field of a solver."""
     return f"error_field of {solver}"
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What does not count in a comparison, and why; an empty solver means all of them."""
+
+    case: str
+    solver: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A solver in a comparison.
+
+    Parameters
+    ----------
+    solver : str
+    rank : int or None
+        One more than the number of solvers that are certainly better (their intervals lie
+        wholly below). None for a solver without a number in some item: its `value` is over fewer
+        items than that of the others.
+    tied : bool
+        Whether another has the same rank.
+    value, low, high : float or None
+        The number and the interval in which it lies.
+    count : int
+        Items that it rests on.
+    where : str
+        Case that decided, where the worst counts.
+    """
+
+    solver: str
+    rank: int | None
+    tied: bool
+    value: float | None
+    low: float | None
+    high: float | None
+    count: int
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All solvers in one respect.
+
+    Parameters
+    ----------
+    metric : str
+        What was compared.
+    view : str
+        Under which condition.
+    how : str
+        How cases are joined: ``"mean"``, geometric mean of the ratios to the best of each case,
+        or ``"worst"``.
+    items : int
+    standings : list of Standing
+        Best first, those without rank last.
+    left_out : list of LeftOut
+    """
+
+    metric: str
+    view: str
+    how: str
+    items: int
+    standings: list[Standing]
+    left_out: list[LeftOut]
+
+
+@dataclass(frozen=True)
+class StabilityStanding:
+    """How the solves of one solver ended.
+
+    Parameters
+    ----------
+    solver : str
+    rank : int
+        One more than the number of solvers with a smaller share of solves lost.
+    tied : bool
+    asked, solved, refused : int
+        Refusals are not held against a solver: it says what it cannot do.
+    failed, timeout, memory : int
+    blown_up : int
+        Solved, but as far off as a body that does not move, or not finite.
+    inside_out : int
+        Solves whose notes tell of elements turned inside out.
+    lost : float
+        Share of the solves not refused that failed, ran out of time or memory, or blew up.
+    regularisations : dict of str to int
+        What was dropped, snapped, clamped, scaled or floored, and how often.
+    """
+
+    solver: str
+    rank: int | None
+    tied: bool
+    asked: int
+    solved: int
+    refused: int
+    failed: int
+    timeout: int
+    memory: int
+    blown_up: int
+    inside_out: int
+    lost: float | None
+    regularisations: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Share of items that each solver has done within a number, as a function of that number.
+
+    Parameters
+    ----------
+    quantity : str
+        What the number is.
+    items : int
+        All of them; a solver that has not done an item has one number less.
+    steps : dict of str to list of float
+        By solver, the numbers at which its share grows by one item; ascending.
+    most : float or None
+        Number beyond which nothing is shown.
+    """
+
+    quantity: str
+    items: int
+    steps: dict[str, list[float]]
+    most: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranking:
+    """A table per question, and what was left out.
+
+    Parameters
+    ----------
+    cases, solvers : list of str
+    conformance : dict of str to dict
+        What ``verify conform`` found, by solver; it does not move the ranks.
+    accuracy, energy, cost : list of Comparison
+    stability : list of StabilityStanding
+    left_out : list of LeftOut
+        What no ranking counts.
+    contended : list of str
+        Why times may be off, if they may.
+    profiles : list of Profile
+        Performance and data profiles.
+    """
+
+    schema: Literal[1]
+    kind: Literal["ranking"] = "ranking"
+    cases: list[str]
+    solvers: list[str]
+    conformance: dict[str, dict[str, Any]]
+    accuracy: list[Comparison]
+    stability: list[StabilityStanding]
+    energy: list[Comparison]
+    cost: list[Comparison]
+    left_out: list[LeftOut]
+    contended: list[str]
+    profiles: list[Profile] = field(default_factory=list)
+
+
+def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:
+    """Return the solvers of a run that can be ranked: all but the reference."""
+    names = dict.fromkeys(solve.solver for result in results for solve in result.solves)
+    return [name for name in names if name != REFERENCE]
+
+
+def folder_of_case(case: str) -> str:
+    """Return the name of the folder of a case below ``cases/`` of a run."""
+    name = case.replace("/", "__")
+    return f"_{name}" if name.startswith(".") else name
+
+
+def write_result(result: CaseResult, path: Path) -> None:
+    """Write `result` as JSON, in one step (a reader never sees half a file).
+
+    Numbers that are not finite, for which JSON has no word, are null there, and named with what
+    they are under ``not_finite``; numpy's scalars are plain numbers.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lost: dict[str, str] = {}
+    content = plain(result.content(), lost)
+    write_json({**content, "not_finite": lost} if lost else content, path)
+
+
+def read_result(path: Path) -> CaseResult:
+    """Read what `write_result` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, or of another schema version.
+    """
+    record = read_json(path, "a result")
+    if record.get("schema") != SCHEMA_VERSION:
+        raise InputError(f"not a result of schema version {SCHEMA_VERSION}", str(path))
+    try:
+        for place, number in record.pop("not_finite", {}).items():
+            _put(record, place, float(number))
+    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+        raise InputError(f"not a readable result ({words_of(error)})", str(path)) from None
+    return checked(CaseResult, record, "result", str(path))
+
+
+def checked[Kind](kind: type[Kind], content: Any, what: str, where: str) -> Kind:
+    """Make a record of `verify.result`, or of what holds them, from plain values.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass.
+    content : object
+    what : str
+        What it is called in the message.
+    where : str
+
+    Raises
+    ------
+    InputError
+        If a value is missing, of another type, or unknown; the first such is named.
+    """
+    from pydantic import ValidationError
+
+    make: Any = kind
+    try:
+        made: Kind = _adapter(make).validate_python(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        said = one_line(f"{place}: {first['msg']}")
+        raise InputError(f"not a readable {what} ({said})", where) from None
+    return made
+
+
+@cache
+def _adapter(kind: Any) -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
+
+
+def _put(record: Any, place: str, number: float) -> None:
+    """Put a number at a JSON pointer (RFC 6901), where null stands for it."""
+    keys = [key.replace("~1", "/").replace("~0", "~") for key in place.split("/")[1:]]
+    for key in keys[:-1]:
+        record = record[int(key) if isinstance(record, list) else key]
+    record[int(keys[-1]) if isinstance(record, list) else keys[-1]] = number

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.files import read_json, whole_file, write_whole
 from verify.handed_over import (
     check_accounts,
     check_cells,
@@ -28,10 +29,8 @@ from verify.handed_over import (
     plain_mass,
     restored_mass,
 )
-from verify.json_files import read_json
 from verify.read_mesh import read_with_meshio
-from verify.records import Regularisation
-from verify.whole_files import whole_file, write_whole
+from verify.result import Regularisation
 
 __all__ = [
     "SCHEMA_VERSION", "Regularisation", "Solution", "handed_over", "read_solution",

@@ -5,10 +5,17 @@ from dataclasses import replace
 
 import scenes
 
-from verify.calibration import KERNEL
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
-from verify.result_files import write_result
+from verify.provenance import KERNEL
+from verify.result import (
+    CaseResult,
+    Metric,
+    ReferenceRecord,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+    write_result,
+)
 
 SCENE = {
     "mesh": {"cells": [[4, 4], [8, 8]]},

@@ -3,7 +3,7 @@
 import pytest
 import runs
 
-from verify.calibration import KERNEL
+from verify.provenance import KERNEL
 
 NOISY = f"kernel {KERNEL}: 0.010 0.016 0.012 0.019 0.011"
 

@@ -7,7 +7,7 @@ import pytest
 import runs
 
 from verify.provenance import changes_of
-from verify.records import CutRecord
+from verify.result import CutRecord
 
 
 def rows(answer, axis=None):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.runner.child import Child
 from verify.scene import load_scene, scene_content
 

@@ -12,7 +12,7 @@ from time import thread_time
 import numpy as np
 import pytest
 
-from verify.calibration import kernel_seconds
+from verify.provenance import kernel_seconds
 from verify.simulator import Hold, Session, Stage
 from verify.xfem.cuts import ToolPath
 from verify.xfem.element import isotropic

@@ -15,9 +15,8 @@ from verify.compare.motion import ExactMotion
 from verify.geometry.planar import inside_polygon
 from verify.judge.cut_errors import are_mixed, measured_cut, with_cut, with_other_errors
 from verify.judge.quantities import Measured
-from verify.records import ReferenceRecord
 from verify.report.tables import cuts_table
-from verify.result import CUT, CaseResult, SolveRecord, Status
+from verify.result import CUT, CaseResult, ReferenceRecord, SolveRecord, Status
 from verify.solvers.interface import find_solver
 
 LIFT = 0.1

@@ -10,7 +10,7 @@ from verify.conformance.check import evaluate
 from verify.conformance.checks import energy_in_motion
 from verify.conformance.meeting_checks import crossed_interface, ending_cut, parted_checks
 from verify.conformance.trials import Outcome
-from verify.json_files import write_json
+from verify.files import write_json
 from verify.result import Status
 from verify.runner.child import Ending
 from verify.solvers import find_solver

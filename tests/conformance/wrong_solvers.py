@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from verify.compare.hooke import hooke, strain_energy
-from verify.records import Regularisation
+from verify.result import Regularisation
 from verify.solvers.xfem import XfemSolver
 
 

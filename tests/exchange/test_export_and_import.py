@@ -15,8 +15,7 @@ from reference.exact import exact_solution
 from verify.cli import main
 from verify.errors import InputError
 from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
-from verify.result import Status, Verdict
-from verify.result_files import read_result
+from verify.result import Status, Verdict, read_result
 from verify.scene import load_scene
 from verify.solution import write_solution
 from verify.solvers.xfem import XfemSolver

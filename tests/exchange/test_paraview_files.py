@@ -10,7 +10,7 @@ from reference.exact import exact_solution
 from verify.compare.hooke import law_of, strain_and_stress, strain_energy
 from verify.compare.locate import SolutionField
 from verify.exchange import export_fields, problem_of
-from verify.json_files import write_json
+from verify.files import write_json
 from verify.result import SolveRecord, Status
 from verify.scene import load_scene, scene_content
 from verify.solution import Solution, write_solution

@@ -11,7 +11,7 @@ import pytest
 from verify.cli import main
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
-from verify.result_files import read_result
+from verify.result import read_result
 from verify.scene import load_scene
 from verify.study.measured_scenes import measurements, variant_of
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from verify.threads import ONE_THREAD
+from verify.processes import ONE_THREAD
 
 
 def test_without_numba_a_run_ends_with_one_line_that_names_the_cure(tmp_path, root):

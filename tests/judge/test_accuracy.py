@@ -7,8 +7,7 @@ from judged_fields import Cubic, judged
 
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.verdict import with_verdicts
-from verify.result import SolveRecord, Status, Verdict
-from verify.result_files import read_result, write_result
+from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.runner.run import SOLVER_FAILED, exit_code
 
 

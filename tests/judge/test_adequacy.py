@@ -12,8 +12,7 @@ from verify.judge import adequacy
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.adequacy import adequacy_notice, other_scene
 from verify.judge.changed_scenes import coarsest, on_one_level
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, Metric, NoticeKind, SolveRecord, Status
+from verify.result import CaseResult, Metric, NoticeKind, ReferenceRecord, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver

@@ -7,8 +7,7 @@ import pytest
 from pressed_halves import normal, pressed
 
 from verify.judge.closing import with_openings
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
 

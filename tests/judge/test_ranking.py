@@ -3,8 +3,7 @@
 import pytest
 
 from verify.judge.ranks import rank_solvers
-from verify.records import ReferenceRecord, Regularisation
-from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.result import CaseResult, Metric, ReferenceRecord, Regularisation, SolveRecord, Status
 
 
 def solve(case, solver, level, error=None, width=0.0, seconds=None, status=Status.SOLVED, **more):

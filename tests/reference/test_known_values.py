@@ -14,10 +14,10 @@ from reference_scenes import TENSION, needs_fenicsx, plate, polyline, square
 
 from reference.exact import exact_solution
 from reference.fracture import stress_intensity, tips
-from verify.calibration import kernel_seconds
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.judge.quantities import Measured
+from verify.provenance import kernel_seconds
 from verify.scene import Scene
 from verify.solvers import find_solver
 

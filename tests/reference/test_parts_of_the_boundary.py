@@ -13,8 +13,7 @@ from verify.exchange import export_case, problem_of
 from verify.foreign.records import PROGRAMS
 from verify.judge.rates import shifted_ends
 from verify.methods import METHODS
-from verify.records import Regularisation
-from verify.result import SolveRecord, Status
+from verify.result import Regularisation, SolveRecord, Status
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh, cuts_of
 from verify.solvers.boundary_conditions import loads_of

@@ -10,18 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from verify.records import ReferenceRecord, Regularisation
 from verify.result import (
     CaseResult,
     Metric,
     Rate,
+    ReferenceRecord,
+    Regularisation,
     SolveRecord,
     Status,
     Verdict,
     VerdictRecord,
     error_picture,
+    write_result,
 )
-from verify.result_files import write_result
 from verify.solution import Solution, write_solution
 
 HOSTILE = "<script>alert('x')</script> & \"quotes\" \u202e\x00 url(http://evil.example) €"

@@ -6,11 +6,10 @@ from statistics import median
 
 import pytest
 
-from verify.records import ReferenceRecord
 from verify.report.answers import Ratio, _over_cases, answers, energy_curve, sliver_curves
 from verify.report.error_plots import answer_panels
 from verify.report.plots import Palette
-from verify.result import CRITICAL_STEP, CaseResult, Metric, SolveRecord, Status
+from verify.result import CRITICAL_STEP, CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
 
 def solve(solver, level, error, off=0.0, seconds=None, **more):

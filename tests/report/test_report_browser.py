@@ -8,7 +8,7 @@ import zlib
 
 import pytest
 
-from verify.report.forms import BROWSERS, print_page
+from verify.report.rendering import BROWSERS, print_page
 
 pytestmark = pytest.mark.browser
 

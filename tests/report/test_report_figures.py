@@ -27,8 +27,9 @@ from verify.result import (
     OpeningProfile,
     SolveRecord,
     Status,
+    read_result,
+    write_result,
 )
-from verify.result_files import read_result, write_result
 
 
 @pytest.fixture(scope="module")

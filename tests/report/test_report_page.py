@@ -17,8 +17,7 @@ from synthetic_run import HOSTILE, make_run
 from verify.cli.run_text import verdict_lines
 from verify.report.rendering import render
 from verify.report.run_directory import COLUMNS, load_run
-from verify.result import SolveRecord, Status, Verdict
-from verify.result_files import read_result, write_result
+from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 
 
 def page_of(root):

@@ -10,8 +10,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.judge.checks import unjudged_result
 from verify.judge.sufficiency import sufficiency
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.directory import Job
 from verify.runner.plan import CasePlan, further_level, levels_in_vain
 from verify.scene import Scene, load_scene

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from verify.json_files import read_json, write_json
-from verify.result import Status
-from verify.result_files import read_result
+from verify.files import read_json, write_json
+from verify.result import Status, read_result
 from verify.runner.solve import main, solve_job
 from verify.scene import load_scene, scene_content
 

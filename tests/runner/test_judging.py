@@ -10,8 +10,15 @@ import pytest
 from verify.compare.errors import nodal_error
 from verify.compare.locate import SolutionField
 from verify.judge import accuracy
-from verify.records import ReferenceRecord
-from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result import (
+    CRITICAL_STEP,
+    CaseResult,
+    ReferenceRecord,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+)
 from verify.runner import exit_code, judging
 from verify.runner.directory import MEASURED
 from verify.runner.solve import solve_job

@@ -6,7 +6,7 @@ from time import perf_counter, thread_time
 import numpy as np
 import pytest
 
-from verify.calibration import kernel_seconds
+from verify.provenance import kernel_seconds
 from verify.simulator import Session, quality_of
 from verify.simulator.session import PHASES, Spread
 from verify.xfem.cuts import ToolPath

@@ -5,8 +5,7 @@ import pytest
 import scenes
 
 from reference.exact import exact_solution
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.study.budget.study import budget_study

@@ -12,8 +12,7 @@ from reference.exact.moving_cracks import wave
 from verify.cli import main
 from verify.errors import RunStoppedError
 from verify.judge.cost import pareto_front, time_at, work_points
-from verify.records import ReferenceRecord
-from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
+from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status, Verdict
 from verify.scene import load_scene
 from verify.study import solving
 from verify.study.calibration.families import families, series_families

@@ -12,8 +12,7 @@ from verify.baseline.finished_run import (
     speed_of,
 )
 from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity, Speed
-from verify.calibration import KERNEL
-from verify.provenance import changes_of
+from verify.provenance import KERNEL, changes_of
 from verify.result import CaseResult, Metric, Verdict
 from verify.runner.run import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 

@@ -9,12 +9,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from verify.baseline.record import Independent, Own, Quantity, Speed
-from verify.calibration import KERNEL, seconds_of_note
 from verify.errors import InputError
-from verify.json_files import read_json
+from verify.files import read_json
 from verify.judge.intervals import ERROR_METRICS
-from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of
-from verify.result_files import read_result
+from verify.provenance import KERNEL, seconds_of_note
+from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of, read_result
 from verify.runner.fingerprint import digest_of
 from verify.scene import Scene
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.scene.strict import Finite, NonNegative, Positive, Strict, first_fault
 
 

@@ -11,9 +11,9 @@ from verify import __version__
 from verify.cli.signatures import Arg, Member, Parser, add_commands, arguments_of, call
 from verify.cli.streams import printable_streams
 from verify.errors import InputError, RunStoppedError, UnsupportedSceneError
+from verify.files import DISK_FAILURES
 from verify.printable import one_line
-from verify.threads import pin_to_one_thread
-from verify.whole_files import DISK_FAILURES
+from verify.processes import pin_to_one_thread
 
 __all__ = ["build_parser", "main"]
 

@@ -111,10 +111,10 @@ def _played(
     stage: "Stage", scene: "Scene", out: Path | None, count: int, zoom: float, records: Path | None
 ) -> dict[str, Any]:
     """Play without a window, write what is asked for, and return the summary."""
+    from verify.files import asked_place, write_whole
     from verify.simulator import PHASES, Session, quality_of
     from verify.simulator.animation import Frame
     from verify.simulator.session import Spread
-    from verify.whole_files import asked_place, write_whole
 
     session = Session(stage)
     every = max(1, round(stage.steps / (count - 1)))

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.printable import words_of
-from verify.ranking import ranked_solvers
-from verify.result import CaseResult, Status
+from verify.result import CaseResult, Status, ranked_solvers
 from verify.runner.fingerprint import code_digest, code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
 from verify.solvers.interface import solver_in

@@ -144,7 +144,7 @@ def cost(
     answer: Answer,
 ) -> int:
     """Work against precision while the first cut of a case grows, at equal accuracy."""
-    from verify.result_files import folder_of_case
+    from verify.result import folder_of_case
     from verify.runner.checking import check_solver_name
     from verify.scene import load_scene
     from verify.study.cost import cost_study, growing_scenes
@@ -188,7 +188,7 @@ def budget(
     answer: Answer,
 ) -> int:
     """Where the error of the XFEM answer comes from, and the cheapest adequate model."""
-    from verify.result_files import folder_of_case
+    from verify.result import folder_of_case
     from verify.scene import load_scene
     from verify.study.budget.study import budget_study
 

@@ -23,7 +23,7 @@ from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_
 from verify.compare.simplex_bodies import MembraneBody, SolidBody
 from verify.compare.simplices import cells_of, heights, points_in
 from verify.geometry.curves import Arc
-from verify.records import CutRecord
+from verify.result import CutRecord
 from verify.solution import Solution
 
 Array = NDArray[np.float64]

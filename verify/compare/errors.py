@@ -31,10 +31,10 @@ from verify.compare.realised import cut_deviation, field_of
 from verify.compare.simplex_bodies import MembraneBody
 from verify.compare.simplices import simplices
 from verify.errors import InputError
-from verify.records import CutRecord
+from verify.files import whole_file
+from verify.result import CutRecord
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.whole_files import whole_file
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from verify.conformance.check import Check, Finding
 from verify.conformance.field_check import EXACT, Solutions, covered, is_field, named
 from verify.conformance.scenes import YOUNG, Array, Field
 from verify.conformance.trials import Trial
-from verify.records import CutRecord
+from verify.result import CutRecord
 from verify.scene import Scene
 from verify.scene.parts import on_part
 from verify.solution import Solution

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.processes import die_with_parent
 from verify.result import Status
 from verify.runner.child import Child, telling_line, watch

@@ -12,7 +12,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.exchange.export import Answers
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases

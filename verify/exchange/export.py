@@ -29,14 +29,13 @@ import numpy as np
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
-from verify.json_files import read_json, write_json
+from verify.files import asked_place, read_json, whole_file, write_json
 from verify.printable import one_line
 from verify.result import Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene
 from verify.solution import Solution, read_solution
 from verify.solvers import check_parameters
-from verify.whole_files import asked_place, whole_file
 
 EXPORT_SCHEMA = 1
 

@@ -22,15 +22,13 @@ from verify.compare.errors import Truth, nodal_differences, truth_of
 from verify.compare.hooke import strain_and_stress
 from verify.compare.locate import SolutionField
 from verify.errors import InputError
-from verify.json_files import read_json
-from verify.records import CutRecord
+from verify.files import asked_place, read_json, whole_file, write_whole
 from verify.report.bodies import read_stored
 from verify.report.run_directory import CaseEntry, load_run
-from verify.result import SolveRecord, Status
+from verify.result import CutRecord, SolveRecord, Status
 from verify.runner.directory import folder_name
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution
-from verify.whole_files import asked_place, whole_file, write_whole
 
 Array = NDArray[np.float64]
 

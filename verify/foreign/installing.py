@@ -15,8 +15,8 @@ from pathlib import Path
 
 from verify.errors import InputError
 from verify.exchange.export import ProgramSolver
+from verify.files import read_json, write_json
 from verify.foreign.records import PROGRAMS, ForeignSolver, foreign_solver
-from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.runner.fingerprint import file_digest
 from verify.scene import Scene

@@ -16,10 +16,10 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from verify.errors import InputError
+from verify.files import asked_place
 from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.strict import nearest
-from verify.whole_files import asked_place
 
 PROGRAMS = Path(__file__).resolve().parent / "programs"
 _STRICT = ConfigDict(extra="forbid")

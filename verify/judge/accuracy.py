@@ -51,13 +51,13 @@ from verify.judge.reference import (
 from verify.judge.resultants import resultants_over_time
 from verify.judge.sufficiency import sufficiency
 from verify.printable import one_line
-from verify.records import ReferenceRecord
 from verify.result import (
     COMPARISON_FAILED,
     REFERENCE,
     CaseResult,
     Metric,
     Rate,
+    ReferenceRecord,
     SolveRecord,
     Status,
 )

@@ -4,8 +4,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from verify.records import ReferenceRecord
-from verify.result import REFERENCE, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result import (
+    REFERENCE,
+    CaseResult,
+    ReferenceRecord,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+)
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck, scene_hash
 
 if TYPE_CHECKING:  # who only lists checks does not load the comparison

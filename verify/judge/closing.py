@@ -23,7 +23,6 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.openings import Contestant, largest_opening_time, opening_profiles
 from verify.judge.reference import size_of
 from verify.printable import one_line
-from verify.records import ReferenceRecord
 from verify.result import (
     COMPARISON_FAILED,
     REFERENCE,
@@ -33,6 +32,7 @@ from verify.result import (
     NoticeKind,
     OpeningCurve,
     OpeningProfile,
+    ReferenceRecord,
     SolveRecord,
     Status,
 )

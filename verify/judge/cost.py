@@ -12,8 +12,7 @@ from statistics import median
 from verify.judge.intervals import Interval, error_interval
 from verify.judge.rates import ROUND_OFF
 from verify.judge.standing import Item, compared_by_mean, item_at_equal_size
-from verify.ranking import Comparison, LeftOut, Profile, Standing
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, Comparison, LeftOut, Profile, SolveRecord, Standing, Status
 
 # Phases that a solver pays once, however often the cut grows: its mesh does not know the cut. A
 # conforming mesh is made anew, and so it is for a solver that is not known here.

@@ -12,8 +12,7 @@ from verify.compare.hooke import Law
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import Motion, SolutionMotion
 from verify.judge.quantities import Measured
-from verify.records import CutRecord, Regularisation
-from verify.result import CUT, SolveRecord
+from verify.result import CUT, CutRecord, Regularisation, SolveRecord
 from verify.solution import Solution
 
 MIXED = "mixed: some levels are judged without continuation across parts of the realised cut"

@@ -21,8 +21,18 @@ from verify.judge.standing import (
     item_at_equal_size,
     item_on_finest,
 )
-from verify.ranking import Comparison, LeftOut, Ranking, StabilityStanding, ranked_solvers
-from verify.result import REFERENCE, CaseResult, SolveRecord, Status, Verdict
+from verify.result import (
+    REFERENCE,
+    CaseResult,
+    Comparison,
+    LeftOut,
+    Ranking,
+    SolveRecord,
+    StabilityStanding,
+    Status,
+    Verdict,
+    ranked_solvers,
+)
 
 EQUAL_SIZE, FINEST = "equal size", "finest level"
 EXACT = "where a solver is exact"

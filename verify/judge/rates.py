@@ -10,8 +10,7 @@ from math import inf, log
 
 from verify.compare.body import AnyBody
 from verify.compare.realised import cut_deviation
-from verify.records import Regularisation
-from verify.result import Rate, SolveRecord
+from verify.result import Rate, Regularisation, SolveRecord
 from verify.scene import Scene
 from verify.scene.parts import END_OF_SUPPORT
 from verify.solution import Solution

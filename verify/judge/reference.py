@@ -39,7 +39,7 @@ from verify.judge.richardson import (
 )
 from verify.judge.stress_intensity import exact_intensity
 from verify.judge.sufficiency import time_to_accuracy
-from verify.records import ReferenceRecord
+from verify.result import ReferenceRecord
 from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,

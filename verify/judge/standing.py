@@ -7,8 +7,7 @@ from math import isfinite
 
 from verify.judge.intervals import ERROR_METRICS, Interval, NotMeasuredError, error_interval
 from verify.judge.rates import ROUND_OFF
-from verify.ranking import Comparison, LeftOut, Standing
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, Comparison, LeftOut, SolveRecord, Standing, Status
 
 _SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a size exactly
 

@@ -3,11 +3,19 @@
 from dataclasses import dataclass, field, replace
 
 from verify.printable import words_of
-from verify.report.blocks import Drawing, Figure, Table
+from verify.report.bodies import colour_bar
 from verify.report.curves import Curve, error_curves, limits, metric_names
-from verify.report.drawn_bodies import colour_bar
 from verify.report.error_plots import error_panel, error_range
-from verify.report.notation import ROUND_OFF, error_title, number, number_text, solver_title
+from verify.report.notation import (
+    ROUND_OFF,
+    Drawing,
+    Figure,
+    Table,
+    error_title,
+    number,
+    number_text,
+    solver_title,
+)
 from verify.report.pictures import CasePictures, Picture
 from verify.report.plots import Palette
 from verify.report.problem import problem_facts, sketch

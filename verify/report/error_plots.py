@@ -11,9 +11,8 @@ from verify.report.answers import (
     moving,
     sliver_curves,
 )
-from verify.report.blocks import Drawing
 from verify.report.curves import Curve, Point, floor, limits
-from verify.report.notation import ROUND_OFF, number_text, solver_title
+from verify.report.notation import ROUND_OFF, Drawing, number_text, solver_title
 from verify.report.plots import (
     Palette,
     Style,

@@ -1,21 +1,235 @@
-"""The report of a run as view data: cases, families of scenes, and the rankings with profiles.
+"""The report of a run as view data: first screen, cases, families of scenes, rankings.
 
-The page and its Markdown are made of it by templates.
+The first screen says what was asked, and what came out of every case and solver. The page and
+its Markdown are made of it by templates.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from verify.printable import words_of
-from verify.report.blocks import Cell, Drawing, Figure, Table
+from verify.report.answers import answers
 from verify.report.case_view import CaseView
 from verify.report.curves import Point, error_curves, metric_names
-from verify.report.notation import error_title, metric_title, solver_title, with_interval
-from verify.report.overview import origin_facts, overview
+from verify.report.error_plots import answer_panels, key
+from verify.report.notation import (
+    Cell,
+    Drawing,
+    Figure,
+    Table,
+    bytes_text,
+    error_title,
+    metric_title,
+    number,
+    solver_title,
+    with_interval,
+)
 from verify.report.plots import Palette, Series, drawing, legend, log_axis, log_range, loglog, panel
-from verify.report.run_directory import Run
-from verify.result import CaseResult
+from verify.report.run_directory import CaseEntry, Run
+from verify.report.tables import MANY, check_text
+from verify.result import CaseResult, Status, Verdict, VerdictRecord
+
+_NAMED = 6  # entries of a list in the paragraph
+_PLACES = 2  # of what one solver fails
+
+
+@dataclass(frozen=True)
+class AnswerView:
+    """One of the four questions, its answer in a sentence, its panel, and the case drawn there."""
+
+    question: str
+    sentence: str
+    panel: Drawing | None
+    case: CaseView | None
+
+
+@dataclass
+class Overview:
+    """Counts, lists in words, the answers to the four questions, and the matrix of verdicts."""
+
+    counts: dict[str, int]
+    cases: int
+    checks: int
+    solvers: int
+    solves: int
+    findings: list[tuple[str, str]] = field(default_factory=list)
+    unchecked: str = ""
+    ended: str = ""
+    notes: list[str] = field(default_factory=list)
+    matrix: Table | None = None
+    names: list[str] = field(default_factory=list)
+    answers: list[AnswerView] = field(default_factory=list)
+    key: Drawing | None = None
+
+
+def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> Overview:
+    """Return the first screen of `run`."""
+    judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
+    solves = [s for r in run.results for s in r.solves]
+    solves += [s for e in run.entries for s in e.unjudged]
+    counts = Counter(str(v.verdict) for _, v in judged)
+    view = Overview(
+        {str(verdict): counts[str(verdict)] for verdict in Verdict}, len(run.entries), len(judged),
+        len({v.solver for _, v in judged if v.solver}), len(solves),
+    )  # fmt: skip
+    view.findings = _findings(run, judged)
+    without = [e.name for e in run.entries if e.result and not e.result.verdicts]
+    view.unchecked = _listed(without)
+    ended = Counter(str(s.status) for s in solves if s.status is not Status.SOLVED)
+    view.ended = ", ".join(f"{count} {name}" for name, count in sorted(ended.items()))
+    view.notes = [f"{defect}." for defect in run.defects]
+    if (run.record.get("provenance") or {}).get("dirty"):
+        view.notes.append(
+            "the code differed from its commit when this ran: it cannot be reproduced from it."
+        )
+    asked = [s.solver for s in solves if s.solver != "reference"]
+    asked += [v.solver or "nobody" for _, v in judged]
+    view.names = [solver_title(name) for name in dict.fromkeys(asked)]
+    view.matrix = _matrix(run, cases, view.names)
+    try:
+        view.answers = _answers(run, cases, palette)
+        shown = [name for name in view.names if name not in ("nobody", "reference")]
+        view.key = key(shown, palette) if shown else None
+    except Exception as error:
+        view.notes.append(f"the four answers cannot be shown: {words_of(error)}.")
+    return view
+
+
+def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return name and value of where the numbers of a run come from."""
+    origin = record.get("provenance")
+    origin = dict(origin) if isinstance(origin, dict) else {}
+    versions = origin.pop("versions", None)
+    commit, dirty = origin.pop("commit", None), origin.pop("dirty", None)
+    state = {True: ", with changes that are not committed", False: ", unchanged"}.get(dirty, "")
+    said = [("command", str(record.get("command") or "unknown"))]
+    if "seconds" in record:  # a study
+        said.append(("took", f"{number(record['seconds'], 3)} s"))
+    else:
+        said.append(("started", str(record.get("started") or "unknown")))
+        said.append(("finished", str(record.get("finished") or "not finished")))
+    said.append(("commit", f"{commit}{state}" if commit else "unknown"))
+    said += [("run again", str(rows)) for rows in record.get("run_again", [])]
+    if isinstance(memory := origin.pop("memory", None), int | float):
+        said.append(("memory", bytes_text(memory)))
+    said += [(key, str(value)) for key, value in origin.items()]
+    if isinstance(versions, dict):
+        said.append(("versions", ", ".join(f"{name} {v}" for name, v in versions.items())))
+    if isinstance(options := record.get("options"), dict):
+        written = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
+        said.append(("options", written))
+    return said
+
+
+def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[tuple[str, str]]:
+    """Return what is not a plain pass, in lists of at most six entries, failures first."""
+    failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
+    errors = _unjudged(judged)
+    errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
+    warned: dict[str, list[str]] = {}
+    for entry in run.entries:
+        for w in entry.result.warnings if entry.result else []:
+            whose = solver_title(w.solver) if w.solver else "every solver"
+            warned.setdefault(f"{w.about} in {entry.name}", []).append(whose)
+    lists = {
+        "Failed": _by_solver([(e, v) for e, v in failed if not v.known], judged),
+        "Failed, known findings": _by_solver([(e, v) for e, v in failed if v.known], judged),
+        "Undecided": [
+            f"{e.name} ({check_text(v)}): {_clause(v.reason)}"
+            for e, v in judged
+            if v.verdict is Verdict.UNDECIDED
+        ],
+        "Not judged": errors,
+        # the text of each stands on top of its case
+        "Warned of": [f"{about} ({', '.join(whose)})" for about, whose in warned.items()],
+    }
+    return [(title, _listed(entries)) for title, entries in lists.items() if entries]
+
+
+def _unjudged(judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[str]:
+    """Say of each solver how many checks could not be judged, and why the first could not."""
+    whose: dict[str, list[str]] = {}
+    for entry, record in judged:
+        if record.verdict is Verdict.ERROR:
+            said = whose.setdefault(record.solver or "nobody", [])
+            said.append(f"{entry.name}: {_clause(record.reason)}")
+    return [
+        f"{solver_title(name)}, {len(said)} check{'s' * (len(said) > 1)}, first {said[0]}"
+        for name, said in whose.items()
+    ]
+
+
+def _by_solver(
+    failed: list[tuple[CaseEntry, VerdictRecord]], judged: list[tuple[CaseEntry, VerdictRecord]]
+) -> list[str]:
+    """Say of each solver what it fails, the one that fails most first."""
+    said = []
+    for solver, count in Counter(v.solver for _, v in failed).most_common():
+        made = sum(v.solver == solver for _, v in judged)
+        where: dict[str, list[str]] = {}
+        for entry, record in failed:
+            if record.solver == solver:
+                where.setdefault(entry.name, []).append(check_text(record, named=False))
+        found = [f"{name} ({', '.join(whats)})" for name, whats in where.items()]
+        places = "; ".join(found[:_PLACES])
+        places += f"; and {len(found) - _PLACES} more cases" if len(found) > _PLACES else ""
+        checks = "1 check" if made == 1 else f"{made} checks"
+        said.append(f"{solver_title(solver)}, {count} of its {checks}: {places}")
+    return said
+
+
+def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
+    """Return the verdict of each solver in each case, with its failed share."""
+    rows = []
+    for entry, case in zip(run.entries, cases, strict=True):
+        marks = [Cell(case.title, case.name, link=case.anchor), Cell("", verdict=str(case.verdict))]
+        n = len(case.warnings)
+        said = [f"⚠ {n} warning{'s' * (n > 1)}"] if n else []
+        marks[1] = Cell("", "; ".join(said), verdict=str(case.verdict))
+        marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
+        rows.append(marks)
+    kind = "matrix many" if len(names) > MANY else "matrix"
+    return Table("Verdicts", ["case", "whole", *names], rows, kind, True)
+
+
+def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
+    own = [v for v in entry.result.verdicts if solver_title(v.solver or "nobody") == name] \
+        if entry.result else []  # fmt: skip
+    if verdict:
+        bad = [v for v in own if str(v.verdict) == verdict]
+        known = verdict == "FAIL" and all(v.known for v in bad)
+        share = f"{len(bad)} of {len(own)}" if verdict != "PASS" and len(own) > 1 else ""
+        said = "known finding" if known else share
+        unsure = max((v.reference_share or 0.0, v.badge) for v in own)[1]
+        return Cell("", "; ".join(filter(None, (said, unsure))), verdict=verdict)
+    solves = entry.result.solves if entry.result else entry.unjudged
+    ends = Counter(str(s.status) for s in solves if solver_title(s.solver) == name)
+    words = ["compared, not judged" if name == str(Status.SOLVED) else name for name in ends]
+    return Cell(", ".join(words) if words else "–")
+
+
+def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[AnswerView]:
+    """Return the four answers with their panels; what cannot be drawn is said by its sentence."""
+    found = answers(run.results)
+    panels = answer_panels(run.results, found, palette)
+    by_name = {case.name: case for case in cases}
+    return [
+        AnswerView(one.question, one.sentence, panel, by_name.get(one.example))
+        for one, panel in zip(found, panels, strict=True)
+    ]
+
+
+def _listed(parts: list[str]) -> str:
+    rest = len(parts) - _NAMED
+    shown = "; ".join(parts[:_NAMED])
+    return shown if rest <= 0 else f"{shown}; and {rest} more in the table"
+
+
+def _clause(sentence: str) -> str:
+    return sentence.rstrip(". ") or "no reason given"
+
 
 _QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 

@@ -19,10 +19,10 @@ from verify.report.bodies import (
     common_view,
     deformed_bodies,
     error_body,
+    packed,
     read_stored,
     zoomed,
 )
-from verify.report.drawn_bodies import packed
 from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.problem import cut_lines
 from verify.report.run_directory import CaseEntry

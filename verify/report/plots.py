@@ -15,8 +15,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from verify.report.blocks import Drawing
-from verify.report.notation import RAISED, printable
+from verify.report.notation import RAISED, Drawing, printable
 
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from verify.errors import InputError
 from verify.geometry.simplices import rim_edges
-from verify.report.blocks import Drawing
+from verify.report.notation import Drawing
 from verify.report.plots import drawing
 from verify.scene.tool_path import Cut
 

@@ -6,8 +6,16 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from verify.report.blocks import Cell, Drawing, Figure, Table
-from verify.report.notation import error_text, metric_title, number, solver_title
+from verify.report.notation import (
+    Cell,
+    Drawing,
+    Figure,
+    Table,
+    error_text,
+    metric_title,
+    number,
+    solver_title,
+)
 from verify.report.plots import Palette, profile_panel
 from verify.result import (
     REFERENCE,

@@ -11,13 +11,21 @@ from xml.etree import ElementTree
 from pydantic import TypeAdapter
 
 from verify.errors import InputError
-from verify.json_files import read_json
+from verify.files import read_json
 from verify.printable import csv_text, words_of
-from verify.ranking import Ranking
 from verify.report.curves import duration
 from verify.report.notation import printable
-from verify.result import CaseResult, SolveRecord, Verdict, VerdictRecord, finest_of
-from verify.result_files import checked, folder_of_case, read_result
+from verify.result import (
+    CaseResult,
+    Ranking,
+    SolveRecord,
+    Verdict,
+    VerdictRecord,
+    checked,
+    finest_of,
+    folder_of_case,
+    read_result,
+)
 
 _RANKING = TypeAdapter(Ranking)
 

@@ -6,14 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json
+from verify.files import read_json, write_whole
 from verify.printable import shown
-from verify.report.blocks import Cell, Drawing, Table
-from verify.report.forms import as_html, as_markdown, print_page
-from verify.report.notation import NORMS, error_title, is_error, metric_title, number, solver_title
-from verify.report.overview import origin_facts
+from verify.report.notation import (
+    NORMS,
+    Cell,
+    Drawing,
+    Table,
+    error_title,
+    is_error,
+    metric_title,
+    number,
+    solver_title,
+)
+from verify.report.page import origin_facts
 from verify.report.plots import Bar, Palette, Series, bars, loglog, profile_panel, scatter
-from verify.whole_files import write_whole
+from verify.report.rendering import as_html, as_markdown, print_page
 
 _STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
 _SCHEMA = 1

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from verify.records import ReferenceRecord, Regularisation
-from verify.report.blocks import Cell, Table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (
     NORMS,
     ROUND_OFF,
+    Cell,
+    Table,
     bytes_text,
     digits_beside,
     error_text,
@@ -30,6 +30,8 @@ from verify.result import (
     CaseResult,
     Metric,
     NoticeKind,
+    ReferenceRecord,
+    Regularisation,
     SolveRecord,
     Status,
     Verdict,

@@ -34,9 +34,8 @@ import numpy as np
 import psutil
 
 from verify.printable import memory_text, one_line
-from verify.processes import FORKED, PARENT_VARIABLE, die_with_parent, start_server
+from verify.processes import FORKED, ONE_THREAD, PARENT_VARIABLE, die_with_parent, start_server
 from verify.result import Status
-from verify.threads import ONE_THREAD
 
 POLL_SECONDS = 0.02
 _SEARCH_SECONDS = 0.2  # between two looks at all processes of the machine for its children

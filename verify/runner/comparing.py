@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.judge.checks import unjudged_result
-from verify.result import COMPARISON_FAILED, CaseResult
-from verify.result_files import read_result
+from verify.result import COMPARISON_FAILED, CaseResult, read_result
 from verify.runner.child import Child, Ending, death
 from verify.runner.directory import JUDGING, RunDirectory, load_record
 from verify.scene import Scene

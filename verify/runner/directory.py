@@ -21,12 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
-from verify.result import SolveRecord, Status
-from verify.result_files import checked, folder_of_case
+from verify.files import asked_place, read_json, write_json
+from verify.result import SolveRecord, Status, checked, folder_of_case
 from verify.runner.fingerprint import file_digest
 from verify.solvers.interface import MOST_LEVELS
-from verify.whole_files import asked_place
 
 RUN_SCHEMA = 1
 # files by which a process says what is needed if it dies: the solve that a comparison is at, and

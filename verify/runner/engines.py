@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json, write_whole
 from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.fingerprint import code_of_solver
 from verify.scene import MeshFile, mesh_path, restore_scene
 from verify.solvers.interface import is_built_in
-from verify.whole_files import write_whole
 
 _CONNECT_SECONDS, _LOOK_SECONDS = 15.0, 1.0
 

@@ -22,11 +22,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from verify.json_files import read_json
+from verify.files import read_json, write_whole
 from verify.provenance import DISTRIBUTIONS, versions
 from verify.scene import MeshFile, Scene, mesh_path
 from verify.solvers.interface import module_of, program_of
-from verify.whole_files import write_whole
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 _PACKAGES = ("verify", "reference")

@@ -18,7 +18,7 @@ import numpy as np
 from verify.compare.body import body_of
 from verify.compare.errors import truth_of, write_error_field
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json, write_whole
 from verify.judge.accuracy import assess_accuracy, not_compared
 from verify.judge.adequacy import adequacy_notice
 from verify.judge.closing import with_openings
@@ -33,8 +33,8 @@ from verify.result import (
     SolveRecord,
     Status,
     error_picture,
+    write_result,
 )
-from verify.result_files import write_result
 from verify.runner.directory import (
     JUDGING,
     MEASURED,
@@ -48,7 +48,6 @@ from verify.runner.mesh_faults import mesh_notices
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
-from verify.whole_files import write_whole
 
 _WILD = 1e3  # sizes of its body: a solution that moves farther has no openings to look at
 

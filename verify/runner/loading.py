@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json
 from verify.processes import die_with_parent
 from verify.runner.child import Child, Ending, telling_line, watch_all
 from verify.runner.fingerprint import digest_of, file_digest

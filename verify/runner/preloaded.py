@@ -23,7 +23,7 @@ from verify.first_use import STAGES
 from verify.processes import PARENT_VARIABLE, die_with_parent
 
 _NEEDED = (
-    "numpy.random", "verify.calibration", "verify.solvers.xfem", "verify.solvers.methods_adapter",
+    "numpy.random", "verify.provenance", "verify.solvers.xfem", "verify.solvers.methods_adapter",
     "verify.runner.solve", "meshio", "reference.exact", "verify.runner.judging",
 )  # fmt: skip
 _IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")

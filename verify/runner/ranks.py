@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from verify.errors import InputError
-from verify.json_files import write_json
+from verify.files import write_json
 from verify.processes import die_with_parent, under_a_launcher
 
 RANKS_VARIABLE = "VERIFY_RANKS"

@@ -37,11 +37,10 @@ from time import time
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import parse_json, read_json, write_json
+from verify.files import asked_place, parse_json, read_json, whole_file, write_json, write_whole
 from verify.printable import one_line, shown, words_of
 from verify.provenance import provenance
-from verify.result import SolveRecord, Status
-from verify.result_files import checked
+from verify.result import SolveRecord, Status, checked
 from verify.runner.directory import Job, is_file_name, solution_files
 from verify.runner.fingerprint import (
     bytes_digest,
@@ -51,7 +50,6 @@ from verify.runner.fingerprint import (
     physics_digest,
 )
 from verify.scene import Scene
-from verify.whole_files import asked_place, whole_file, write_whole
 
 REFERENCE = "reference"
 BESIDE = "references"  # folder beside a case in which its own bundle lies

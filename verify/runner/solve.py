@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line, words_of
 from verify.processes import die_with_parent, peak_memory
 from verify.result import COMPILING, CRITICAL_STEP, Status
 from verify.runner.directory import LEVELS, emptied
 from verify.runner.ranks import give_up, world
-from verify.whole_files import write_whole
 
 _WORTH_SAYING = 0.5  # seconds of compilation
 _LONGEST = 400  # characters of a reason
@@ -91,7 +90,7 @@ def _leave_traceback() -> None:
 
 
 def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict[str, Any]:
-    from verify.calibration import compile_times
+    from verify.provenance import compile_times
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
@@ -135,7 +134,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
 
 def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
     """Note what is measured after a solve: the speed of the machine, and the critical step."""
-    from verify.calibration import calibration_note
+    from verify.provenance import calibration_note
 
     return {
         "calibration": calibration_note(),

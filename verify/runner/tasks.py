@@ -18,17 +18,16 @@ from shutil import rmtree
 from typing import Any, get_type_hints
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json, write_whole
 from verify.printable import words_of
 from verify.processes import die_with_parent, start_server
-from verify.result_files import checked
+from verify.result import checked
 from verify.runner.child import Child, Ending, death, watch_all
 from verify.runner.directory import emptied, folder_name
 from verify.runner.fingerprint import code_digest, code_of_solver, digest_of
 from verify.runner.loading import source_of
 from verify.solvers import find_solver
 from verify.solvers.interface import is_built_in, solver_in
-from verify.whole_files import write_whole
 
 _FOUND, _WHY = "found.json", "why.json"
 _LONGEST_NAME = 80

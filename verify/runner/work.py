@@ -9,10 +9,9 @@ from time import sleep
 from typing import Any, Protocol
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
+from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line
-from verify.result import LOG, CaseResult, SolveRecord, Status
-from verify.result_files import write_result
+from verify.result import LOG, CaseResult, SolveRecord, Status, write_result
 from verify.runner.child import POLL_SECONDS, Ending, death
 from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
 from verify.runner.directory import (
@@ -32,7 +31,6 @@ from verify.runner.plan import CasePlan, begun_after, further_level, levels_in_v
 from verify.runner.references import REFERENCE, ReferenceBundle, ReferenceCache
 from verify.runner.selection import Options
 from verify.scene import RatioCheck, Scene, scene_content
-from verify.whole_files import write_whole
 
 
 class Families:

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from verify.errors import InputError
+from verify.files import deeper_than, read_bounded
 from verify.geometry.simplices import refine_uniformly
-from verify.json_files import deeper_than
 from verify.printable import one_line, shown, words_of
 from verify.scene.acceptance import RatioCheck
 from verify.scene.geometry import MeshFile
@@ -31,7 +31,6 @@ from verify.scene.regions import RESERVED_NAMES, parse_expression, parse_region
 from verify.scene.scene import Scene
 from verify.scene.strict import first_fault, nearest
 from verify.scene.tables import Row
-from verify.whole_files import read_bounded
 
 _LARGEST = 2**23  # bytes; the longest case that comes with the project has 6 kB
 _DEEPEST, _PARTS = 20, 20

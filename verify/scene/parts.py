@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.simplices import feet, nearest_parts
-from verify.records import Regularisation
+from verify.result import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.regions import Side, comparisons, is_affine, parse_region
 from verify.scene.tables import SceneTables

@@ -20,10 +20,10 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
+from verify.files import whole_file, write_whole
 from verify.simulator.session import Session
 from verify.simulator.stage import Stage
 from verify.simulator.surfaces import Picture
-from verify.whole_files import whole_file, write_whole
 from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.cuts import ToolPath
 

@@ -17,9 +17,9 @@ from time import perf_counter, thread_time
 import numpy as np
 from scipy.sparse import csr_array
 
-from verify.calibration import kernel_seconds
 from verify.methods import cut_by
 from verify.methods.cut_body import CutBody
+from verify.provenance import kernel_seconds
 from verify.scene import Scene, Skin, load_scene
 from verify.simulator import PHASES, Session, Stage, quality_of, stage_of
 from verify.simulator.semi_progressive import Crossings, SemiProgressiveCutter

@@ -6,11 +6,10 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import write_json
+from verify.files import write_json, write_whole
 from verify.printable import csv_text
 from verify.provenance import provenance
 from verify.result import Verdict
-from verify.whole_files import write_whole
 
 
 @dataclass(frozen=True)

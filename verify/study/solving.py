@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import plain
+from verify.files import plain
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases
 from verify.runner.directory import RunDirectory
