@@ -107,6 +107,11 @@ def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():
     said = answers([*cases, bladed])[1].sentence
     assert "(wild). Left out: 1 case in which a blade takes energy." in said.replace(",", "")
     assert "a blade takes energy" in answers([bladed])[1].sentence
+    # nor what a sum over few outputs misses of damping
+    damped = moving("damped", 0.3)
+    damped.solves[0].account["damping"] = [0.0, 0.2, 0.3]
+    said = answers([*cases, damped])[1].sentence
+    assert "(wild). Left out: 1 case in which damping takes energy." in said
 
 
 def test_slivers_are_held_against_the_largest_epsilon_and_rows_without_slivers_are_left_out():

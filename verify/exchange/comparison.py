@@ -141,12 +141,9 @@ def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scen
 
 
 def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
-    known = [
-        known
-        for known in scene.known_findings
-        if known.check == "excess" or any(map(known.concerns, checks))
-    ]
-    changed = scene.model_copy(update={"acceptance": checks, "known_findings": known})
+    changed = scene.model_copy(update={"acceptance": checks})
+    known = [one for one in scene.known_findings if any(map(one.concerns, changed.checks))]
+    changed = changed.model_copy(update={"known_findings": known})
     changed._name, changed._file, changed._row = scene.name, scene.file, scene.row
     return changed
 

@@ -20,6 +20,7 @@ from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, finest
 BASELINE = "conforming"
 _REFERENCE = "reference"
 _ERROR = "displacement_l2"
+_TAKERS = ("a blade", "damping")  # what is to take energy
 _NAMED = 3  # solvers in a sentence
 _BEYOND = 0.1  # probability that a median lies outside its interval
 _PARAMETER = "epsilon"  # of a family of slivers, in elements
@@ -79,7 +80,9 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
 def energy(results: Sequence[CaseResult]) -> Answer:
     """Answer how far the total energy drifts where nothing is to take any.
 
-    A blade takes energy, as the solver says; verdicts on `released_to_cut` judge that.
+    A blade takes energy, as the solver says; verdicts on `released_to_cut` judge that. What damping
+    takes is known from the outputs alone, as a sum over the spans between them: what the sum misses
+    is as large as a drift, and no scheme's.
     """
     worst: dict[str, tuple[float, float, str]] = {}
     cases = set()
@@ -91,9 +94,13 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         known = worst.get(solve.solver)
         if known is None or drift.value > known[0]:
             worst[solve.solver] = drift.value, drift.value + drift.uncertainty, result.case
-    cut = {result.case for result, _ in moving(results, cut=True)}
-    cases_cut = f"{len(cut)} case{'s' * (len(cut) != 1)}"
-    left = f" Left out: {cases_cut} in which a blade takes energy." if cut else ""
+    others = {what: {result.case for result, _ in moving(results, what)} for what in _TAKERS}
+    said = [
+        f"{len(c)} case{'s' * (len(c) != 1)} in which {w} takes energy"
+        for w, c in others.items()
+        if c
+    ]
+    left = f" Left out: {', '.join(said)}." if said else ""
     if not worst:
         return Answer("Energy", f"No energy was followed: a case in motion would tell.{left}")
     order = sorted(worst, key=lambda name: (name == BASELINE, worst[name][0]))
@@ -182,18 +189,24 @@ def compared_curves(result: CaseResult) -> list[Curve]:
 
 
 def moving(
-    results: Sequence[CaseResult], cut: bool = False
+    results: Sequence[CaseResult], taker: str | None = None
 ) -> Iterator[tuple[CaseResult, SolveRecord]]:
     """Yield the solves, on the finest level of each solver, whose total energy is known.
 
-    Those in which a blade takes energy, or the others.
+    Those in which one of `_TAKERS` takes energy, or those in which nothing is to take any.
     """
     for result in results:
         solved = (s for s in result.solves if s.status is Status.SOLVED)
         for solve in finest_of(solved).values():
             followed = solve.solver != _REFERENCE and len(solve.account.get("total", [])) > 1
-            if followed and (solve.metric("released_to_cut") is not None) == cut:
+            if followed and _taker(solve) == taker:
                 yield result, solve
+
+
+def _taker(solve: SolveRecord) -> str | None:
+    if solve.metric("released_to_cut") is not None:
+        return "a blade"
+    return "damping" if any(solve.account.get("damping", ())) else None
 
 
 def energy_curve(solve: SolveRecord) -> list[tuple[float, float]]:

@@ -328,6 +328,16 @@ class ValueCheck(_Check):
     source: Line = Field(description="where the value comes from")
 
 
+class BladeCheck(_Check):
+    """What forces at a released cut take, against what a blade on its way releases.
+
+    No case asks for it: it is made of every solver, wherever a blade is on its way.
+    """
+
+    check: Literal["excess"] = "excess"
+    metric: str = "released_to_cut"
+
+
 Acceptance = Annotated[
     RateCheck | BoundCheck | RatioCheck | ValueCheck, Field(discriminator="check")
 ]
@@ -341,7 +351,9 @@ class KnownFinding(Strict):
     metric: str
     reason: Line = Field(description="why it fails, in one sentence")
 
-    def concerns(self, check: "RateCheck | BoundCheck | RatioCheck | ValueCheck") -> bool:
+    def concerns(
+        self, check: RateCheck | BoundCheck | RatioCheck | ValueCheck | BladeCheck
+    ) -> bool:
         """Whether `check` is the one that fails and is made of the solver."""
         same = (check.check, check.metric) == (self.check, self.metric)
         return same and check.solver in (None, self.solver) and check.compared != self.solver

@@ -215,13 +215,9 @@ def _unknown_metric(scene: SceneTables, name: str) -> tuple[str, str] | None:
 
 def _not_made(scene: SceneTables, finding: Any) -> tuple[str, ...] | None:
     """Break the rule where no check of the case is the one that is known to fail."""
-    made = dict.fromkeys(f"{check.check} of {check.metric}" for check in scene.acceptance)
-    if not _is_static(scene) and any(cut.on_the_way for cut in scene.cuts):
-        made |= {"excess of released_to_cut": None}
-        if (finding.check, finding.metric) == ("excess", "released_to_cut"):
-            return None
-    if any(map(finding.concerns, scene.acceptance)):
+    if any(map(finding.concerns, scene.checks)):
         return None
+    made = dict.fromkeys(f"{check.check} of {check.metric}" for check in scene.checks)
     return finding.check, finding.metric, finding.solver, ", ".join(made) or "none"
 
 

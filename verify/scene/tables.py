@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
 from verify.errors import InputError
-from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
+from verify.scene.acceptance import (
+    Acceptance,
+    BladeCheck,
+    KnownFinding,
+    Quantity,
+    StrainEnergyQuantity,
+)
 from verify.scene.geometry import Geometry, MeshFile, MeshLevels, ReferenceLevels, Skin
 from verify.scene.physics import Analysis, Exact, Load, Material, Support, field_values
 from verify.scene.strict import (
@@ -288,6 +294,12 @@ class SceneTables(Strict):
     def file(self) -> Path | None:
         """The case file, if it came from one."""
         return self._file
+
+    @property
+    def checks(self) -> list[Acceptance | BladeCheck]:
+        """Checks that are made of the case: those that it asks for, and one of every blade."""
+        bladed = any(cut.on_the_way for cut in self.cuts) and self.analysis.kind != "static"
+        return [*self.acceptance, *([BladeCheck()] if bladed else [])]
 
     @property
     def first_refinement(self) -> int:
