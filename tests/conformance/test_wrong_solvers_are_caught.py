@@ -8,7 +8,7 @@ import pytest
 from verify.conformance import State, conform, exit_code_of, scenes, trials
 from verify.conformance.check import evaluate
 from verify.conformance.checks import energy_in_motion
-from verify.conformance.meeting_checks import crossed_interface, ending_cut, parted_checks
+from verify.conformance.meeting import end_check, interface_check, parted_checks
 from verify.conformance.trials import Outcome
 from verify.files import write_json
 from verify.result import Status
@@ -97,7 +97,7 @@ def test_a_fault_breaks_the_check_that_is_there_for_it(solver, check, said, monk
 
 def in_this_process(name, solver):
     """One check of a solver that neither crashes nor hangs."""
-    every = [*parted_checks(), crossed_interface(), ending_cut()]
+    every = [*parted_checks(), interface_check(), end_check()]
     (check,) = (check for check in every if check.name == name)
     (trial,) = check.trials
     solution = solver.solve(trial.scene, trial.level, 0)

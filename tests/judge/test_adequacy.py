@@ -8,10 +8,9 @@ import scenes
 from pydantic import ValidationError
 
 from verify.compare.hooke import law_of, strain_energy
-from verify.judge import adequacy
+from verify.judge import models
 from verify.judge.accuracy import assess_accuracy
-from verify.judge.adequacy import adequacy_notice, other_scene
-from verify.judge.changed_scenes import coarsest, on_one_level
+from verify.judge.models import adequacy_notice, coarsest, on_one_level, other_scene
 from verify.result import CaseResult, Metric, NoticeKind, ReferenceRecord, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
@@ -92,7 +91,7 @@ def test_the_share_is_as_uncertain_as_both_energies_make_it(monkeypatch) -> None
     """1.30 ± 0.01 against 1.00 ± 0.04: at most 1.31/0.96 − 1 = 36.5 %, where 30 % are said."""
     one = scene(adequacy={"kinematics": True})
     rich = SimpleNamespace(quantities={"strain_energy": (1.0, 0.04)})
-    monkeypatch.setattr(adequacy, "conforming_reference", lambda *_: rich)
+    monkeypatch.setattr(models, "conforming_reference", lambda *_: rich)
     poor = Metric("strain_energy", 1.3, "J/m", 1.3, 0.01, "conforming")
     solve = SolveRecord("scene", "xfem", 0, Status.SOLVED, metrics=[poor])
     result = CaseResult("scene", "", "", "", {}, ReferenceRecord(), [solve], [], [])

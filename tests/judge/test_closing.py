@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pressed_halves import normal, pressed
 
-from verify.judge.closing import with_openings
+from verify.judge.openings import with_openings
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver

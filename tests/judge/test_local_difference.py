@@ -10,9 +10,9 @@ from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
+from verify.judge.convergence import extrapolate, place_uncertainty
 from verify.judge.quantities import Measured, local_difference
 from verify.judge.reference import known_quantity
-from verify.judge.richardson import extrapolate, place_uncertainty
 from verify.solution import Solution
 
 SIZES = [0.4, 0.2, 0.1]

@@ -25,8 +25,7 @@ from verify.scene.physics import field_values
 from verify.solution import Solution
 from verify.solvers.interface import find_solver
 from verify.solvers.xfem import XfemSolver
-from verify.study.energy import account_findings
-from verify.study.measured_scenes import AT_MOST, Measurement
+from verify.study.measured_scenes import AT_MOST, Measurement, account_findings
 
 D = 0.003 / 0.46  # 1/s: takes 2 D ∫T dt, of a bar that has half of its energy in motion
 DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}

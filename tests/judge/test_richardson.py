@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from verify.compare.body import body_of
-from verify.judge.rates import error_fall, observed_rate
-from verify.judge.richardson import extrapolate, field_uncertainty, observed_order
-from verify.judge.sufficiency import time_to_accuracy
+from verify.judge.convergence import (
+    error_fall,
+    extrapolate,
+    field_uncertainty,
+    observed_order,
+    observed_rate,
+)
+from verify.judge.intervals import time_to_accuracy
 from verify.scene import Scene, load_scene
 from verify.solution import Solution
 

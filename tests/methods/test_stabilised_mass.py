@@ -6,13 +6,13 @@ from cut_bodies import DENSITY, cut_body, cut_membrane
 from scipy.linalg import eigh
 from test_junctions import fork
 
-from verify.judge.system_numbers import critical_step, lowest_frequency
 from verify.methods.mass_variants import (
     eigenvalue_stabilised_mass,
     generalised_eigenvalue_stabilised_mass,
 )
 from verify.scene import load_scene
 from verify.solvers import find_solver
+from verify.system import critical_step, lowest_frequency
 from verify.xfem.cuts import ImplicitCut, Polyline
 from verify.xfem.mass import consistent_mass, second_moments
 from verify.xfem.mesh import box_mesh, rectangle_mesh

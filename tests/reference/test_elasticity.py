@@ -7,7 +7,7 @@ from reference_scenes import areas, energy_of, exterior_facets, needs_fenicsx, p
 from reference.exact import exact_solution
 from reference.meshing import Grading, conforming_mesh, singular_points
 from verify.errors import InputError
-from verify.judge.richardson import extrapolate
+from verify.judge.convergence import extrapolate
 from verify.scene import load_scene
 from verify.solvers import find_solver
 

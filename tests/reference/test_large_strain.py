@@ -12,7 +12,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from reference import large_strain
 from reference.inside_out import singular_nodes
-from verify.judge.richardson import field_uncertainty
+from verify.judge.convergence import field_uncertainty
 from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx

@@ -11,7 +11,7 @@ from reference_scenes import needs_fenicsx
 
 from verify.exchange import export_case, problem_of
 from verify.foreign.records import PROGRAMS
-from verify.judge.rates import shifted_ends
+from verify.judge.convergence import shifted_ends
 from verify.methods import METHODS
 from verify.result import Regularisation, SolveRecord, Status
 from verify.solvers import find_solver

@@ -6,7 +6,7 @@ from reference_scenes import arc, areas, energy_of, needs_fenicsx, polyline, squ
 
 from reference.meshing import Grading, conforming_mesh, singular_points
 from verify.errors import InputError
-from verify.judge.richardson import extrapolate
+from verify.judge.convergence import extrapolate
 from verify.solvers import find_solver
 
 pytestmark = needs_fenicsx

@@ -10,15 +10,15 @@ from reference.exact.moving_cracks import sudden_intensity, sudden_slip
 from reference.exact.solution import Hooke, hooke
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
+from verify.judge.convergence import extrapolate
 from verify.judge.notices import ringing_factors
 from verify.judge.quantities import Measured
 from verify.judge.reference import known_quantity, size_of
-from verify.judge.richardson import extrapolate
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.conforming import _RADIUS_OF_JUMPS
-from verify.study.calibration.families import families
-from verify.study.calibration.study import trials
+from verify.study.calibration import trials
+from verify.study.calibration_families import families
 
 LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
 TIME = 0.9

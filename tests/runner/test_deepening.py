@@ -9,7 +9,7 @@ import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.judge.checks import unjudged_result
-from verify.judge.sufficiency import sufficiency
+from verify.judge.intervals import sufficiency
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.directory import Job
 from verify.runner.plan import CasePlan, further_level, levels_in_vain

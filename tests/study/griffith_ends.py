@@ -15,7 +15,7 @@ from verify.judge.quantities import Measured
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.budget.study import CutEnd, cut_ends
+from verify.study.budget import CutEnd, cut_ends
 
 
 def crack_scene(ends, angle, mesh):

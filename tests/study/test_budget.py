@@ -10,9 +10,9 @@ from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.budget.budget import Answer, error_budget
-from verify.study.budget.candidates import Candidate, cheapest_adequate
-from verify.study.budget.chain import mean_wait
+from verify.study.budget_chain import mean_wait
+from verify.study.budget_parts import Answer, error_budget
+from verify.study.candidates import Candidate, cheapest_adequate
 
 
 class Affine:

@@ -8,8 +8,8 @@ from reference.exact import exact_solution
 from verify.result import CaseResult, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.budget.study import budget_study
-from verify.study.solving import Solved
+from verify.study.budget import budget_study
+from verify.study.study import Solved
 
 
 def solve(scenes, place, solvers, parameters=None, timed=False):

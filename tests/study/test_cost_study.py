@@ -14,10 +14,10 @@ from verify.errors import RunStoppedError
 from verify.judge.cost import pareto_front, time_at, work_points
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status, Verdict
 from verify.scene import load_scene
-from verify.study import solving
-from verify.study.calibration.families import families, series_families
-from verify.study.calibration.motion_scenes import released, stretched
-from verify.study.calibration.study import Trial, binomial_tail, calibration_findings, trials
+from verify.study import study
+from verify.study.calibration import Trial, binomial_tail, calibration_findings, trials
+from verify.study.calibration_families import families, series_families
+from verify.study.calibration_scenes import released, stretched
 from verify.study.cost import cost_study, growing_scenes
 
 STRIP = "statics/tissue_strip"
@@ -260,7 +260,7 @@ def test_ctrl_c_ends_a_study_in_one_line(words, tmp_path, monkeypatch, capsys):
     def stopped(*_):
         raise RunStoppedError(signal.SIGINT)
 
-    monkeypatch.setattr(solving, "run_cases", stopped)
+    monkeypatch.setattr(study, "run_cases", stopped)
     assert main(["study", *words, "--out", str(tmp_path)]) == 130
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == "verify: error: interrupted by SIGINT; the same command resumes it"

@@ -9,7 +9,7 @@ from contextlib import redirect_stdout
 import pytest
 
 from verify.cli import main
-from verify.study.solving import Making
+from verify.study.study import Making
 
 # nodes of the field u = t (1 + 2^-iterations + 0.01 / substeps) x; solved: without the middle part
 SOLVER = """

@@ -20,14 +20,14 @@ from verify.simulator.thesis import (
     with_other_frames,
 )
 from verify.study.thesis import measured as measuring
-from verify.study.thesis.measured import (
+from verify.study.thesis_measured import (
     METHODS,
     Measured,
     MethodOnCase,
     exponent,
     sliver_systems,
 )
-from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
+from verify.study.thesis_verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 _HOLD = (
     "Table 4.3, its law",

@@ -5,10 +5,8 @@ value that owes nothing to the solver (exact, published, or of the reference wit
 uncertainty); only a hand that edits the file can move it.
 """
 
-from verify.baseline.checking import Row, check_run, exit_code_of
-from verify.baseline.difference import VerdictChange, verdict_changes
-from verify.baseline.finished_run import FinishedRun, read_run
-from verify.baseline.record import Baseline, read_baseline, write_baseline
+from verify.baseline.checking import Row, VerdictChange, check_run, exit_code_of, verdict_changes
+from verify.baseline.record import Baseline, FinishedRun, read_baseline, read_run, write_baseline
 from verify.baseline.updating import Move, save_run, update_from
 
 __all__ = [

@@ -1,12 +1,23 @@
-"""The baseline file: JSON, sorted, made to be committed and read in a review."""
+"""What is kept of a run: the file of a baseline, and a finished run as a baseline reads it.
 
+The file is JSON, sorted, made to be committed and read in a review.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Annotated, Literal
+from statistics import median
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
 from verify.errors import InputError
 from verify.files import read_json, write_json
+from verify.judge.intervals import ERROR_METRICS
+from verify.provenance import KERNEL, seconds_of_note
+from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of, read_result
+from verify.runner.fingerprint import digest_of
+from verify.scene import Scene
 from verify.scene.strict import Finite, NonNegative, Positive, Strict, first_fault
 
 
@@ -101,3 +112,194 @@ def write_baseline(baseline: Baseline, path: Path) -> None:
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     write_json({"schema": content["schema"], "cases": cases}, path)
+
+
+# errors below this are round-off; how large round-off is says nothing
+_ROUND_OFF = 1e-10
+
+
+@dataclass(frozen=True)
+class MeasuredSpeed:
+    """Ratio to the calibration kernel with its relative half-width; or why there is none."""
+
+    ratio: float = 0.0
+    spread: float = 0.0
+    reason: str = ""
+
+
+def finest(result: CaseResult) -> list[SolveRecord]:
+    """Return the finest level of each solver, solved or not."""
+    return list(finest_of(result.solves).values())
+
+
+def metric_of(result: CaseResult, name: str) -> tuple[Metric | None, str]:
+    """Find ``solver/level/metric`` in a result, or say why it is not there."""
+    place, _, metric_name = name.rpartition("/")
+    solver, _, level = place.rpartition("/")
+    for solve in result.solves:
+        if (solve.solver, str(solve.level)) == (solver, level):
+            metric = solve.metric(metric_name)
+            if metric is not None and isfinite(metric.value):
+                return metric, ""
+            if metric is not None:
+                return None, "it is not finite"
+            why = solve.reason or solve.notes.get(metric_name, "it was not measured")
+            return None, f"{solve.status}: {why}" if solve.status is not Status.SOLVED else why
+    return None, f"'{solver}' level {level} was not run"
+
+
+def quantities_of(result: CaseResult, origin: dict[str, Any]) -> dict[str, Quantity]:
+    """Return every metric of the finest solved levels, with both its axes."""
+    found = {}
+    for solve in finest(result):
+        if solve.status is not Status.SOLVED:
+            continue
+        for metric in solve.metrics:
+            if not isfinite(metric.value):
+                continue
+            absolute = _ROUND_OFF if metric.name in ERROR_METRICS else 0.0
+            found[f"{solve.solver}/{solve.level}/{metric.name}"] = Quantity(
+                unit=metric.unit,
+                own=Own(value=float(metric.value), absolute=absolute, **origin),
+                independent=_independent(result, solve.solver, metric, origin),
+            )
+    return found
+
+
+def _independent(
+    result: CaseResult, solver: str, metric: Metric, origin: dict[str, Any]
+) -> Independent | None:
+    """Take the independent value and tolerance that the case states, else the reference's value."""
+    checks = [
+        check
+        for check in result.scene.get("acceptance", [])
+        if check["solver"] in (None, solver) and check["metric"] == metric.name
+    ]
+    for check in checks:
+        if check["check"] == "value":
+            return Independent(
+                value=check["equals"],
+                tolerance=check["relative_tolerance"],
+                source=check["source"],
+                **origin,
+            )
+    bound = next((check["at_most"] for check in checks if check["check"] == "error"), None)
+    if metric.name in ERROR_METRICS:
+        return Independent(value=0.0, tolerance=bound, source=metric.source, **origin)
+    if metric.reference is None:
+        return None
+    return Independent(
+        value=metric.reference,
+        uncertainty=metric.uncertainty,
+        tolerance=bound,
+        source=metric.source,
+        **origin,
+    )
+
+
+def speed_of(solve: SolveRecord) -> MeasuredSpeed:
+    """Return the time of one solve, over all its phases, in units of the calibration kernel."""
+    kernel = seconds_of_note(solve.notes.get("calibration", ""))
+    if solve.status is not Status.SOLVED:
+        return MeasuredSpeed(reason=f"{solve.status}: {solve.reason}")
+    if kernel is None:
+        return MeasuredSpeed(reason="the calibration kernel was not timed beside it")
+    if not solve.timings or not all(solve.timings.values()):
+        return MeasuredSpeed(reason="the solver gives no timings")
+    if solve.notes.get("timing", "").startswith("contended"):
+        return MeasuredSpeed(reason=solve.notes["timing"])
+    count = max(len(seconds) for seconds in solve.timings.values())
+    if count < 3:
+        return MeasuredSpeed(reason=f"{count} repetitions; a spread needs 3")
+    # a phase timed once (meshing) is the same in all repetitions
+    totals = [
+        sum(s[i] if len(s) == count else median(s) for s in solve.timings.values())
+        for i in range(count)
+    ]
+    if not median(totals) > 0.0:
+        return MeasuredSpeed(reason="its times are zero")
+    spread = _half_width(totals) + _half_width(kernel)
+    return MeasuredSpeed(median(totals) / median(kernel), spread)
+
+
+def _half_width(seconds: list[float]) -> float:
+    """Half the range over the median; a range, because the few values are no normal sample."""
+    return 0.5 * (max(seconds) - min(seconds)) / median(seconds)
+
+
+def speed_entry(measured: MeasuredSpeed, cpu: str, origin: dict[str, Any]) -> Speed:
+    """Make the entry of a baseline."""
+    return Speed(ratio=measured.ratio, spread=measured.spread, kernel=KERNEL, cpu=cpu, **origin)
+
+
+_WORDS = {"title", "requirement", "tags", "acceptance", "known_findings", "contact"}
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """Results of a run by case, and where it comes from (commit, dirty, date, cpu)."""
+
+    directory: Path
+    results: dict[str, CaseResult]
+    provenance: dict[str, Any]
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """What a baseline keeps of the provenance: commit, dirty flag, date, meaning."""
+        kept = {key: self.provenance.get(key) for key in ("commit", "dirty", "date")}
+        return kept | {"meaning": self.meaning}
+
+    @property
+    def meaning(self) -> int:
+        """Revision of what its numbers mean; 1 before revisions were kept."""
+        found = self.provenance.get("meaning", 1)
+        return found if isinstance(found, int) else 1
+
+
+def read_run(directory: Path) -> FinishedRun:
+    """Read a run that `verify run` or `verify import` has finished.
+
+    Raises
+    ------
+    InputError
+        If there is none, it has not finished, or a result is missing or damaged.
+    """
+    if not (directory / "run.json").is_file():
+        raise InputError("not a run (it has no run.json)", str(directory))
+    record = read_json(directory / "run.json")
+    if not record.get("finished"):
+        raise InputError("the run has not finished; its own command resumes it", str(directory))
+    files = sorted((directory / "cases").glob("*/result.json"))
+    results = [read_result(file) for file in files]
+    by_case = {result.case: result for result in results}
+    for name in record.get("cases", []):
+        if name not in by_case:
+            raise InputError(f"no result of '{name}'; run it again", str(directory))
+    return FinishedRun(directory, by_case, record.get("provenance") or {})
+
+
+def physics_of(result: CaseResult) -> str:
+    """Digest of what was asked: the scene without its words and its acceptance.
+
+    Defaults are left out, so that a key that the schema gains later changes nothing. A mesh file
+    enters by the hash of the whole scene, which contains its bytes.
+
+    Raises
+    ------
+    InputError
+        If the scene in the result is not one of this version.
+    """
+    given = result.scene
+    if all(cut.get("kind") != "tool_path" for cut in given.get("cuts") or []):
+        analysis = {key: x for key, x in (given.get("analysis") or {}).items() if key != "opening"}
+        given = {**given, "analysis": analysis}  # its default was another one
+    try:
+        scene = Scene.model_validate(given)
+    except ValidationError:
+        raise InputError("its scene is not of this version; run it again", result.case) from None
+    content: list[Any] = [
+        scene.model_dump(mode="json", by_alias=True, exclude=_WORDS, exclude_defaults=True)
+    ]
+    if result.scene.get("geometry", {}).get("kind") == "file":
+        content.append(result.scene_hash)
+    return digest_of(content)

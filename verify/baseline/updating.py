@@ -7,8 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from verify.baseline.checking import independent_row
-from verify.baseline.finished_run import (
+from verify.baseline.record import (
+    Baseline,
+    CaseBaseline,
     FinishedRun,
+    Own,
+    Quantity,
+    Speed,
     finest,
     metric_of,
     physics_of,
@@ -16,7 +21,6 @@ from verify.baseline.finished_run import (
     speed_entry,
     speed_of,
 )
-from verify.baseline.record import Baseline, CaseBaseline, Own, Quantity, Speed
 from verify.errors import InputError
 from verify.result import CaseResult, Status, Verdict
 from verify.scene.strict import nearest

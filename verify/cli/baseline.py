@@ -160,7 +160,7 @@ def diff(
 ) -> int:
     """Show which verdicts differ between two runs."""
     from verify.baseline import read_run, verdict_changes
-    from verify.baseline.difference import any_worse, meaning_lines
+    from verify.baseline.checking import any_worse, meaning_lines
 
     old, new = read_run(run), read_run(other)
     changes = verdict_changes(old, new)

@@ -30,8 +30,7 @@ from verify.errors import InputError
 if TYPE_CHECKING:
     from verify.scene import Scene
     from verify.study.measured_scenes import MeasuredStudy
-    from verify.study.record import Study
-    from verify.study.solving import Making, Solved
+    from verify.study.study import Making, Solved, Study
 
 _SOLVER = "'NAME [PARAMETER=VALUE …]'"
 Quick = Annotated[bool, Arg("less of it, in under a minute")]
@@ -97,7 +96,7 @@ def energy(
     answer: Answer,
 ) -> int:
     """What any solver keeps of energy and momenta, over cases that move."""
-    from verify.study.energy import energy_study
+    from verify.study.measured_scenes import energy_study
 
     def study(making: "Making") -> "Study":
         return _over_scenes(energy_study, cases, None if cases else "energy", measured, making)
@@ -190,7 +189,7 @@ def budget(
     """Where the error of the XFEM answer comes from, and the cheapest adequate model."""
     from verify.result import folder_of_case
     from verify.scene import load_scene
-    from verify.study.budget.study import budget_study
+    from verify.study.budget import budget_study
 
     timed_repetitions = repetitions or (2 if quick else 5)
 
@@ -287,8 +286,7 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
     """Make a study, write its record and table, render its page, and say what it found."""
     from verify.cli.progress import progress_on
     from verify.report.study_page import render_study
-    from verify.study.record import make_directory, write_study
-    from verify.study.solving import Making
+    from verify.study.study import Making, make_directory, write_study
 
     def announce(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

@@ -29,8 +29,9 @@ from verify.compare.part_account import (
 from verify.compare.simplices import cells_of, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
+from verify.judge.convergence import observed_rate, shifted_ends
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
-from verify.judge.intervals import error_interval
+from verify.judge.intervals import error_interval, sufficiency
 from verify.judge.notices import (
     absurd_strain,
     doubtful_errors,
@@ -39,7 +40,6 @@ from verify.judge.notices import (
     unavailable_quantities,
 )
 from verify.judge.quantities import Measured, unit_of
-from verify.judge.rates import observed_rate, shifted_ends
 from verify.judge.reference import (
     OTHER,
     ExactField,
@@ -49,7 +49,6 @@ from verify.judge.reference import (
     exact_reference,
 )
 from verify.judge.resultants import resultants_over_time
-from verify.judge.sufficiency import sufficiency
 from verify.printable import one_line
 from verify.result import (
     COMPARISON_FAILED,

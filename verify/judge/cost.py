@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median
 
+from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import Interval, error_interval
-from verify.judge.rates import ROUND_OFF
 from verify.judge.standing import Item, compared_by_mean, item_at_equal_size
 from verify.result import CaseResult, Comparison, LeftOut, Profile, SolveRecord, Standing, Status
 

@@ -27,18 +27,21 @@ from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import cells_of
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.quantities import Measured, field_quantity, local_difference
-from verify.judge.rates import ROUND_OFF, counted_order, cut_on_the_way, error_fall
-from verify.judge.resultants import mean_stress, scale_of
-from verify.judge.richardson import (
+from verify.judge.convergence import (
+    ROUND_OFF,
     Extrapolation,
+    counted_order,
+    cut_on_the_way,
+    error_fall,
     extrapolate,
     field_uncertainty,
     observed_order,
     place_uncertainty,
 )
+from verify.judge.intervals import time_to_accuracy
+from verify.judge.quantities import Measured, field_quantity, local_difference
+from verify.judge.resultants import mean_stress, scale_of
 from verify.judge.stress_intensity import exact_intensity
-from verify.judge.sufficiency import time_to_accuracy
 from verify.result import ReferenceRecord
 from verify.scene import MeshFile, Scene
 from verify.scene.acceptance import (
@@ -311,7 +314,7 @@ def known_quantity(
     functional : float
         Order that the field lets a functional of it count on; 0 if it has none.
     falls : float
-        See `verify.judge.richardson.extrapolate`.
+        See `verify.judge.convergence.extrapolate`.
     """
     order = counted_order(measured[-1].scene, measured[-1].solution)
     nothing = _round_off(asked, measured[-1])

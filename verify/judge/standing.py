@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
+from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import ERROR_METRICS, Interval, NotMeasuredError, error_interval
-from verify.judge.rates import ROUND_OFF
 from verify.result import CaseResult, Comparison, LeftOut, SolveRecord, Standing, Status
 
 _SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a size exactly

@@ -10,13 +10,13 @@ from dataclasses import replace
 from math import inf, isfinite
 
 from verify.judge.checks import applied_checks, verdict_record
+from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import (
     Interval,
     NotMeasuredError,
     error_interval,
     reference_share,
 )
-from verify.judge.rates import ROUND_OFF
 from verify.result import (
     REFERENCE,
     CaseResult,

@@ -20,8 +20,8 @@ from verify.compare.errors import truth_of, write_error_field
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.judge.accuracy import assess_accuracy, not_compared
-from verify.judge.adequacy import adequacy_notice
-from verify.judge.closing import with_openings
+from verify.judge.models import adequacy_notice
+from verify.judge.openings import with_openings
 from verify.judge.verdict import with_verdicts
 from verify.printable import words_of
 from verify.processes import die_with_parent

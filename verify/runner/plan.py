@@ -229,7 +229,7 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
         By model.
     """
     # what only reads cases shall not wait for the comparison that this imports
-    from verify.judge.adequacy import other_scene
+    from verify.judge.models import other_scene
 
     jobs, scenes = [], {}
     for model in scene.adequacy.models:

@@ -150,8 +150,7 @@ def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) 
     if unknowns > _LARGE:
         return {CRITICAL_STEP: f"not computed for more than {_LARGE} unknowns"}
     # only now: a fresh process takes longer to import them than many a solve takes
-    from verify.judge.system_numbers import critical_step
-    from verify.system import checked_system
+    from verify.system import checked_system, critical_step
 
     try:
         own = checked_system(system(scene, job["level"], **job["parameters"]))

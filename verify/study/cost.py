@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.judge.changed_scenes import changed
 from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
+from verify.judge.models import changed
 from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.scene import PolylineCut, Scene
-from verify.study.record import Finding, Study
+from verify.study.study import Finding, Study
 
 REFERENCE = "reference"
 SAMPLE = 3  # repetitions from which on their range bounds a time

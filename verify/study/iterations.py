@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.judge.accuracy import assess_accuracy
-from verify.judge.changed_scenes import coarsest
+from verify.judge.models import coarsest
 from verify.result import SolveRecord, Status
 from verify.scene import Scene, scene_content
 from verify.solution import Solution
 from verify.solvers.interface import name_with
 from verify.study.measured_scenes import Variant
-from verify.study.record import Finding, Study
-from verify.study.solving import Making, Solved
+from verify.study.study import Finding, Making, Solved, Study
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,22 @@ from scipy.stats import linregress
 from scipy.stats import t as student
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.system_numbers import (
+from verify.printable import one_line, words_of
+from verify.result import Verdict
+from verify.scene import Box, Rectangle, Scene, restore_scene
+from verify.solvers import Solver
+from verify.study.measured_scenes import (
+    MeasuredStudy,
+    Measurement,
+    Variant,
+    account_findings,
+    measured_families,
+    measurements,
+    missing_solutions,
+)
+from verify.study.step_by_running import step_by_running
+from verify.study.study import Finding, Making
+from verify.system import (
     CONDITION,
     FREQUENCY,
     SCALED,
@@ -23,22 +38,6 @@ from verify.judge.system_numbers import (
     lowest_frequency,
     with_uncut_twin,
 )
-from verify.printable import one_line, words_of
-from verify.result import Verdict
-from verify.scene import Box, Rectangle, Scene, restore_scene
-from verify.solvers import Solver
-from verify.study.energy import account_findings
-from verify.study.measured_scenes import (
-    MeasuredStudy,
-    Measurement,
-    Variant,
-    measured_families,
-    measurements,
-    missing_solutions,
-)
-from verify.study.record import Finding
-from verify.study.solving import Making
-from verify.study.step_by_running import step_by_running
 
 _FITTED = (CONDITION, SCALED, STEP)
 Row = tuple[str, str, float | None, str]

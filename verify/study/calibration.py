@@ -27,9 +27,8 @@ from verify.runner.tasks import Task
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
-from verify.study.calibration.families import Family, Trial, families, series_families
-from verify.study.record import Finding, Study
-from verify.study.solving import Making
+from verify.study.calibration_families import Family, Trial, families, series_families
+from verify.study.study import Finding, Making, Study
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 _LEVELS = 3  # that a reference is made of

@@ -10,18 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from verify.judge.richardson import extrapolate
+from verify.judge.convergence import extrapolate
 from verify.scene import Scene
-from verify.study.calibration.motion_scenes import bar, blade_strip, sudden_crack
-from verify.study.calibration.still_scenes import (
+from verify.study.calibration_scenes import (
     airy,
     arc_through,
     ball_and_shell,
+    bar,
+    blade_strip,
     curved_crack,
     griffith,
     ring_and_disc,
     smooth,
     solid_smooth,
+    sudden_crack,
     tip,
 )
 

@@ -10,16 +10,15 @@ from verify.compare.error_norm import ErrorNorm, rules, spread_of
 from verify.compare.hooke import Law, hooke, law_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.changed_scenes import at_rest, with_kinematics
+from verify.judge.models import at_rest, with_kinematics
 from verify.judge.quantities import Measured
 from verify.judge.reference import Reference, size_of
 from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.study.budget.budget import Times, distances, norm_names
-from verify.study.budget.links import JUDGED, Chain, Solve
-from verify.study.record import Finding
-from verify.study.solving import Solved
+from verify.study.budget_chain import JUDGED, Chain, Solve
+from verify.study.budget_parts import Times, distances, norm_names
+from verify.study.study import Finding, Solved
 
 
 @dataclass(frozen=True)

@@ -21,17 +21,16 @@ from verify.compare.cut_deviation import polylines_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.geometry.simplices import feet
-from verify.judge.changed_scenes import coarsest
+from verify.judge.models import coarsest
 from verify.judge.quantities import unit_of
 from verify.judge.reference import ExactField
 from verify.result import Verdict
 from verify.scene import Scene
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.budget.budget import Budget, Part, Times, error_budget, norm_names
-from verify.study.budget.candidates import Candidate, cheapest_adequate, find_candidates
-from verify.study.budget.chain import make_chain
-from verify.study.budget.links import JUDGED, Chain, Missing, Solve
-from verify.study.record import Finding, Study
+from verify.study.budget_chain import JUDGED, Chain, Missing, Solve, make_chain
+from verify.study.budget_parts import Budget, Part, Times, error_budget, norm_names
+from verify.study.candidates import Candidate, cheapest_adequate, find_candidates
+from verify.study.study import Finding, Study
 
 Array = NDArray[np.float64]
 

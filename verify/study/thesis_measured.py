@@ -12,12 +12,12 @@ import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.cost import work_points
-from verify.judge.system_numbers import condition_numbers, critical_step, with_uncut_twin
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scenes, restore_scene
 from verify.simulator.thesis import Delay, FaceCount, Frames, RealTime, StepTime, StripCount
 from verify.solvers import find_solver
 from verify.study.measured_scenes import variant_of
+from verify.system import condition_numbers, critical_step, with_uncut_twin
 
 METHODS = (
     "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",

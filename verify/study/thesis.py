@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
-from verify.judge.changed_scenes import coarsest
+from verify.judge.models import coarsest
 from verify.runner.tasks import Task
 from verify.scene import load_scene, scene_content
 from verify.simulator.thesis import (
@@ -25,16 +25,15 @@ from verify.simulator.thesis import (
     step_times,
     with_other_frames,
 )
-from verify.study.record import Study
-from verify.study.solving import Making
-from verify.study.thesis.measured import (
+from verify.study.study import Making, Study
+from verify.study.thesis_measured import (
     METHODS,
     Measured,
     compare_methods,
     critical_steps,
     sliver_systems,
 )
-from verify.study.thesis.verdicts import verdicts_on_cost, verdicts_on_mechanics
+from verify.study.thesis_verdicts import verdicts_on_cost, verdicts_on_mechanics
 
 # exact without tips, exact with tips inside elements, and references in the plane and in space
 CASES = (

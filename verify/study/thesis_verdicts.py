@@ -13,8 +13,8 @@ from verify.simulator.thesis import (
     StepTime,
     StripCount,
 )
-from verify.study.record import Finding
-from verify.study.thesis.measured import Measured, MethodOnCase, SliverSystem, exponent
+from verify.study.study import Finding
+from verify.study.thesis_measured import Measured, MethodOnCase, SliverSystem, exponent
 
 _NEAR = 0.2  # of the thesis' increments: another face, other strokes, two nodes less for each end
 _BEATEN = 500.0
