@@ -7,8 +7,8 @@ import pytest
 
 from verify.conformance import State, conform, exit_code_of, scenes, trials
 from verify.conformance.check import evaluate
-from verify.conformance.checks import energy_in_motion
 from verify.conformance.meeting import end_check, interface_check, parted_checks
+from verify.conformance.suite import energy_in_motion
 from verify.conformance.trials import Outcome
 from verify.files import write_json
 from verify.result import Status

@@ -13,7 +13,7 @@ from verify.runner.fingerprint import ROOT, Sources, code_of_comparison, code_of
 SOLVING = "verify.runner.solve"
 ROOTS = [
     "verify.solvers.conforming", "verify.solvers.xfem", "verify.solvers.methods_adapter",
-    "verify.runner.judging", "verify.conformance.checks", "verify.report.rendering",
+    "verify.runner.judging", "verify.conformance.suite", "verify.report.rendering",
     "verify.xfem.statics",
 ]  # fmt: skip
 

@@ -19,7 +19,7 @@ from verify.simulator.thesis import (
     step_times,
     with_other_frames,
 )
-from verify.study.thesis import measured as measuring
+from verify.study import thesis_measured as measuring
 from verify.study.thesis_measured import (
     METHODS,
     Measured,

@@ -102,7 +102,7 @@ def _source_of_guest(solver: str) -> str:
 
 def code_of_suite() -> str:
     """Return the hash of all that the suite's findings depend on beside the solver."""
-    return code_digest("verify.conformance.checks", "verify.conformance.trials")
+    return code_digest("verify.conformance.suite", "verify.conformance.trials")
 
 
 def _stored(target: Path) -> dict[str, Any]:

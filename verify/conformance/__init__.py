@@ -1,6 +1,6 @@
 """Properties of every right solver, whatever its method; asked before any ranking."""
 
 from verify.conformance.check import CheckResult, State
-from verify.conformance.checks import conform, exit_code_of
+from verify.conformance.suite import conform, exit_code_of
 
 __all__ = ["CheckResult", "State", "conform", "exit_code_of"]
