@@ -19,7 +19,6 @@ from reference.linear_solvers import (
     Answer,
     factorised,
     mean_stiffness,
-    near_null_space,
     solve_by_multigrid,
     solve_directly,
     solve_saddle,
@@ -91,7 +90,7 @@ def solve_linear(
     exact : ExactSolution or None
         For supports and loads that are said to be exact.
     method : {"direct", "multigrid"}, optional
-        MUMPS, or CG with GAMG (with a pressure MINRES with GAMG for the displacements); default by
+        MUMPS, or CG with multigrid (with a pressure MINRES with GAMG); default by
         the number of unknowns.
     tolerance : float
         Of multigrid: the norm of the true residual over that of the loads.
@@ -139,9 +138,8 @@ def solve_linear(
         answer = solve_saddle(matrix, weight, space, unknowns, x, vector, tolerance)
         weight.destroy()
     else:
-        matrix.setNearNullSpace(near_null_space(matrix, space))
         flat = _unknowns_of_flat_cells(matrix, space)
-        answer = solve_by_multigrid(matrix, x, vector, tolerance, flat)
+        answer = solve_by_multigrid(matrix, space, x, vector, tolerance, flat)
     timings["solve"] = perf_counter() - start - sum(timings.values())
     law.update()
     stored, displacement = law.stored(), unknowns.everywhere(x.array)

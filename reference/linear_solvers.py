@@ -27,6 +27,18 @@ _GAMG = {
     "mg_coarse_pc_factor_mat_solver_type": "mumps",
 }
 _MULTIGRID = {"ksp_norm_type": "unpreconditioned", **_GAMG}
+# of quadratic elements: linear ones on the same mesh below them, which are solved for directly as
+# long as there are few
+_LINEAR_BELOW = {
+    "ksp_norm_type": "unpreconditioned",
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 1,
+    "mg_levels_pc_type": "sor",
+    "mg_levels_esteig_ksp_type": "cg",
+    "mg_coarse_ksp_type": "preonly",
+}
+_DIRECTLY = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+_MOST_CORNERS = 100_000  # unknowns of linear elements that are solved for directly
 # of a saddle point: multigrid for the displacements, and a mass for the pressures
 _BLOCKS = {
     "pc_type": "fieldsplit",
@@ -181,9 +193,17 @@ def solve_directly(
 
 
 def solve_by_multigrid(
-    matrix: Any, x: Any, vector: Any, tolerance: float, flat: NDArray[np.int32] | None = None
+    matrix: Any,
+    space: ConformingSpace,
+    x: Any,
+    vector: Any,
+    tolerance: float,
+    flat: NDArray[np.int32] | None = None,
 ) -> Answer:
-    """Solve by conjugate gradients with algebraic multigrid (GAMG), from x.
+    """Solve by conjugate gradients with multigrid, from x.
+
+    Below quadratic elements are linear ones on the same mesh, below these algebraic multigrid
+    (GAMG) where they are many. It knows the rigid motions.
 
     Cells that a cut leaves flat are stiff against everything but rigid motions, which no smoother
     of points resolves: their unknowns are solved for directly before and after each cycle (as de
@@ -195,8 +215,9 @@ def solve_by_multigrid(
     Parameters
     ----------
     matrix, x, vector : PETSc Mat and Vecs
-        x holds the values of the constrained unknowns and zeros else; the matrix knows its
-        near-null-space.
+        x holds the values of the constrained unknowns and zeros else.
+    space : ConformingSpace
+        Of the displacements, which are the unknowns.
     tolerance : float
         Of the true residual, relative to that of the start.
     flat : int array, optional
@@ -212,15 +233,16 @@ def solve_by_multigrid(
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
+    cycle = _Cycle(matrix, space)
     own = np.zeros(0, dtype=np.int32) if flat is None else flat
     if 0 < matrix.comm.tompi4py().allreduce(len(own)) < _MOST_FLAT * matrix.getSize()[0]:
         norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
         solver.setNormType(norm)
         conditioner: Any = solver.getPC()
         conditioner.setType("python")
-        conditioner.setPythonContext(_CyclesBetweenFlatCells(matrix, own))
+        conditioner.setPythonContext(_CyclesBetweenFlatCells(matrix, own, cycle))
     else:
-        set_multigrid(solver)
+        cycle.set(solver)
     solver.setType("cg")
     solver.setInitialGuessNonzero(True)
 
@@ -230,15 +252,67 @@ def solve_by_multigrid(
         )
 
     try:
-        return iterate(solver, matrix, x, vector, tolerance, aim, "CG with GAMG")
+        return iterate(solver, matrix, x, vector, tolerance, aim, f"CG with {cycle.name}")
     finally:
         solver.destroy()
+        cycle.destroy()
+
+
+class _Cycle:
+    """A multigrid cycle for the matrix of a space.
+
+    Attributes
+    ----------
+    name : str
+    """
+
+    def __init__(self, matrix: Any, space: ConformingSpace) -> None:
+        from petsc4py import PETSc
+
+        self.name, self._entries = "GAMG", []
+        if space.degree == 1:
+            matrix.setNearNullSpace(near_null_space(matrix, space))
+            return
+        shares, corners = space.interpolation_of_corners()
+        (rows, _), d = matrix.getSizes()[0], space.dimension
+        self._linear = PETSc.Mat().createAIJ(
+            ((rows, None), (d * len(corners), shares.shape[1])), comm=matrix.comm,
+            csr=(shares.indptr.astype(np.int32), shares.indices.astype(np.int32), shares.data),
+        )  # fmt: skip
+        self._below = matrix.PtAP(self._linear)
+        self._below.setBlockSize(d)
+        self._below.setOption(PETSc.Mat.Option.SPD, True)
+        self._entries = [self._linear, self._below]
+        self._direct = shares.shape[1] <= _MOST_CORNERS
+        if not self._direct:
+            self._below.setNearNullSpace(near_null_space(self._below, space, corners))
+        self.name = "linear elements" if self._direct else "linear elements and GAMG"
+
+    def set(self, solver: Any) -> None:
+        """Let a PETSc KSP be preconditioned by the cycle, its norm that of the true residual."""
+        if not self._entries:
+            set_multigrid(solver)
+            return
+        conditioner: Any = solver.getPC()
+        solver.setOptionsPrefix("reference_")
+        conditioner.setType("mg")
+        conditioner.setMGLevels(2)
+        conditioner.setMGInterpolation(1, self._linear)
+        conditioner.getMGCoarseSolve().setOperators(self._below)
+        coarse = _DIRECTLY if self._direct else _GAMG
+        given = {**_LINEAR_BELOW, **{f"mg_coarse_{name}": value for name, value in coarse.items()}}
+        with options(solver, "reference_", given):
+            solver.setUp()  # GAMG reads what it is to be then
+
+    def destroy(self) -> None:
+        for entry in self._entries:
+            entry.destroy()
 
 
 class _CyclesBetweenFlatCells:
-    """Preconditioner of PETSc: flat cells directly, a cycle of GAMG, flat cells directly."""
+    """Preconditioner of PETSc: flat cells directly, a multigrid cycle, flat cells directly."""
 
-    def __init__(self, matrix: Any, flat: NDArray[np.int32]) -> None:
+    def __init__(self, matrix: Any, flat: NDArray[np.int32], cycle: _Cycle) -> None:
         from petsc4py import PETSc
 
         self._matrix = matrix
@@ -248,7 +322,7 @@ class _CyclesBetweenFlatCells:
         self._direct = factorised(self._block)
         self._cycle = PETSc.KSP().create(matrix.comm)
         self._cycle.setOperators(matrix)
-        set_multigrid(self._cycle)
+        cycle.set(self._cycle)
         self._cycle.setType("preonly")
         self._left, self._change = matrix.createVecRight(), matrix.createVecRight()
         self._part = self._block.createVecRight()
@@ -432,11 +506,16 @@ def options(solver: Any, prefix: str, given: dict[str, Any]) -> Iterator[None]:
             known.delValue(prefix + name)
 
 
-def near_null_space(matrix: Any, space: ConformingSpace) -> Any:
-    """Give the rigid motions of a body as PETSc wants them for the multigrid of `matrix`."""
+def near_null_space(
+    matrix: Any, space: ConformingSpace, nodes: NDArray[np.int64] | None = None
+) -> Any:
+    """Give the rigid motions of a body as PETSc wants them for the multigrid of `matrix`.
+
+    Its unknowns are those of the nodes of this rank, or of some of them.
+    """
     from petsc4py import PETSc
 
-    mine = space.node_points[space.node_of_dof[: space.owned]]
+    mine = space.node_points[space.node_of_dof[: space.owned] if nodes is None else nodes]
     places = matrix.createVecRight()
     places.setBlockSize(space.dimension)
     places.array[:] = (mine - space.node_points.mean(axis=0)).ravel()

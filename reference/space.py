@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array, eye_array, kron
 from scipy.sparse.csgraph import connected_components
 
 from reference.installation import create_simplex_mesh
@@ -315,6 +315,29 @@ class ConformingSpace(Unknowns):
         """Nodes (b, q) of all facets of the outer boundary, and their corners (b, k, d), m."""
         nodes = self.facet_nodes(*self.mesh.boundary.T)
         return nodes, self.node_points[nodes[:, : self.mesh.cell_dimension]]
+
+    def interpolation_of_corners(self) -> tuple[csr_array, NDArray[np.int64]]:
+        """Interpolate linear elements on the same mesh by the quadratic ones of this space.
+
+        Returns
+        -------
+        interpolation : (own nodes × d, corners × d) csr_array
+            Corners are numbered by ranks, and on each in the order of its nodes.
+        corners : (c,) int array
+            Nodes of this rank that are corners.
+        """
+        k = self.mesh.cell_dimension
+        ends = np.repeat(np.arange(len(self.node_points))[:, None], 2, axis=1)
+        for e, edge in enumerate(_VTK_EDGES[: 3 * (k - 1)]):
+            ends[self.cell_nodes[:, k + 1 + e]] = self.cell_nodes[:, edge]
+        own = self.node_of_dof[: self.owned]
+        every = np.concatenate(self.function_space.mesh.comm.allgather(own))
+        is_corner = ends[:, 0] == ends[:, 1]
+        number = np.empty(len(every), dtype=np.int64)
+        number[every] = np.cumsum(is_corner[every]) - 1
+        places = (np.repeat(np.arange(len(own)), 2), number[ends[own]].ravel())
+        shares = coo_array((np.full(2 * len(own), 0.5), places), (len(own), is_corner.sum()))
+        return kron(shares, eye_array(self.dimension), format="csr"), own[is_corner[own]]
 
     @property
     def owned(self) -> int:
