@@ -47,7 +47,7 @@ class ConjugateGradients(LinearSolver):
         Of the last solve.
     """
 
-    reads_half = True
+    reads_half = is_iterative = True
 
     def __init__(
         self, pattern: BlockPattern, block: int, tolerance: float = 1e-10, limit: int = 10_000

@@ -24,7 +24,7 @@ from verify.xfem.linear_solvers import LinearSolver, SparseLU
 _OPERATION, _ENTRY, _ITERATION = 0.035, 6.0, 50.0
 _FEW_NODES = 500  # nodes, up to which a factorisation takes less than a millisecond
 _LARGE = 2000  # nodes of a solid, from which it is not even analysed ...
-_MANY = 100  # ... before so many iterations were not enough
+_MANY, _ACROSS = 100, 12.0  # ... before so many iterations were not enough, or of its nodes across
 _MOST = 10_000  # iterations where there is no memory for a factor
 
 
@@ -46,7 +46,7 @@ class SolverByCost(LinearSolver):
     Attributes
     ----------
     is_iterative : bool
-        Whether the next solution will be by conjugate gradients.
+        Whether the last solution was, and the next will begin, by conjugate gradients.
     """
 
     def __init__(
@@ -60,9 +60,11 @@ class SolverByCost(LinearSolver):
         self._pattern, self._block, self._held = pattern, block, held
         self._direct: Cholesky | None = None
         self._blocks: Floats | None = None
-        self._iterative = ConjugateGradients(pattern, block, tolerance, _MANY)
         self.is_iterative = pattern.node_count > _FEW_NODES
         self._waits = solid and pattern.node_count >= _LARGE
+        # a cube at rest takes 10 N^⅓ to a residual of 1e-13
+        many = int(_ACROSS * pattern.node_count ** (1 / 3)) if self._waits else 0
+        self._iterative = ConjugateGradients(pattern, block, tolerance, max(_MANY, many))
         self._matrices, self._is_analysed = 0, False
         if not self.is_iterative:
             self._analyse()

@@ -41,10 +41,13 @@ class LinearSolver(Protocol):
     tolerance : float
         Of the residual that iterations leave, relative to the right-hand side; direct solvers read
         none.
+    is_iterative : bool
+        Whether the last solution was by iterations.
     """
 
     reads_half: bool = False
     tolerance: float = 0.0
+    is_iterative: bool = False
 
     def learn(self, former: "LinearSolver") -> None:
         """Take over what one of nearly the same matrices has found out about their cost."""
@@ -156,6 +159,8 @@ class BlockJacobiCG(LinearSolver):
     limit : int
         Most iterations.
     """
+
+    is_iterative = True
 
     def __init__(
         self, pattern: BlockPattern, block: int, tolerance: float = 1e-10, limit: int = 10_000
@@ -282,8 +287,8 @@ class Kernels:
     iterative : callable
         (pattern, block, tolerance, limit) → iterations with such a matrix.
     step : callable
-        (pattern, block, held, solid, tolerance) → whichever of the two is quicker for a step in
-        time; `solid` says whether the body fills space, where factors are large.
+        (pattern, block, held, solid, tolerance) → whichever of the two is quicker for steps in
+        time and large statics; `solid` says whether the body fills space, where factors are large.
     general : callable
         (pattern, block) → solver for any regular matrix, nearly symmetric as a rule.
     one_pass : callable, optional

@@ -82,14 +82,17 @@ def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int =
     [0.0, -9.8]
     """
     load = np.zeros_like(phantom.corners.node_points)
-    piece, barycentric, share = phantom.solid_simplices
-    cell = phantom.parent[piece]
-    if not callable(density):
-        shapes = load.shape[1:], (len(phantom.mesh.cells), load.shape[1])
-        density = finite_array(density, "load density", *shapes)
-        density = density if density.ndim == 1 else density[cell]
-    volume = share * phantom.mesh.measures[cell]
-    _integrate(phantom, load, piece, barycentric, volume, density, degree)
+    if callable(density):
+        piece, barycentric, share = phantom.solid_simplices
+        volume = share * phantom.mesh.measures[phantom.parent[piece]]
+        _integrate(phantom, load, piece, barycentric, volume, density, degree)
+        return phantom.restrict(load)
+    shapes = load.shape[1:], (len(phantom.mesh.cells), load.shape[1])
+    given = np.atleast_2d(finite_array(density, "load density", *shapes))
+    given = given if len(given) == 1 else given[phantom.parent]
+    for axis, component in enumerate(given.T):
+        force = phantom.shape_integrals * component[:, None]
+        load[:, axis] = np.bincount(phantom.cells.ravel(), force.ravel(), len(load))
     return phantom.restrict(load)
 
 

@@ -134,14 +134,12 @@ class SimplexMesh:
     def gradients(self) -> Floats:
         """(m, dim + 1, space) gradients of the linear shape functions, in 1/m."""
         # E_jk (∇N_i)_k = δ_ij with the edges E from the first node; Σ_j ∇N_j = 0
-        edges = self.edge_vectors
         if self.dim == self.space:
-            others = np.linalg.inv(edges).transpose(0, 2, 1)
-        else:  # ∇N_1 = e_2 × n / |n|², ∇N_2 = n × e_1 / |n|² with n = e_1 × e_2
-            across = self._across / np.sum(self._across**2, axis=1)[:, None]
-            others = np.stack(
-                [np.cross(edges[:, 1], across), np.cross(across, edges[:, 0])], axis=1
-            )
+            return _gradients(self.points, self.cells)
+        # ∇N_1 = e_2 × n / |n|², ∇N_2 = n × e_1 / |n|² with n = e_1 × e_2
+        edges = self.edge_vectors
+        across = self._across / np.sum(self._across**2, axis=1)[:, None]
+        others = np.stack([np.cross(edges[:, 1], across), np.cross(across, edges[:, 0])], axis=1)
         return np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
 
     @cached_property
@@ -212,6 +210,37 @@ def _sizes(points, cells):
                 determinants[cell] += edges[1, i] * minor
             determinants[cell] = abs(determinants[cell])
     return longest, determinants
+
+
+@njit(cache=True)
+def _gradients(points, cells):
+    """Gradients (m, d + 1, d) of the shape functions of triangles or tetrahedra in their space.
+
+    ∇N_1 = e_2 × e_3 / (e_1 · e_2 × e_3) with the edges e from the first node, the others in turn.
+    """
+    (count, corners), space = cells.shape, points.shape[1]
+    gradients, edges = np.zeros((count, corners, space)), np.zeros((space, space))
+    for cell in range(count):
+        for a in range(space):
+            for i in range(space):
+                edges[a, i] = points[cells[cell, a + 1], i] - points[cells[cell, 0], i]
+        own = gradients[cell]
+        for a in range(space):
+            b, c = (a + 1) % space, (a + 2) % space
+            for i in range(space):
+                j, k = (i + 1) % space, (i + 2) % space
+                if space == 2:  # of e_b, turned by a right angle
+                    own[a + 1, i] = edges[b, j] if i == 0 else -edges[b, j]
+                else:
+                    own[a + 1, i] = edges[b, j] * edges[c, k] - edges[b, k] * edges[c, j]
+        for a in range(space):
+            height = 0.0
+            for i in range(space):
+                height += own[a + 1, i] * edges[a, i]
+            for i in range(space):
+                own[a + 1, i] /= height
+                own[0, i] -= own[a + 1, i]
+    return gradients
 
 
 def facets_of(cells: NDArray) -> NDArray:

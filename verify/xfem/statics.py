@@ -34,7 +34,7 @@ Method = Literal["auto", "direct", "iterative"]
 ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 _PHASES = ("analysis", "assembly", "factorisation", "solve")
-_MOST = 2000  # iterations before a factorisation is the quicker way
+_MOST = 10_000  # iterations that are insisted on
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ def solve_static(
         Nodal forces in newtons.
     solver : {"auto", "direct", "iterative"}
         Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
-        ``auto`` takes the faster one: iterations for solids of 2000 nodes and more, without a ghost
-        penalty; and the factorisation after all if they do not converge (thin bodies that bend).
+        ``auto`` takes the faster one: for solids of 2000 nodes and more, without a ghost penalty,
+        what the kernels take for a step, or the factorisation after all if that does not converge.
     ghost : Penalty, optional
         A `verify.xfem.ghost_penalty`, added to the stiffness.
     kernels : Kernels
@@ -157,7 +157,7 @@ def solve_static(
 
 
 class StaticSolver:
-    """Iterations for a large body, a factorisation where they do not converge.
+    """What is quicker for a large body, a factorisation for a small one or where that fails.
 
     Parameters
     ----------
@@ -185,13 +185,15 @@ class StaticSolver:
         method: Method = "auto",
     ) -> None:
         kernels, block, phantom = force.kernels, fixed.shape[1], force.phantom
-        self._make_direct = partial(kernels.direct, pattern, block, fixed.all(axis=1))
+        held = fixed.all(axis=1)
+        self._make_direct = partial(kernels.direct, pattern, block, held)
         is_large = phantom.mesh.dim == 3 and phantom.node_count >= ITERATE_FROM
-        iterates = is_large and force.ghost is None if method == "auto" else method == "iterative"
+        self._large: LinearSolver | None = None
+        if method == "iterative":
+            self._large = kernels.iterative(pattern, block, tolerance, _MOST)
+        elif method == "auto" and is_large and force.ghost is None:
+            self._large = kernels.step(pattern, block, held, True, tolerance)
         self._insists = method == "iterative"
-        limit = 5 * _MOST if self._insists else _MOST
-        self._iterative = kernels.iterative(pattern, block, tolerance, limit) if iterates else None
-        self._first = self._iterative or self._direct
         self.used: set[str] = set()
 
     @cached_property
@@ -201,14 +203,14 @@ class StaticSolver:
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks; see `LinearSolver`."""
         self._blocks = blocks
-        self._first.factorize(blocks)
+        (self._large or self._direct).factorize(blocks)
 
     def solve(self, load: Floats) -> Floats:
         """Solve; by a factorisation where iterations that are optional do not converge."""
-        if self._iterative is not None:
+        if self._large is not None:
             try:
-                found = self._iterative.solve(load)
-                self.used.add("iterative")
+                found = self._large.solve(load)
+                self.used.add("iterative" if self._large.is_iterative else "direct")
                 return found
             except NotConvergedError:
                 if self._insists:
