@@ -20,7 +20,7 @@ from reference.linear_solvers import (
     set_multigrid,
     solve_directly,
 )
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, LinearElements
 from verify.scene import Material
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the
 _ROUND_OFF = 1e-14
 _GOOD_ENOUGH = 1e-8  # of the force scale, where round-off does not let the residual fall further
 _STAGNANT = 0.5  # of the residual of the iteration before, at round-off
+_LASTING = 1e-2  # of the residual of the iteration before: its tangent serves once more
 _DIVERGED = 1e4  # of the first residual or of the force scale
 _MOST_ITERATIONS = 25
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
@@ -44,6 +45,7 @@ _SMALLEST_STEP = 1e-4
 _MOST = {"accepted steps": 100, "refused steps": 50, "Newton iterations": 1000}
 _SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
 _FINER = 2.7  # steps of a second path: another, but no multiple of the first
+_NEAR = 0.25  # of the displacement: so close to that of linear elements is the same equilibrium
 _SAME = 1e-6  # of the energy, between two paths
 
 
@@ -87,7 +89,7 @@ class StrainEquations:
         self._most_inverted = most_inverted
         self._unknowns, self.solution = law.unknowns, law.solution
         self._own, self._at = self._unknowns.own_unknowns(held)
-        self._rows = self._unknowns.rows(held)
+        self._held = self._unknowns.indices(self._own)
         self._factor, self._is_membrane = 0.0, isinstance(law.state, MembraneStretch)
         self._motions = RigidMotions(space, held)
         self.orientation = OrientationCheck(space, held, law.state.J, quadrature_points(space))
@@ -103,7 +105,7 @@ class StrainEquations:
         self._increment, self._load = self._vector.duplicate(), self._vector.duplicate()
         self._load.array[:] = 0.0 if load is None else self._unknowns.own_part(load)
         self._force = self._diagonal = 0.0
-        self._first_residual = self._residual_before = np.inf
+        self._first_residual = self._residual_before = self._contraction = np.inf
         self._solver = self._newton()
         self._unproven = self._solver.getKSP().getType() == "preonly"
 
@@ -150,6 +152,17 @@ class StrainEquations:
             return lost
         return self._imbalance(stored, before, moved, is_short or rests)
 
+    def begin(self, displacement: Array, values: Array) -> str:
+        """Find the equilibrium at load factor 1 near a displacement (n, d), or say why not."""
+        x = self.solution.x.petsc_vec
+        x.array[:] = self._unknowns.own_part(displacement)
+        self._take(x)
+        reactions, comm = self._internal_force()[self._own], x.comm.tompi4py()
+        size = comm.allreduce(float(reactions @ reactions))
+        self._force = float(np.sqrt(size)) + float(self._load.norm())
+        self._factor = 1.0
+        return self.advance(1.0, values)
+
     def _inside_out(self) -> str:
         """Say where a state is turned inside out that must not be; or nothing."""
         found = self.orientation()
@@ -175,6 +188,7 @@ class StrainEquations:
         self._residual_before = residual
         if iteration == 0:
             self._first_residual, before = residual, np.inf
+        self._contraction = residual / before if iteration else np.inf
         if residual <= _TOLERANCE * self._force:
             return reasons.CONVERGED_FNORM_ABS
         if residual > _STAGNANT * before and residual <= self._round_off():
@@ -217,7 +231,7 @@ class StrainEquations:
         if self._is_membrane or linear.getType() != "preonly":
             return None
         self._assemble(self._matrix)
-        self._matrix.zeroRowsColumns(self._rows, self._diagonal)
+        self._matrix.zeroRowsColumns(self._held, self._diagonal)
         comm = self._space.function_space.mesh.comm
         return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
 
@@ -231,7 +245,8 @@ class StrainEquations:
 
     def destroy(self) -> None:
         """Free what PETSc holds."""
-        for entry in (self._solver, self._matrix, self._vector, self._increment, self._load):
+        for entry in (self._solver, self._matrix, self._vector, self._increment, self._load,
+                      self._held):  # fmt: skip
             entry.destroy()
 
     def _assemble_residual(self, _snes: Any, x: Any, out: Any) -> None:
@@ -241,9 +256,11 @@ class StrainEquations:
         out.array[self._own] = 0.0
 
     def _assemble_tangent(self, snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
+        if self._tension is None and self._contraction < _LASTING:
+            return
         self._take(x)
         self._assemble(matrix, snes.getIterationNumber())
-        matrix.zeroRowsColumns(self._rows, self._diagonal)
+        matrix.zeroRowsColumns(self._held, self._diagonal)
 
     def _follow(self, values: Array) -> None:
         """Let pieces turn with their supports; what is left is the linear response's."""
@@ -273,7 +290,9 @@ class StrainEquations:
         vector.axpy(self._factor, self._load)
         increment.set(0.0)
         increment.array[self._own] = values - x.array[self._own]
-        self._matrix.zeroRowsColumns(self._rows, self._diagonal, increment, vector)
+        loads = np.delete(vector.array, self._own)
+        reactions = self._matrix.createSubMatrix(self._held)
+        self._matrix.zeroRowsColumns(self._held, self._diagonal, increment, vector)
         linear = self._solver.getKSP()
         linear.setOperators(self._matrix)
         if self._unproven:  # at rest: what is held too weakly shows as in linear statics
@@ -281,9 +300,14 @@ class StrainEquations:
             self._unproven = False
         else:
             linear.solve(vector, increment)
-        self._assemble(self._matrix)
-        self._matrix.mult(increment, vector)
-        self._force = max(self._force, float(vector.norm()), 1e-300)
+        # of the product of the tangent as it was with the increment
+        at_supports = reactions.createVecLeft()
+        reactions.mult(increment, at_supports)
+        comm = x.comm.tompi4py()
+        size = float(np.hypot(np.sqrt(comm.allreduce(float(loads @ loads))), at_supports.norm()))
+        self._force = max(self._force, size, 1e-300)
+        for entry in (reactions, at_supports):
+            entry.destroy()
         x.axpy(1.0, increment)
         x.array[self._own] = values
         self._take(x)
@@ -386,6 +410,8 @@ class LargeStrainSolve:
         Strain energy of the other path's end in J if it was another one.
     timings : dict of str to float
         Seconds.
+    nested : bool
+        Whether the load steps are those of linear elements on the same mesh.
     """
 
     displacement: Array
@@ -399,6 +425,7 @@ class LargeStrainSolve:
     timings: dict[str, float]
     paths: int = 1
     dismissed: float | None = None
+    nested: bool = False
 
 
 def solve_large_strain(
@@ -446,18 +473,13 @@ def solve_large_strain(
         If steps below 1e-4, or the last of 100, do not converge; with the load factor reached and
         PETSc's reason. If neither of two paths ends in a stable state; with both energies.
     """
-
-    def path(step: float) -> LargeStrainSolve:
-        start = perf_counter()
-        law, inverted = Law(material, space, energy, pressure), ENERGIES[energy].inverted
-        equations = StrainEquations(law, space, unknowns, load, inverted)
-        found = _follow(equations, prescribed, step)
-        return replace(found, timings={"solve": perf_counter() - start})
-
-    one = path(first_step)
+    problem = _Problem(material, space, unknowns, prescribed, load, energy, pressure)
+    if (nested := _nested(problem, first_step)) is not None:
+        return nested
+    one = problem.path(first_step)
     if not one.negative_modes:
         return one
-    two = path(first_step / _FINER)
+    two = problem.path(first_step / _FINER)
     timings = {"solve": one.timings["solve"] + two.timings["solve"]}
     found = f"{one.strain_energy:.6g} J and {two.strain_energy:.6g} J"
     least = min(one.strain_energy, two.strain_energy)
@@ -476,6 +498,80 @@ def solve_large_strain(
             f"{two.negative_modes} modes in which the energy falls)"
         )
     return replace(two, paths=2, timings=timings, dismissed=one.strain_energy)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What `solve_large_strain` is asked."""
+
+    material: Material
+    space: ConformingSpace
+    held: NDArray[np.int32]
+    prescribed: Callable[[float], Array]
+    load: Array | None
+    energy: str
+    pressure: bool
+
+    def equations(self) -> StrainEquations:
+        law = Law(self.material, self.space, self.energy, self.pressure)
+        most_inverted = ENERGIES[self.energy].inverted
+        return StrainEquations(law, self.space, self.held, self.load, most_inverted)
+
+    def path(self, first_step: float) -> LargeStrainSolve:
+        start = perf_counter()
+        found = _follow(self.equations(), self.prescribed, first_step)
+        return replace(found, timings={"solve": perf_counter() - start})
+
+    def of_linear_elements(self, linear: LinearElements) -> "_Problem":
+        held, which = linear.held(self.held)
+        load = None if self.load is None else linear.forces(self.load)
+        return replace(
+            self, space=linear.space, held=held, load=load,
+            prescribed=lambda factor: self.prescribed(factor)[which],
+        )  # fmt: skip
+
+
+def _nested(problem: _Problem, first_step: float) -> LargeStrainSolve | None:
+    """Follow the path by linear elements on the same mesh, and begin at their end.
+
+    A quadratic tangent costs some thirty times as much. None of membranes and mixed elements; and
+    if the linear elements find no stable end, or the quadratic ones none close to it.
+    """
+    space, start = problem.space, perf_counter()
+    if space.degree == 1 or problem.pressure or space.mesh.cell_dimension < space.dimension:
+        return None
+    linear = LinearElements(space)
+    try:
+        coarse = problem.of_linear_elements(linear).path(first_step)
+        if coarse.negative_modes:
+            return None
+        equations = problem.equations()
+        begin = linear.refined(coarse.displacement)
+        refused = equations.begin(begin, problem.prescribed(1.0))
+    except RuntimeError:  # said by the path of the quadratic elements
+        return None
+    found = _state(equations, coarse.steps, coarse.refused_steps)
+    moved = np.linalg.norm(found.displacement - begin)
+    if refused or found.negative_modes or moved > _NEAR * np.linalg.norm(found.displacement):
+        return None
+    return replace(found, nested=True, timings={"solve": perf_counter() - start})
+
+
+def _state(equations: StrainEquations, steps: int, refused: list[str]) -> LargeStrainSolve:
+    """Give the end of a path, and free the equations."""
+    found = LargeStrainSolve(
+        equations.displacement(),
+        equations.energy(),
+        equations.orientation(),
+        equations.method,
+        equations.iterations,
+        steps,
+        refused,
+        equations.negative_modes(),
+        {},
+    )
+    equations.destroy()
+    return found
 
 
 def _follow(
@@ -511,16 +607,4 @@ def _follow(
                 f"Before that, det F is {state.least:.3g} or more, least at "
                 f"{place_text(state.place)}"
             )
-    result = LargeStrainSolve(
-        equations.displacement(),
-        equations.energy(),
-        equations.orientation(),
-        equations.method,
-        equations.iterations,
-        steps,
-        refused,
-        equations.negative_modes(),
-        {},
-    )
-    equations.destroy()
-    return result
+    return _state(equations, steps, refused)

@@ -392,6 +392,45 @@ def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> Con
     )  # fmt: skip
 
 
+class LinearElements:
+    """The linear elements on the mesh of a quadratic space, and what goes between the two.
+
+    Parameters
+    ----------
+    fine : ConformingSpace
+        Of degree 2.
+
+    Attributes
+    ----------
+    space : ConformingSpace
+    """
+
+    def __init__(self, fine: ConformingSpace) -> None:
+        comm, corners = fine.function_space.mesh.comm, fine.mesh.cell_dimension + 1
+        self.space = space = conforming_space(fine.mesh, 1, comm if comm.size > 1 else None)
+        self._ends = np.empty((len(fine.node_points), 2), dtype=np.int64)
+        pairs = [(k, k) for k in range(corners)] + _VTK_EDGES[: 3 * (corners - 2)]
+        for column, pair in enumerate(pairs):
+            self._ends[fine.cell_nodes[:, column]] = space.cell_nodes[:, pair]
+
+    def refined(self, u: Array) -> Array:
+        """Displacements of the quadratic space that are those (n, d) of the linear elements."""
+        return np.asarray(u[self._ends].mean(axis=1))
+
+    def forces(self, fine: Array) -> Array:
+        """Nodal forces (k,) that do the work of those of the quadratic space."""
+        coarse = np.zeros(self.space.shape)
+        for end in self._ends.T:
+            np.add.at(coarse, end, 0.5 * fine.reshape(len(end), -1))
+        return coarse.ravel()
+
+    def held(self, fine: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """Which scalar unknowns are held, and which of those of the quadratic space they are."""
+        node, component = np.divmod(fine, self.space.dimension)
+        one, other = self._ends[node].T
+        return (one * self.space.dimension + component)[one == other].astype(np.int32), one == other
+
+
 def mixed_unknowns(space: ConformingSpace) -> Unknowns:
     """Add a pressure to quadratic displacements: continuous, linear (Taylor–Hood).
 

@@ -238,6 +238,7 @@ def test_a_slender_block_turns_in_few_steps_along_its_load():
     found, moved = slender_block()
     assert found.steps <= 40
     assert found.iterations <= 400
+    assert not found.nested  # linear elements lock: they end far from here
     plane = moved @ np.array([[1.0, 0.0], [0.0, 0.8], [0.0, 0.6]])
     assert moved @ [0.0, 0.6, -0.8] == pytest.approx(0.0, abs=1e-3)
     # shear and stretch: of the order of PL²/EI (h/L)², and the error of the coarse mesh
@@ -253,6 +254,33 @@ def test_the_record_names_the_solver_that_ran(monkeypatch):
     space = space_of(1, (3, 3, 3))
     found = solve(space, on_ends(space), lambda f: 0.1 * f * space.node_points * [0, 1, 0])
     assert found.method == "PETSc SNES, GMRES with GAMG"
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_path_of_linear_elements_leads_to_the_equilibrium_of_the_quadratic_ones(d, monkeypatch):
+    """Of a block that is cut askew and bears its own weight, held on two of its sides."""
+    import ufl
+
+    line, plane = (
+        [(-1, 0.3), (0.55, 0.62)],
+        [(-1, 0.3, -1), (0.55, 0.62, -1), (0.55, 0.62, 2), (-1, 0.3, 2)],
+    )
+    space = space_of(2, (6, 6) if d == 2 else (2, 2, 2), cuts=[line if d == 2 else plane])
+    weight = np.array([-0.02, -0.05, 0.03][:d])
+    load = forces_of(space, lambda v: ufl.inner(ufl.as_vector(weight), v) * ufl.dx)
+
+    def field(factor):
+        return 0.2 * factor * space.node_points[:, ::-1] * space.node_points[:, :1]
+
+    found = solve(space, on_ends(space), field, load=load)
+    monkeypatch.setattr(large_strain, "_nested", lambda *_: None)
+    whole = solve(space, on_ends(space), field, load=load)
+    assert found.nested
+    assert not whole.nested
+    scale = np.abs(whole.displacement).max()
+    assert found.displacement == pytest.approx(whole.displacement, abs=1e-9 * scale)
+    assert found.strain_energy == pytest.approx(whole.strain_energy, rel=1e-10)
+    assert 2 * found.iterations < whole.iterations
 
 
 def test_a_body_turned_inside_out_away_from_singular_places_is_refused_with_the_place():

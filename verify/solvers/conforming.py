@@ -269,6 +269,7 @@ def _equilibrium(
         if state.share
         else "nowhere",
         "steps taken again": "; ".join(finite.refused_steps) or "none",
+        "load steps by": "linear elements on the same mesh" if finite.nested else "these elements",
         "stability": _stability(finite),
     }
     record.iterations |= {"newton": finite.iterations, "load steps": finite.steps}
