@@ -8,6 +8,7 @@ from verify.compare.body import body_of
 from verify.compare.body_rule import area_rule
 from verify.compare.cut_rule import cut_rule
 from verify.compare.error_norm import displacement_error, energy_error, jump_error
+from verify.compare.errors import Rules
 from verify.compare.hooke import hooke
 from verify.judge.quantities import Measured
 from verify.judge.reference import conforming_reference, exact_reference
@@ -30,7 +31,7 @@ def test_the_stated_uncertainty_of_the_reference_covers_its_true_error(name):
     law = hooke(case.material)
     exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
     body = body_of(case, exact.singular_points)
-    stated = conforming_reference(case, levels, body, law, h / 8)
+    stated = conforming_reference(case, levels, body, law, Rules(body, h / 8, 1))
     truth = exact_reference(case, exact, body, law)
     finest = Measured(levels[2], body, law)
     area, line = area_rule(body, h / 24, grading=0.3), cut_rule(body, h / 64)

@@ -5,6 +5,7 @@ import pytest
 import scenes
 
 from verify.compare.body import body_of
+from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.errors import UnsupportedSceneError
 from verify.judge.quantities import Measured, unit_of
@@ -267,7 +268,8 @@ def test_the_interval_of_a_reaction_holds_the_value_of_far_finer_meshes():
     )  # fmt: skip
     levels = {k: find_solver("conforming").solve(scene, k, repetitions=0) for k in range(4)}
     fine = values(scene, solution=levels.pop(3))
-    known = conforming_reference(scene, levels, body_of(scene), law_of(scene), 1 / 32).quantities
+    rules = Rules(body_of(scene), 1 / 32, 1)
+    known = conforming_reference(scene, levels, body_of(scene), law_of(scene), rules).quantities
     for name, (value, width) in known.items():
         assert abs(value - fine[name]) <= width < 0.1 * abs(value), name
     assert known["R"][0] == pytest.approx(-known["N"][0], rel=1e-9)

@@ -11,6 +11,7 @@ import scenes
 from reference import fracture
 from reference.exact import exact_solution
 from verify.compare.body import body_of
+from verify.compare.errors import Rules
 from verify.compare.hooke import hooke, law_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.notices import unavailable_quantities
@@ -132,12 +133,14 @@ def test_what_only_fine_levels_have_is_known_from_those():
     case = griffith(mesh={"pattern": "structured", "cells": [[n, n] for n in (2, 16, 32, 64)]})
     body, law = body_of(case), hooke(case.material)
     levels = {k: find_solver("xfem").solve(case, k, repetitions=0) for k in range(4)}
-    reference = conforming_reference(case, levels, body, law, 0.5)
+    reference = conforming_reference(case, levels, body, law, Rules(body, 0.5, 1))
     values = reference.record.metrics["K_I at the end"]["values"]
     assert values[0] is None
     assert None not in values[1:]
     assert reference.record.missing is None
-    fewer = conforming_reference(case, {k: levels[k] for k in (0, 1, 2)}, body, law, 0.5)
+    fewer = conforming_reference(
+        case, {k: levels[k] for k in (0, 1, 2)}, body, law, Rules(body, 0.5, 1)
+    )
     assert "K_I at the end" not in fewer.quantities
     assert "does not fit" in fewer.record.missing["K_I at the end"]
 

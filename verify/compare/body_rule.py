@@ -19,6 +19,7 @@ from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
@@ -74,14 +75,12 @@ class _Monotone:
     bulge: float  # arcs: +1 right half, -1 left half
     outline: bool
 
-    def x(self, y: Array) -> Array:
+    def row(self) -> list[float]:
+        """Return it as kernels take it: with the ends of a segment, or centre, radius and bulge."""
+        ends = [self.low, self.high, float(self.outline)]
         if isinstance(self.piece, Segment):
-            a, b = self.piece.start, self.piece.end
-            t = (y - a[1]) / (b[1] - a[1])
-            return (1 - t) * a[0] + t * b[0]
-        height = (y - self.piece.centre[1]) / self.piece.radius
-        half = np.sqrt(np.maximum((1 - height) * (1 + height), 0.0))
-        return self.piece.centre[0] + self.bulge * self.piece.radius * half
+            return [*ends, 0.0, *self.piece.start, *self.piece.end]
+        return [*ends, 1.0, *self.piece.centre, self.piece.radius, self.bulge]
 
     def poles(self) -> list[float]:
         """Heights, at an end or close beyond it, at which x(y) is like a square root."""
@@ -139,12 +138,10 @@ def area_rule(
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
     xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
-    thinnest = ROUND_OFF * body.size
-    cells = [
-        cell for low, high in pairwise(ys) for cell in _slab(curves, low, high, xs, order, thinnest)
-    ]
-    points = np.vstack([p for p, _ in cells]) @ turn
-    return Rule(points, np.concatenate([w for _, w in cells]))
+    rows = np.array([curve.row() for curve in curves])
+    strips = _strips(rows, ys, xs, ROUND_OFF * body.size)
+    points, weights = _in_strips(rows, ys, xs, strips, *_gauss(order), *_gauss(max(order, 6)))
+    return Rule(points @ turn, weights)
 
 
 def slab_angles(body: Body) -> tuple[float, float, float]:
@@ -183,12 +180,11 @@ def graded_breaks(
     if len(singular):
         nearest = base[np.abs(singular[:, None] - base).argmin(axis=1)]
         singular = np.where(np.abs(singular - nearest) <= 4 * same, nearest, singular)
-    cells = []
-    for a, b in pairwise(base):
-        n = int(np.ceil((b - a) / spacing))
-        edges = np.linspace(a, b, n + 1)
-        cells.append(np.column_stack([edges[:-1], edges[1:]]))
-    open_cells, done = np.vstack(cells), [base]
+    count = np.ceil(np.diff(base) / spacing).astype(np.int64)
+    last = np.cumsum(count)
+    step, start = np.repeat(np.diff(base) / count, count), np.repeat(base[:-1], count)
+    low = start + (np.arange(last[-1]) - np.repeat(last - count, count)) * step
+    open_cells, done = np.column_stack([low, np.append(low[1:], base[-1])]), [base]
     singular = np.unique(singular)
     while len(open_cells):
         done.append(open_cells.ravel())
@@ -238,48 +234,83 @@ def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
     return found
 
 
-def _slab(
-    curves: list[_Monotone], low: float, high: float, columns: Array, order: int, thinnest: float
-) -> list[tuple[Array, Array]]:
-    """Quadrature of the body between two heights, one entry per strip between two curves.
+@njit(cache=True)
+def _x(curve, y):
+    a, b, c, d = curve[4:]
+    if curve[3] == 0.0:
+        t = (y - b) / (d - b)
+        return (1 - t) * a + t * c
+    height = (y - b) / c
+    return a + d * c * np.sqrt(max((1 - height) * (1 + height), 0.0))
 
-    A strip thinner than `thinnest`, in m, is round-off, and its points would be on the cut.
+
+@njit(cache=True)
+def _strips(curves, ys, columns, thinnest):
+    """Give the strips of the body between two curves in slabs, one a row.
+
+    A row has the slab, the curves on the left and on the right, and the first and the last of the
+    columns between. A strip thinner than `thinnest`, in m, is round-off: its points would be on
+    the cut.
     """
-    middle = np.array([0.5 * (low + high)])
-    here = [c for c in curves if c.low < middle[0] < c.high]
-    here.sort(key=lambda c: float(c.x(middle)[0]))
-    u, wu = _gauss(order)
-    found, inside = [], False
-    for left, right in pairwise(here):
-        inside ^= left.outline
-        if not inside:
-            continue
-        curved = isinstance(left.piece, Arc) or isinstance(right.piece, Arc)
-        v, wv = _gauss(max(order, 6) if curved else order)
-        ys, wy = low + (high - low) * v, (high - low) * wv
-        x0, x1 = left.x(ys), right.x(ys)
-        m0, m1 = float(left.x(middle)[0]), float(right.x(middle)[0])
-        width = x1 - x0
-        if m1 - m0 <= thinnest:
-            continue  # two curves on each other: a strip of no width
-        first = np.searchsorted(columns, m0 + thinnest, "right")
-        between = columns[first : np.searchsorted(columns, m1 - thinnest)]
-        s = np.concatenate([[0.0], (between - m0) / (m1 - m0), [1.0]])
-        step = np.diff(s)
-        place = (s[:-1, None] + step[:, None] * u).ravel()
-        share = (step[:, None] * wu).ravel()
-        x = x0[:, None] + width[:, None] * place
-        points = np.stack([x, np.broadcast_to(ys[:, None], x.shape)], axis=2)
-        found.append((points.reshape(-1, 2), ((wy * width)[:, None] * share).ravel()))
-    return found
+    found, filled = np.empty((len(ys), 5), dtype=np.int64), 0
+    here = np.empty(len(curves), dtype=np.int64)
+    at = np.empty(len(curves))
+    for slab in range(len(ys) - 1):
+        middle, count = 0.5 * (ys[slab] + ys[slab + 1]), 0
+        for c in range(len(curves)):
+            if curves[c, 0] < middle < curves[c, 1]:
+                x, k = _x(curves[c], middle), count
+                while k > 0 and at[k - 1] > x:
+                    at[k], here[k] = at[k - 1], here[k - 1]
+                    k -= 1
+                at[k], here[k] = x, c
+                count += 1
+        inside = False
+        for k in range(count - 1):
+            inside ^= curves[here[k], 2] != 0.0
+            if inside and at[k + 1] - at[k] > thinnest:
+                first = np.searchsorted(columns, at[k] + thinnest, "right")
+                last = max(first, np.searchsorted(columns, at[k + 1] - thinnest))
+                if filled == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                found[filled] = slab, here[k], here[k + 1], first, last
+                filled += 1
+    return found[:filled]
+
+
+@njit(cache=True)
+def _in_strips(curves, ys, columns, strips, u, wu, v, wv):
+    """Quadrature points (n, 2) and weights (n,) of strips, with more points (v) of curved ones."""
+    count = 0
+    for _, left, right, first, last in strips:
+        curved = curves[left, 3] + curves[right, 3] > 0.0
+        count += (len(v) if curved else len(u)) * (last - first + 1) * len(u)
+    points, weights, n = np.empty((count, 2)), np.empty(count), 0
+    for slab, left, right, first, last in strips:
+        curved = curves[left, 3] + curves[right, 3] > 0.0
+        heights, shares = (v, wv) if curved else (u, wu)
+        low, high = ys[slab], ys[slab + 1]
+        middle = 0.5 * (low + high)
+        m0, m1 = _x(curves[left], middle), _x(curves[right], middle)
+        for i in range(len(heights)):
+            y = low + (high - low) * heights[i]
+            x0 = _x(curves[left], y)
+            width = _x(curves[right], y) - x0
+            weight = (high - low) * shares[i] * width
+            for k in range(first, last + 1):
+                start = (columns[k - 1] - m0) / (m1 - m0) if k > first else 0.0
+                step = ((columns[k] - m0) / (m1 - m0) if k < last else 1.0) - start
+                for q in range(len(u)):
+                    points[n, 0], points[n, 1] = x0 + width * (start + step * u[q]), y
+                    weights[n] = weight * (step * wu[q])
+                    n += 1
+    return points, weights
 
 
 @cache
 def _gauss(n: int) -> tuple[Array, Array]:
     x, w = np.polynomial.legendre.leggauss(n)
-    x, w = 0.5 * (x + 1), 0.5 * w
-    x.flags.writeable = w.flags.writeable = False  # every strip of every rule has the same
-    return x, w
+    return 0.5 * (x + 1), 0.5 * w
 
 
 # Kuhn's tetrahedra keep their orientation as long as no node moves by a sixth of the spacing.

@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body_rule import Rule
-from verify.compare.locate import Field, SolutionField, strain_squares
+from verify.compare.locate import (
+    Field,
+    SolutionField,
+    difference_squares,
+    squares,
+    strain_squares,
+)
 from verify.compare.mass import separated_parts
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
 from verify.errors import InputError
@@ -72,6 +78,15 @@ class Hooke:
         """Energy density (n,) of the difference of a gradient from an `expected` one."""
         return self.energy_density(difference)
 
+    def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
+        """Energy densities (n,) of the difference of gradients and of those expected, J/m³.
+
+        The third (n,) are the sums of squares of the entries of those expected.
+        """
+        trace2, square, own_trace2, own_square, entries = difference_squares(found, expected)
+        difference = 0.5 * self.lame * trace2 + self.shear * square
+        return difference, 0.5 * self.lame * own_trace2 + self.shear * own_square, entries
+
 
 @dataclass(frozen=True)
 class Corotated(Hooke):
@@ -86,6 +101,11 @@ class Corotated(Hooke):
         turned = np.swapaxes(_rotations(gradient), 1, 2)
         unit = np.eye(gradient.shape[1])
         return super().power_density(turned @ (unit + gradient) - unit, turned @ rate)
+
+    def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
+        """Return `error_density`, `energy_density`, and squares, as of linear elasticity."""
+        difference = self.error_density(found - expected, expected)
+        return difference, self.energy_density(expected), squares(expected)
 
     def _density(self, stretch: Array) -> Array:
         """Energy density (n,) of principal stretches less one (n, k)."""

@@ -135,6 +135,38 @@ def _strain_squares(gradient, axes, trace2, square):
         trace2[i], square[i] = trace**2, 0.5 * sheared
 
 
+def difference_squares(found: Floats, expected: Floats) -> Floats:
+    """Squares (5, n) of the strains of what gradients (n, d, d) differ by, and of those `expected`.
+
+    tr² ε and ε : ε of either; the last row is the sum of the squares of all entries of `expected`.
+    """
+    rows = np.empty((5, len(found)))
+    found, expected = np.ascontiguousarray(found), np.ascontiguousarray(expected)
+    _difference_squares(found, expected, axes_of(found.shape[1]), rows)
+    return rows
+
+
+@njit(cache=True)
+def _difference_squares(found, expected, axes, rows):
+    for i in range(len(found)):
+        trace = sheared = trace_e = sheared_e = entries = 0.0
+        for a in axes:
+            own = expected[i, a, a]
+            off = found[i, a, a] - own
+            trace += off
+            trace_e += own
+            sheared += 2.0 * off**2
+            sheared_e += 2.0 * own**2
+            entries += own**2
+            for b in range(a):
+                one, other = expected[i, a, b], expected[i, b, a]
+                sheared += ((found[i, a, b] - one) + (found[i, b, a] - other)) ** 2
+                sheared_e += (one + other) ** 2
+                entries += one**2 + other**2
+        rows[0, i], rows[1, i] = trace**2, 0.5 * sheared
+        rows[2, i], rows[3, i], rows[4, i] = trace_e**2, 0.5 * sheared_e, entries
+
+
 Array = NDArray[np.float64]
 
 # Relative to the body's size: mesh generators and files move points by up to this much.

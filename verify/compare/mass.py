@@ -11,13 +11,15 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, issparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from verify.compare.cell_tree import axes_of
 from verify.compare.locate import ROUND_OFF
-from verify.compare.simplices import EDGES, cells_of, simplex_rule, simplices
+from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule, simplices
 from verify.errors import InputError
 from verify.handed_over import CONSISTENT
 from verify.scene import Scene
@@ -73,8 +75,9 @@ def density_of(scene: Scene, solution: Solution) -> float | Array:
 
 
 def kinetic(
-    solution: Solution, density: float | Array, cells: NDArray[np.int64] | None = None
-) -> Kinetic:
+    solution: Solution, density: float | Array, cells: NDArray[np.int64] | None = None,
+    steps: slice = slice(None),
+) -> Kinetic:  # fmt: skip
     """Integrate over the cells of the solution, exactly for its velocity field.
 
     Parameters
@@ -84,6 +87,8 @@ def kinetic(
         kg/m³, of a membrane times its thickness; of all cells of the solution or of each.
     cells : (c,) int array, optional
         Numbers of the cells of a part; default all.
+    steps : slice
+        Of the output times; default all.
 
     Raises
     ------
@@ -93,39 +98,60 @@ def kinetic(
     if solution.velocity is None:
         raise InputError("a solution without velocities has no kinetic energy")
     d, k = solution.dimension, solution.cell_dimension
-    nodes = solution.cells if cells is None else solution.cells[cells]
-    shape = simplices(solution.points, nodes)
+    nodes, own = solution.cells, density * cells_of(solution).volume
+    if cells is not None:
+        nodes, own = nodes[cells], own[cells]
     place, share = simplex_rule(k, 2 if solution.order == 1 else 4)
     hats = shape_functions(place, k, solution.order)
-    own = density if cells is None or np.ndim(density) == 0 else np.asarray(density)[cells]
-    mass = ((own * shape.volume)[:, None] * share).ravel()
-    names = ("centre", "energy", "linear", "angular", "spin", "scales")
-    rows: dict[str, list[Array]] = {name: [] for name in names}
-    for u, v in zip(solution.displacement, solution.velocity, strict=True):
-        x, speed = (
-            np.einsum("qk,mka->mqa", hats, nodal[nodes]).reshape(-1, d)
-            for nodal in (solution.points + u, v)
-        )
-        size = np.linalg.norm(speed, axis=1)
-        centre = mass @ x / max(mass.sum(), 1e-300)
-        rows["centre"].append(centre)
-        arm = np.linalg.norm(x - centre, axis=1)
-        rows["energy"].append(0.5 * mass @ size**2)
-        rows["linear"].append(mass @ speed)
-        rows["angular"].append(mass @ _cross(x, speed))
-        rows["spin"].append(mass @ _cross(x - centre, speed))
-        rows["scales"].append(np.array([mass @ size, mass @ (arm * size)]))
-    scales = np.max(rows["scales"], axis=0)
+    mass = own[:, None] * share
+    weights, total = mass @ hats, float(mass.sum())
+    axes, turns = axes_of(d), 3 if d == 3 else 1
+    moved = solution.points + solution.displacement[steps]
+    sums, centres = np.zeros((len(moved), 3 + d + 2 * turns)), np.empty((len(moved), d))
+    for row, x, v in zip(range(len(moved)), moved, solution.velocity[steps], strict=True):
+        centres[row] = np.tensordot(weights, x[nodes], 2) / max(total, 1e-300)
+        v = np.ascontiguousarray(v)
+        _add_motion(x, v, nodes, hats, mass, centres[row], axes, sums[row])
+    energy, scales, linear, angular, spin = np.split(sums, np.cumsum([1, 2, d, turns]), axis=1)
     return Kinetic(
-        float(mass.sum()), np.array(rows["centre"]), np.array(rows["energy"]),
-        np.array(rows["linear"]), np.array(rows["angular"]), np.array(rows["spin"]),
-        float(scales[0]), float(scales[1]),
-    )  # fmt: skip
+        total, centres, energy[:, 0], linear, angular, spin, *scales.max(axis=0).tolist()
+    )
 
 
-def _cross(x: Array, v: Array) -> Array:
-    """Cross product (n, 3), in the plane its only component (n, 1)."""
-    return np.cross(x, v) if x.shape[1] == 3 else x[:, :1] * v[:, 1:] - x[:, 1:] * v[:, :1]
+@njit(cache=True)
+def _add_motion(x, v, nodes, hats, mass, centre, axes, sums):
+    """Add up over the points of cells: energy, both scales, linear, angular momentum, spin."""
+    d, of_cell = len(axes), np.empty(len(sums))
+    place, speed = np.empty(3), np.empty(3)
+    for m in range(len(nodes)):
+        of_cell[:] = 0.0
+        for q in range(len(hats)):
+            size2 = arm2 = 0.0
+            for a in axes:
+                place[a] = speed[a] = 0.0
+                for k in range(nodes.shape[1]):
+                    place[a] += hats[q, k] * x[nodes[m, k], a]
+                    speed[a] += hats[q, k] * v[nodes[m, k], a]
+                size2 += speed[a] ** 2
+                arm2 += (place[a] - centre[a]) ** 2
+                of_cell[3 + a] += mass[m, q] * speed[a]
+            size = np.sqrt(size2)
+            of_cell[0] += 0.5 * mass[m, q] * size2
+            of_cell[1] += mass[m, q] * size
+            of_cell[2] += mass[m, q] * np.sqrt(arm2) * size
+            at = 3 + d
+            for about in range(2):
+                if about:
+                    for a in axes:
+                        place[a] -= centre[a]
+                if d == 3:
+                    of_cell[at] += mass[m, q] * (place[1] * speed[2] - place[2] * speed[1])
+                    of_cell[at + 1] += mass[m, q] * (place[2] * speed[0] - place[0] * speed[2])
+                    at += 2
+                of_cell[at] += mass[m, q] * (place[0] * speed[1] - place[1] * speed[0])
+                at += 1
+        for i in range(len(sums)):
+            sums[i] += of_cell[i]
 
 
 def shape_functions(place: Array, k: int, order: int) -> Array:
@@ -310,23 +336,27 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
     density : float or (m,) array
         kg/m³, of a membrane times its thickness; of all cells of the solution or of each.
     """
-    corners = solution.cells[:, : solution.cell_dimension + 1]
-    facets, cell = _facets(corners)
-    _, number = np.unique(facets, axis=0, return_inverse=True)
-    link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel())))
-    link = link.tocsr()
-    _, label = connected_components(link @ link.T, directed=False)
     shape = cells_of(solution)
-    order = np.argsort(label, kind="stable")
-    starts = np.flatnonzero(np.diff(label[order])) + 1
     mass = density * shape.volume
-    parts = [_part(cells, shape.corners, mass) for cells in np.split(order, starts)]
+    parts = [_part(cells, shape.corners, mass) for cells in _connected(solution)]
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
 
     def place(part: Part) -> tuple[float, ...]:
         return tuple(-np.round(part.centre[::-1] / (_ALIKE * size)))
 
     return sorted(parts, key=place)
+
+
+@kept_with
+def _connected(solution: Solution) -> list[Ints]:
+    """Cells of each part."""
+    facets, cell = _facets(solution.cells[:, : solution.cell_dimension + 1])
+    _, number = np.unique(facets, axis=0, return_inverse=True)
+    link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel())))
+    link = link.tocsr()
+    _, label = connected_components(link @ link.T, directed=False)
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
 def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:

@@ -4,7 +4,6 @@ No metric here needs a reference: energy and momentum of the parts, and of the b
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,11 +174,7 @@ def part_quantity(
         return float(cell_strain_energies(SolutionField(solution, step), law)[cells].sum())
     if solution.velocity is None:
         raise UnsupportedSceneError(NO_VELOCITIES)
-    then = replace(
-        solution, times=solution.times[[step]], displacement=solution.displacement[[step]],
-        velocity=solution.velocity[[step]], acceleration=None, ledger={},
-    )  # fmt: skip
-    found = kinetic(then, density, cells)
+    found = kinetic(solution, density, cells, slice(step, step + 1))
     if asked.of == "kinetic_energy":
         return float(found.energy[0])
     row = found.linear[0] if asked.of == "linear_momentum" else found.spin[0]

@@ -6,6 +6,7 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from typing import Protocol
 
 import numpy as np
@@ -122,8 +123,9 @@ def assess_accuracy(
     body, missing = _body(scene, exact)
     reference = None
     if body is not None:
+        rules_for = cache(partial(Rules, body))
         records, solutions = _fit(scene, records, solutions)
-        reference, missing = _reference(scene, solutions, exact, body, law)
+        reference, missing = _reference(scene, solutions, exact, body, law, rules_for)
     measured: list[SolveRecord] = list(records)
     for level in sorted({record.level for record in records}):
         rows = [i for i, record in enumerate(records) if record.level == level]
@@ -137,8 +139,11 @@ def assess_accuracy(
         if len(before) < len(own):
             # the same points for all solvers of a level: their errors are compared
             finest = min(compared_size(s, body) for s in own.values())
-            rules = Rules(body, finest, 3 if reference else 1)
-            judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
+            alone = not scene.judged_by_exact and all(records[i].solver == REFERENCE for i in own)
+            rules = rules_for(finest, 3 if reference and not alone else 1)
+            judge_of = reference
+            if reference and rules is not reference.rules:
+                judge_of = replace(reference, motion=reference.motion.afresh())
             for i, solution in own.items():
                 if i in before:
                     continue
@@ -183,6 +188,7 @@ def _reference(
     exact: ExactField | None,
     body: AnyBody,
     law: Law,
+    rules_for: Callable[[float, int], Rules],
 ) -> tuple[Reference | None, str]:
     """Find the reference, or say why there is none."""
     try:
@@ -194,7 +200,8 @@ def _reference(
         sizes = (compared_size(s, body) for s in judged or levels.values())
         finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
-        return conforming_reference(scene, levels, body, law, finest, others), ""
+        rules = rules_for(finest, 3 if judged else 1)
+        return conforming_reference(scene, levels, body, law, rules, others), ""
     except InputError as problem:
         return None, str(problem)
 

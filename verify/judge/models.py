@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import polylines_of, triangles_of
+from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.intervals import quotient_half_width
@@ -237,7 +238,8 @@ def _differences(
     other = other_scene(scene, model)
     body = body_of(other)
     size = min((compared_size(one, body) for one in solutions.values()), default=body.size / 50)
-    known = conforming_reference(other, solutions, body, law_of(other), size).quantities
+    rules = Rules(body, size, 1)
+    known = conforming_reference(other, solutions, body, law_of(other), rules).quantities
     found = []
     for asked in scene.quantities:
         metric = next(

@@ -90,6 +90,8 @@ class Reference:
         Value and half-width per quantity of interest that it has.
     record : ReferenceRecord
         What the result says about it.
+    rules : Rules, optional
+        At the points of which the motion was asked before, and remembers what it was.
     """
 
     motion: Motion
@@ -97,6 +99,7 @@ class Reference:
     norms: dict[str, float]
     quantities: dict[str, tuple[float, float]]
     record: ReferenceRecord
+    rules: Rules | None = None
 
 
 def size_of(solution: Solution) -> float:
@@ -209,7 +212,7 @@ def conforming_reference(
     levels: Mapping[int, Solution],
     body: AnyBody,
     law: Law,
-    size: float,
+    rules: Rules,
     others: Mapping[int, Solution] | None = None,
 ) -> Reference:
     """Make the reference from conforming solutions of at least three levels.
@@ -221,9 +224,9 @@ def conforming_reference(
         The reference solver's solutions by level.
     body : Body or SolidBody
     law : Law
-    size : float
-        Element size for the quadrature of differences, m: that of the finest solution that
-        will be judged.
+    rules : Rules
+        For the quadrature of differences, of the element size of the finest solution that will be
+        judged.
     others : mapping of int to Solution, optional
         Solutions of an independent discretisation, for a second estimate of the quantities.
 
@@ -242,10 +245,9 @@ def conforming_reference(
     measured = [Measured(solution, body, law, scene) for solution in solutions]
     order = counted_order(scene, solutions[-1])
     falls = error_fall(scene, solutions, sizes, body)
-    rules = Rules(body, size, count=1)
     times = compared_times(scene, solutions[-1])
     motions = [one.motion.afresh() for one in measured]  # the middle one is asked twice
-    steps = [error_history(one, other, times, rules, law) for one, other in pairwise(motions)]
+    steps = [error_history(one, other, times, rules, law, 1) for one, other in pairwise(motions)]
     norms, entries = _field_norms([step.reported() for step in steps], sizes, order, falls)
     # functionals of a Galerkin solution converge with twice the order of its field
     doubled = 2 * (entries["energy_norm"]["order"] or 0.0)
@@ -279,7 +281,7 @@ def conforming_reference(
         metrics=metrics,
         missing=missing or None,
     )
-    return Reference(measured[-1].motion, source, norms, quantities, record)
+    return Reference(motions[-1], source, norms, quantities, record, rules)
 
 
 def _coarser(scene: Scene, solutions: Sequence[Solution]) -> str:

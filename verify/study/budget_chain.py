@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from verify.compare.body import AnyBody, Body, body_of
+from verify.compare.errors import Rules
 from verify.compare.hooke import hooke, law_of
 from verify.compare.realised import cut_deviation
 from verify.compare.sides import distance_to_cut
@@ -205,9 +206,9 @@ class References:
 
     def _measured(self, solved: Solved) -> Reference:
         levels = solved.solutions.get(REFERENCE, {})
-        law = law_of(solved.scene)
+        law, rules = law_of(solved.scene), Rules(self._body, self._size, 1)
         try:
-            return conforming_reference(self._scene, levels, self._body, law, self._size)
+            return conforming_reference(self._scene, levels, self._body, law, rules)
         except InputError as problem:
             reason = solved.reason(REFERENCE)
             kind = solved.scene.analysis.kinematics

@@ -74,7 +74,7 @@ def _judged(
 ) -> list[Trial]:
     finest = levels[max(levels)]
     size = size_of(finest) * (1 if scene.dimension == 2 else 2)  # of the quadrature
-    stated = conforming_reference(scene, levels, body, law, size)
+    stated = conforming_reference(scene, levels, body, law, Rules(body, size, 1))
     found = []
     if exact is not None:
         own = Measured(finest, body, law, scene).field
