@@ -269,16 +269,16 @@ class _Cycle:
     def __init__(self, matrix: Any, space: ConformingSpace) -> None:
         from petsc4py import PETSc
 
-        self.name, self._entries = "GAMG", []
+        self.name = "GAMG"
+        self._entries: list[Any] = []
         if space.degree == 1:
             matrix.setNearNullSpace(near_null_space(matrix, space))
             return
         shares, corners = space.interpolation_of_corners()
-        (rows, _), d = matrix.getSizes()[0], space.dimension
-        self._linear = PETSc.Mat().createAIJ(
-            ((rows, None), (d * len(corners), shares.shape[1])), comm=matrix.comm,
-            csr=(shares.indptr.astype(np.int32), shares.indices.astype(np.int32), shares.data),
-        )  # fmt: skip
+        d = space.dimension
+        sizes = (matrix.getSizes()[0], (d * len(corners), shares.shape[1]))
+        parts = (shares.indptr.astype(np.int32), shares.indices.astype(np.int32), shares.data)
+        self._linear = PETSc.Mat().createAIJ(sizes, csr=parts, comm=matrix.comm)
         self._below = matrix.PtAP(self._linear)
         self._below.setBlockSize(d)
         self._below.setOption(PETSc.Mat.Option.SPD, True)
