@@ -7,6 +7,7 @@ import pytest
 from verify.errors import InputError
 from verify.exchange import problem_of
 from verify.geometry.simplices import measures
+from verify.judge.convergence import extrapolate
 from verify.scene import load_scene, read_mesh
 from verify.scene.parts import pieces_on_part
 from verify.solvers import find_solver
@@ -201,3 +202,60 @@ def test_at_a_tip_energies_are_of_first_order_against_a_graded_reference(tmp_pat
         orders = np.log2(short[:-1] / short[1:])
         assert orders.mean() == pytest.approx(1.0, abs=0.2), (short, orders)
         assert best[-1] - best[0] < 0.1 * short[-1]
+
+
+@pytest.mark.fenicsx
+def test_where_a_body_turns_in_the_interval_covers_the_value_of_another_mesh(tmp_path):
+    """An L, turned, with a cut that ends in an arm: the reference is graded to its inner corner.
+
+    A body described by its corners is meshed and graded anew. Graded to the tip of the cut alone,
+    the energy was said to 1.2e-3, and 3.4e-3 off.
+    """
+    pytest.importorskip("dolfinx_solver")
+    mesh = rectangle_mesh((8, 8), (0.0, 0.0), (1.0, 1.0))
+    cells = mesh.cells[(mesh.points[mesh.cells].mean(axis=1) < 0.5).any(axis=1)]
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    meshio.Mesh(mesh.points @ turn, [("triangle", cells)]).write(tmp_path / "body.vtu")
+    x, y = (" + ".join(f"({c!r}) * {n}" for c, n in zip(row, "xy", strict=True))
+            for row in turn.tolist())  # fmt: skip
+    corners = np.array([[0, 0], [1, 0], [1, 0.5], [0.5, 0.5], [0.5, 1], [0, 1]]) @ turn
+    cut = f"points = {(np.array([[0.7, -0.1], [0.74, 0.21]]) @ turn).tolist()}"
+    load = f'[[loads]]\nkind = "traction"\nwhere = "{x} > 1.0 - 1e-9"\ntraction = [20.0, 50.0]\n'
+    text = CASE.format(d=2, refine=1, plane='plane = "strain"', more=load, value=[0.0, 0.0],
+                       held=f"{y} > 1.0 - 1e-9", cut=f'kind = "polyline"\n{cut}')  # fmt: skip
+    (tmp_path / "given.toml").write_text(text)
+    begin, end = text.index("[geometry]"), text.index("[material]")
+    own = f'[geometry]\nkind = "polygon"\ncorners = {corners.tolist()}\n'
+    own += '[mesh]\npattern = "unstructured"\nsizes = [0.1]\n'
+    (tmp_path / "own.toml").write_text(text[:begin] + own + text[end:])
+    solver = find_solver("reference")
+
+    def energy(name, level):
+        scene = load_scene(tmp_path / f"{name}.toml")
+        return float(solver.solve(scene, level, 0).ledger["strain"][0])
+
+    found = extrapolate([energy("given", level) for level in range(3)], [4, 2, 1], formal=4.0)
+    assert abs(energy("own", 1) - found.value) < found.half_width
+    assert found.half_width < 5e-4 * found.value
+
+
+@pytest.mark.fenicsx
+def test_in_space_a_body_turns_in_along_edges(tmp_path):
+    """A block less a quarter of it: the edge inside, and none where its ends turn by 30°."""
+    pytest.importorskip("dolfinx_solver")
+    from reference.meshing.inner_lines import singular_lines
+
+    mesh = box_mesh((4, 4, 2), (0.0,) * 3, (1.0,) * 3)
+    cells = mesh.cells[(mesh.points[mesh.cells].mean(axis=1)[:, :2] < 0.5).any(axis=1)]
+    used, number = np.unique(cells, return_inverse=True)
+    points = mesh.points[used]
+    points[:, 2] += np.tan(np.pi / 12) * np.abs(points[:, 0] - 0.25)
+    turn = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
+    blocks = [("tetra", number.reshape(-1, 4))]
+    meshio.Mesh(points @ turn, blocks).write(tmp_path / "body.vtu")
+    text = CASE.format(d=3, refine=1, plane="", more="", held="boundary", value=[0.0] * 3, cut="")
+    (tmp_path / "case.toml").write_text(text.split("[[cuts]]")[0])
+    scene = load_scene(tmp_path / "case.toml")
+    lines = singular_lines(scene, *read_mesh(scene), np.zeros((0, 3), dtype=int)) @ turn.T
+    np.testing.assert_allclose(lines[..., :2], 0.5, atol=1e-12)
+    assert np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1).sum() == pytest.approx(1.0)
