@@ -55,6 +55,14 @@ def words_of(error: BaseException, longest: int = _LONGEST) -> str:
     return one_line(f"{type(error).__name__}{': ' if said else ''}{said}", longest)
 
 
+def duration_text(seconds: float) -> str:
+    """Return a rough duration: seconds, minutes or hours, with one or two digits."""
+    for unit, length in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{max(seconds, 1.0):.2g} s" if seconds < 9.5 else f"{round(seconds, -1):.0f} s"
+
+
 def memory_text(amount: float) -> str:
     """Return bytes in the units of ``--memory``: MB, or GB from 1 on (powers of ten)."""
     return f"{amount / 1e6:.0f} MB" if amount < 0.9995e9 else f"{amount / 1e9:.3g} GB"

@@ -149,6 +149,7 @@ SCHEMA_VERSION = 1
 REFERENCE = "reference"  #: solver that judges the others, where no exact solution does
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
+FORECAST = "finer levels"  #: of those of a reference: what the levels to come are expected to take
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 #: of the notes of a solve in motion or of slivers: of central differences, undeformed body
 CRITICAL_STEP = "critical step"

@@ -247,6 +247,20 @@ def test_a_ratio_is_made_of_all_but_the_one_compared_with():
     assert by_solver(verdicts(AT_MOST_TWICE, records)) == {"mine": FAIL, "xfem": PASS}
 
 
+def test_what_a_reference_misses_that_was_left_out_is_undecided():
+    """And an error where a solver has failed as well, or the reference was not asked to stop."""
+    own = SolveRecord("a test", "xfem", 0, Status.SOLVED, notes=UNKNOWN)
+    out = SolveRecord("a test", "reference", 1, Status.REFUSED, "left out")
+    failed = SolveRecord("a test", "xfem", 1, Status.FAILED, "it died")
+    for records, expected in (
+        ([own], ERROR),
+        ([own, out], UNDECIDED),
+        ([own, failed, out], ERROR),
+        ([own, replace(out, status=Status.TIMEOUT)], ERROR),
+    ):
+        assert verdicts(BOUND, records)[0].verdict is expected
+
+
 def test_a_solver_that_refuses_the_case_is_not_judged_and_one_that_failed_is():
     refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
     failed = SolveRecord("a test", "broken", 0, Status.FAILED, "singular")

@@ -1,13 +1,26 @@
 """Costs that are expected of a case before anything is solved."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from scenes import catalogue
 
 from verify.cli import main
 from verify.cli.run_text import suites_line
-from verify.runner.cost import case_cost, mesh_of_level, solver_costs
+from verify.result import SolveRecord, Status
+from verify.runner.cost import (
+    case_cost,
+    coarser_reference,
+    finer_costs,
+    forecast_text,
+    mesh_of_level,
+    solver_costs,
+)
+from verify.runner.directory import RunDirectory
+from verify.runner.plan import levels_left_out, plan_case
+from verify.runner.selection import Options
 from verify.scene import ToolPathCut
 from verify.solvers.body_of_scene import background_mesh
 
@@ -61,7 +74,7 @@ def test_a_step_of_the_reference_s_own_is_in_its_forecast():
     levels = scene.reference.model_copy(update={"time_step": None})
     plain = scene.model_copy(update={"reference": levels})
     own, asked = (solver_costs(s, "reference")[2].seconds for s in (scene, plain))
-    assert 3.0 < own / asked < 4.1
+    assert 2.5 < own / asked < 4.1  # the process and its mesh take a part
     xfem = [solver_costs(s, "xfem")[-1].seconds for s in (scene, plain)]
     assert xfem[0] == xfem[1]
 
@@ -78,6 +91,114 @@ def test_a_step_of_the_reference_s_own_is_in_its_forecast():
 def test_unknowns_of_a_reference_lie_in_the_range_that_is_said(name, found):
     for row, unknowns in zip(solver_costs(SCENES[name], "reference"), found, strict=True):
         assert row.unknowns < unknowns < row.at_most
+
+
+# unknowns and wall seconds of the references of a run of the quick cases, coarse to fine
+RECORDED = {
+    "controls/cantilever": [(138, 0.62), (1074, 1.08), (3986, 2.26)],
+    "controls/hanging_bar": [(861, 0.71), (2568, 0.69), (22071, 1.44)],
+    "curved/s_shape": [(1686, 2.57), (5366, 3.41), (19310, 4.55)],
+    "cutting/hanging_block_quick": [(1836, 3.01), (5142, 20.7), (17664, 177.1)],
+    "cutting/plate_crossed_quick": [(1420, 1.49), (3150, 5.52), (7710, 15.1)],
+    "cutting/triangle": [(30, 0.57), (80, 0.82), (252, 1.43), (884, 4.16)],
+    "dynamics/block_falls_apart": [(1383, 1.04), (6657, 3.58), (63738, 75.5)],
+    "dynamics/cantilever_release": [(1432, 1.18), (5356, 3.01), (18866, 15.8)],
+    "dynamics/freed_half": [(1554, 2.17), (5422, 5.23), (20362, 30.1)],
+    "dynamics/plate_cut_vibrating": [(252, 0.8), (1822, 2.31), (7184, 10.8)],
+    "dynamics/two_cuts_in_turn": [(166, 0.9), (524, 1.29), (1722, 3.46)],
+    "material/layered_sleeve": [(4166, 0.71), (16010, 0.86), (62738, 1.59)],
+    "material/organ_with_nodule": [(3354, 0.54), (13010, 0.72), (51234, 1.27)],
+    "meeting/branch": [(3168, 1.06), (13382, 1.25), (52474, 2.26)],
+    "meeting/crossing": [(3418, 1.13), (12278, 1.57), (45230, 2.43)],
+    "meeting/edges_vertices_corner": [(13508, 1.45), (51360, 1.88), (200182, 4.63)],
+    "meeting/parallel_tenth": [(12806, 1.17), (42684, 1.81), (140528, 3.76)],
+    "meeting/three_through_a_point": [(4390, 2.25), (15594, 3.01), (56648, 4.38)],
+    "rotation/stretched_halves": [(260, 0.59), (936, 0.57), (3248, 0.67)],
+    "rotation/tissue_strip": [(4802, 1.59), (19138, 2.94), (74936, 9.0)],
+    "rotation/turned_apart": [(286, 0.97), (1250, 1.16), (4562, 1.54)],
+    "rotation/turned_apart_solid": [(222, 1.18), (441, 1.0), (4233, 2.61)],
+    "statics/griffith_edges": [(11048, 0.8), (43536, 1.28), (172608, 3.82)],
+    "statics/membrane_catenary": [(1080, 1.86), (3690, 3.91), (13518, 11.8)],
+    "statics/membrane_halves": [(156, 0.71), (486, 0.48), (1686, 0.68)],
+    "statics/tissue_strip": [(8944, 0.96), (34388, 1.64), (133698, 3.51)],
+}
+
+
+def solved(case, level, unknowns, wall):
+    return SolveRecord(case, "reference", level, Status.SOLVED, unknowns=unknowns, wall=wall)
+
+
+def test_finer_levels_are_forecast_within_a_factor_of_three():
+    """In nine of ten cases, from level 0 alone; and a priori in three of four."""
+    shares, before = [], []
+    for case, rows in RECORDED.items():
+        finer = finer_costs(SCENES[case], solved(case, 0, *rows[0]), len(rows))
+        shares.append(sum(row.seconds for row in finer) / sum(wall for _, wall in rows[1:]))
+        costs = solver_costs(SCENES[case], "reference")
+        before.append(sum(row.seconds for row in costs[:3]) / sum(wall for _, wall in rows[:3]))
+    assert len(shares) > 25
+    assert np.mean(np.abs(np.log(shares)) < np.log(3.0)) >= 0.9
+    assert np.mean(np.abs(np.log(before)) < np.log(3.0)) >= 0.75
+    assert 0.5 < np.median(before) < 2.0
+
+
+def test_a_slower_machine_is_told_from_the_level_that_is_solved():
+    case = "cutting/hanging_block_quick"
+    unknowns, wall = RECORDED[case][0]
+    own, slow = (
+        finer_costs(SCENES[case], solved(case, 0, unknowns, times * wall), 3) for times in (1, 10)
+    )
+    assert 5.0 < slow[1].seconds / own[1].seconds < 12.0
+    assert slow[1].memory == own[1].memory
+
+
+def test_what_will_not_end_is_said_with_what_to_change():
+    scene, case = SCENES["cutting/hanging_block_quick"], "cutting/hanging_block_quick"
+    finer = finer_costs(scene, solved(case, 0, *RECORDED[case][0]), 3)
+    calm = forecast_text(scene, finer, 3600.0, 1e12)
+    assert calm.startswith("level 1 in about ")
+    assert "not end" not in calm
+    said = forecast_text(scene, finer, 10.0, 1e12)
+    size = 4 * (scene.reference.size or np.nan)
+    assert f"level 1 may not end within 10 s (--timeout); expected 'size = {size:.3g}'" in said
+    assert "level 1 may not end within 1 MB (--memory), with about" in forecast_text(
+        scene, finer, 3600.0, 1e6
+    )
+
+
+def test_within_asks_for_larger_elements_and_leaves_a_given_mesh():
+    scene = SCENES["cutting/hanging_block_quick"]
+    whole = sum(row.seconds for row in solver_costs(scene, "reference"))
+    assert coarser_reference(scene, 1.1 * whole) == (scene, 1)
+    coarse, times = coarser_reference(scene, 0.2 * whole)
+    assert times == 2
+    assert coarse.reference.size == 2 * scene.reference.size
+    assert coarse.reference.levels == scene.reference.levels
+    assert coarser_reference(scene, 1e-3)[1] == 8
+    given = SCENES["material/organ_with_nodule"]
+    assert coarser_reference(given, 1e-3) == (given, 1)
+
+
+def test_levels_that_end_too_late_are_left_out_by_what_the_others_took(tmp_path):
+    """Never without being asked; with a bundle of solved references nothing is."""
+    case = "dynamics/block_falls_apart"
+    asked = Options(solvers=("uncut",), within=20.0)
+    plan = plan_case(SCENES[case], asked, {}, RunDirectory(tmp_path))
+    levels = [plan.job_of("reference", level) for level in range(3)]
+    records = [solved(case, k, *RECORDED[case][k]) for k in range(2)]
+    assert levels_left_out(plan, levels[0], records[:1], levels[1:])[0][0] == levels[2]
+    for solves, waiting in ((records[:1], levels[1:]), (records, levels[2:])):
+        ((job, record),) = levels_left_out(plan, levels[len(solves) - 1], solves, waiting)
+        assert job == levels[2]
+        assert record.status is Status.REFUSED
+        assert "--within asks for 20 s" in record.reason
+    quick = [replace(one, wall=0.1 * one.wall) for one in records]
+    assert not levels_left_out(plan, levels[1], quick, levels[2:])
+    unasked = plan_case(SCENES[case], replace(asked, within=None), {}, RunDirectory(tmp_path))
+    assert not levels_left_out(unasked, levels[0], records[:1], levels[1:])
+    stored = plan_case(SCENES[case], replace(asked, cache=tmp_path), {}, RunDirectory(tmp_path))
+    assert stored.bundle is not None
+    assert stored.within is None
 
 
 def test_the_smallest_suite_comes_first():

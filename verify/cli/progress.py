@@ -8,7 +8,7 @@ from typing import Protocol, TextIO
 
 from verify.cli.streams import unfiltered
 from verify.printable import one_line
-from verify.result import COMPILING, LOG, CaseResult, SolveRecord, Status
+from verify.result import COMPILING, FORECAST, LOG, CaseResult, SolveRecord, Status
 from verify.runner import Progress
 from verify.runner.comparing import comparison_label
 
@@ -106,7 +106,8 @@ def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
     if took and COMPILING in record.notes:
         took += f", of them {record.notes[COMPILING]} compiling kernels (first use)"
     if record.status is Status.SOLVED:
-        return f"{label}: solved, {record.unknowns} unknowns{took}"
+        finer = f"; {record.notes[FORECAST]}" if FORECAST in record.notes else ""
+        return f"{label}: solved, {record.unknowns} unknowns{took}{finer}"
     where = f" (see {record.notes[LOG]})" if LOG in record.notes else ""
     return one_line(f"{label}: {record.status}{took}: {record.reason}{where}")
 
@@ -202,7 +203,7 @@ class _Bars:
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         self.running.pop(label, None)
-        if record.status is not Status.SOLVED:
+        if record.status is not Status.SOLVED or "not end within" in record.notes.get(FORECAST, ""):
             self.say(_solve_text(label, record, reused))
         self._describe(1)
 

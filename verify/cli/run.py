@@ -56,6 +56,15 @@ class RunOptions:
             read=positive,
         ),
     ] = None
+    within: Annotated[
+        float | None,
+        Arg(
+            "time for the reference of each case: larger elements and fewer levels than the case "
+            "asks for, if more is expected; verdicts are then by a coarser reference",
+            "S",
+            read=positive,
+        ),
+    ] = None
     solvers: Annotated[
         Sequence[str],
         Arg(
@@ -222,6 +231,7 @@ def _options(
         cluster=asked.cluster,
         ranks=asked.ranks,
         judge_only=tuple(dict.fromkeys(map(one_name, asked.judge))),
+        within=asked.within,
     )
 
 

@@ -5,9 +5,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
-from verify.printable import memory_text, one_line
+from verify.printable import duration_text, memory_text, one_line
 from verify.result import LOG, CaseResult, Notice, Status, Verdict, VerdictRecord
-from verify.runner.cost import LevelCost, case_cost
+from verify.runner.cost import REFERENCE, LevelCost, case_cost
 from verify.runner.plan import solvers_of
 from verify.runner.selection import Options
 from verify.scene import Scene
@@ -32,6 +32,13 @@ def case_lines(costs: Sequence[LevelCost]) -> list[str]:
         rows = list(group)
         unknowns = ", ".join(_unknowns(row) for row in rows)
         lines.append(f"{solver}: about {unknowns} unknowns, {_spent(rows)}")
+    limit = duration_text(Options.timeout)
+    lines += [
+        f"level {row.level} of the reference may not end within {limit} (--timeout); expected a "
+        "larger size in [reference] of the case, a longer --timeout, or --within"
+        for row in [one for one in costs if one.seconds > Options.timeout][:1]
+        if row.solver == REFERENCE
+    ]
     return [*lines, f"in all {_spent(costs)}; rough, by mesh sizes"]
 
 
@@ -74,14 +81,6 @@ def suites_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -
             spent = _START * (2 + len(suite) / jobs) + sum(map(_seconds, suite)) / jobs
             said.append(f"`verify run {option}` ({len(suite)} cases, {duration_text(spent)})")
     return f"which suite first: {', then '.join(said)}; rough" if said else ""
-
-
-def duration_text(seconds: float) -> str:
-    """Return a rough duration: seconds, minutes or hours, with one or two digits."""
-    for unit, length in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 1.5 * length:
-            return f"{seconds / length:.2g} {unit}"
-    return f"{max(seconds, 1.0):.2g} s" if seconds < 9.5 else f"{round(seconds, -1):.0f} s"
 
 
 def _unknowns(row: LevelCost) -> str:

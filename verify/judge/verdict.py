@@ -74,7 +74,8 @@ def judge(
                 found = _judged(check, records, rates, rows)
                 found = replace(found, reference_share=_reference_share(check, records))
         except NotMeasuredError as problem:
-            found = verdict_record(check, Verdict.ERROR, str(problem))
+            verdict = Verdict.UNDECIDED if _left_out(check, records) else Verdict.ERROR
+            found = verdict_record(check, verdict, str(problem))
         found = found or verdict_record(check, Verdict.UNDECIDED, applied.not_judged)
         verdicts.append(found)
     return [_marked(scene, one) for one in verdicts + _cut_works(records, judge_only)]
@@ -181,6 +182,15 @@ def _judged(
                 text = f"the row {row:g} is not part of this run"
             return verdict_record(check, Verdict.UNDECIDED, text)
     raise TypeError(f"{check!r} is no acceptance check")
+
+
+def _left_out(check: Check, records: Sequence[SolveRecord]) -> bool:
+    """Whether all that a check misses may be levels of the reference that were asked to be out."""
+    out = [record for record in records if record.status is not Status.SOLVED]
+    own = any(record.solver == check.solver for record in out)
+    return not own and any(
+        record.solver == REFERENCE and record.status is Status.REFUSED for record in out
+    )
 
 
 def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:

@@ -2,17 +2,20 @@
 
 Unknowns follow from the numbers of nodes; those of a reference, whose mesh is graded, lie in a
 range. Seconds and bytes per unknown were measured on one core of the machine of the published
-results, over the quick cases: half of the solves took between a third and three times of what is
-said here. Nothing is meshed.
+results, over the quick cases. Nothing is meshed. Once a level of a reference is solved, the finer
+ones are forecast from its unknowns and seconds: docs/theory/reference.md has how well.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, prod, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from reference.deformation import wave_speed
+from verify.printable import duration_text, memory_text
+from verify.result import SolveRecord
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.placement import points_of_body
 from verify.solvers.interface import is_built_in, solver_in
@@ -32,6 +35,10 @@ _GRADED = {2: 3.0, 3: 1.5}  # times as many elements, where a reference is grade
 # of 81 levels of references of published runs, 72 had between 0.6 and 5 times as many unknowns;
 # more where cuts are near each other, fewer (0.55) where a mesh is fine everywhere
 _RANGE = (0.5, 5.0)
+_TYPICAL = 1.6  # times as many: the middle of that range
+_DOUBT = 0.5  # s that a level may take more or less than by its unknowns, whatever it is
+_FACTOR = 3.0  # within which forecasts are expected
+_COARSEST = 8  # times the size of elements that a case asks for
 _PER_AREA, _PER_VOLUME = 2 / sqrt(3), sqrt(2)  # nodes per h^d of equilateral triangles, tetrahedra
 
 
@@ -79,6 +86,22 @@ def body_text(scene: Scene) -> str:
     return f"{extent} m{mesh}, {volumes.sum():.3g} m{power}{mass}"
 
 
+class _Rates(NamedTuple):
+    """Seconds of a reference: setup U^power + steps (step + each U), of U unknowns."""
+
+    setup: float
+    power: float
+    step: float = 0.0
+    each: float = 0.0
+
+
+_LINEAR = {2: _Rates(1.8e-5, 1.0), 3: _Rates(1.0e-5, 1.2)}
+_ROTATION = {2: _Rates(6e-5, 1.0), 3: _Rates(2e-4, 1.1)}
+_ROTATION_OF_SKIN = _Rates(7.5e-4, 1.0)
+_LINEAR_MOTION = {2: _Rates(1.8e-5, 1.0, 4e-4, 2.0e-6), 3: _Rates(1.0e-5, 1.2, 4e-4, 5.0e-6)}
+_MOTION = {2: _Rates(2e-5, 1.0, 1.2e-3, 6e-6), 3: _Rates(2e-5, 1.2, 1.5e-3, 4e-5)}
+
+
 @dataclass(frozen=True)
 class LevelCost:
     """What a solve is expected to take.
@@ -109,29 +132,131 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
     Empty for a body whose mesh is made elsewhere (a skin). A solver of others counts as one of
     FEniCSx does.
     """
-    reference = solver == REFERENCE
-    count = scene.reference.levels if reference else scene.mesh.count
+    if solver == REFERENCE:
+        return _reference_costs(scene)
     rows = []
-    for level in range(count):
-        found = _reference_mesh(scene, level) if reference else mesh_of_level(scene, level)
+    for level in range(scene.mesh.count):
+        found = mesh_of_level(scene, level)
         if found is None:
             return []
         nodes, size = found
         unknowns = round(nodes * scene.dimension)
         heavy = solver_in(solver) in _FENICSX or not is_built_in(solver)
         work = unknowns * _SECONDS[heavy] * (_IN_SPACE if scene.cell_dimension == 3 else 1.0)
-        work *= scene.reference.degree if reference else 1  # more entries to a row
         if scene.analysis.kind == "dynamic":
-            work = max(_STEP * work, _LEAST[heavy]) * _steps(
-                scene, size, level if reference else 0, reference
-            )
+            work = max(_STEP * work, _LEAST[heavy]) * _steps(scene, size)
         else:
             work *= _ITERATIONS[scene.analysis.kinematics]
-        times = 1 if reference else 1 + repetitions
-        memory = _MEMORY[heavy] + unknowns * _BYTES * (_IN_SPACE if scene.dimension == 3 else 1.0)
-        least, most = (round(share * unknowns) for share in (_RANGE if reference else (1, 1)))
-        rows.append(LevelCost(solver, level, least, most, _BESIDE[heavy] + times * work, memory))
+        seconds = _BESIDE[heavy] + (1 + repetitions) * work
+        memory = _memory(scene, unknowns, heavy)
+        rows.append(LevelCost(solver, level, unknowns, unknowns, seconds, memory))
     return rows
+
+
+def _reference_costs(scene: Scene) -> list[LevelCost]:
+    """Estimate all levels of a reference before any is solved."""
+    rows = []
+    for level in range(scene.reference.levels):
+        found = _reference_mesh(scene, level)
+        if found is None:
+            return []
+        unknowns = found[0] * scene.dimension
+        least, most = (round(share * unknowns) for share in _RANGE)
+        seconds = _BESIDE[True] + _work(scene, level, _TYPICAL * unknowns)
+        memory = _memory(scene, round(unknowns))
+        rows.append(LevelCost(REFERENCE, level, least, most, seconds, memory))
+    return rows
+
+
+def finer_costs(scene: Scene, solved: SolveRecord, levels: int) -> list[LevelCost]:
+    """Forecast the finer ones of some levels of a reference from one that is solved.
+
+    Empty for a body whose mesh is made elsewhere (a skin).
+    """
+    known = _reference_mesh(scene, solved.level)
+    if known is None or not solved.unknowns or solved.wall is None:
+        return []
+    expected = _work(scene, solved.level, solved.unknowns)
+    slower = (max(solved.wall - _BESIDE[True], 0.0) + _DOUBT) / (expected + _DOUBT)
+    rows = []
+    for level in range(solved.level + 1, levels):
+        mesh = _reference_mesh(scene, level)
+        assert mesh is not None
+        unknowns = round(solved.unknowns * mesh[0] / known[0])
+        seconds = _BESIDE[True] + slower * _work(scene, level, unknowns)
+        memory = _memory(scene, unknowns)
+        rows.append(LevelCost(REFERENCE, level, unknowns, unknowns, seconds, memory))
+    return rows
+
+
+def forecast_text(scene: Scene, finer: Sequence[LevelCost], timeout: float, memory: float) -> str:
+    """Say what finer levels of a reference will take, and what to change where that is too much.
+
+    Parameters
+    ----------
+    scene : Scene
+    finer : sequence of LevelCost
+        Of `finer_costs`.
+    timeout, memory : float
+        Limits of a solve, s and bytes.
+    """
+    said = [f"level {row.level} in about {duration_text(row.seconds)}" for row in finer]
+    beyond = [row for row in finer if row.seconds > timeout or row.memory > memory]
+    if not beyond:
+        return ", ".join(said)
+    first = beyond[0]
+    limit = f"{duration_text(timeout)} (--timeout)"
+    if first.memory > memory:
+        limit = f"{memory_text(memory)} (--memory), with about {memory_text(first.memory)}"
+    sure = "will" if first.seconds > _FACTOR * timeout else "may"
+    change = "a mesh of fewer cells"
+    if (mesh := _reference_mesh(scene, 0)) is not None and not isinstance(scene.geometry, MeshFile):
+        change = f"'size = {2 ** len(beyond) * mesh[1]:.3g}' in [reference] of the case"
+    return (
+        f"{', '.join(said)}; level {first.level} {sure} not end within {limit}; "
+        f"expected {change}, a larger limit, or --within"
+    )
+
+
+def coarser_reference(scene: Scene, seconds: float) -> tuple[Scene, int]:
+    """Ask for elements of a reference so large that its levels are expected within some seconds.
+
+    At most eight times as large as the case asks; those of a given mesh stay.
+
+    Returns
+    -------
+    scene : Scene
+    times : int
+        How much larger they are: 1, 2, 4, 8.
+    """
+    mesh = _reference_mesh(scene, 0)
+    if scene.judged_by_exact or mesh is None or isinstance(scene.geometry, MeshFile):
+        return scene, 1
+    times, found = 1, scene
+    while times < _COARSEST and sum(row.seconds for row in _reference_costs(found)) > seconds:
+        times *= 2
+        larger = scene.reference.model_copy(update={"size": times * mesh[1]})
+        found = scene.model_copy(update={"reference": larger})
+    return found, times
+
+
+def _work(scene: Scene, level: int, unknowns: float) -> float:
+    """Seconds of a level of a reference with so many unknowns, without its process."""
+    d, linear = scene.cell_dimension, scene.analysis.kinematics == "linear"
+    if scene.analysis.kind == "dynamic":
+        rates, mesh = (_LINEAR_MOTION if linear else _MOTION)[d], _reference_mesh(scene, level)
+        assert mesh is not None
+        steps = _steps(scene, mesh[1], level, True)
+    else:
+        rates, steps = (_LINEAR if linear else _ROTATION)[d], 1.0
+        if not linear and d < scene.dimension:
+            rates = _ROTATION_OF_SKIN
+    return rates.setup * unknowns**rates.power + steps * (rates.step + rates.each * unknowns)
+
+
+def _memory(scene: Scene, unknowns: int, heavy: bool = True) -> float:
+    """Bytes of a process that solves for so many unknowns."""
+    return _MEMORY[heavy] + unknowns * _BYTES * (_IN_SPACE if scene.dimension == 3 else 1.0)
 
 
 def case_cost(scene: Scene, solvers: Sequence[str], repetitions: int = 3) -> list[LevelCost]:
@@ -187,7 +312,7 @@ def _nodes(scene: Scene, size: float) -> float:
     return float(inside + d * volume ** ((d - 1) / d) / size ** (d - 1))
 
 
-def _steps(scene: Scene, size: float, halved: int, reference: bool) -> float:
+def _steps(scene: Scene, size: float, halved: int = 0, reference: bool = False) -> float:
     """Time steps of a motion: those that are asked, or of a pressure wave across an element."""
     analysis = scene.analysis
     asked = scene.reference.time_step if reference else None

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import duration_text
 from verify.result import CaseResult, SolveRecord, Status
-from verify.runner.cost import case_cost
+from verify.runner.cost import LevelCost, case_cost, coarser_reference, finer_costs
 from verify.runner.directory import Job, RunDirectory, stored_record
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.loading import Loaded
@@ -55,6 +56,10 @@ class CasePlan:
         How many levels are expected to follow level 0, by solver.
     bundle : ReferenceBundle or None
         That the reference is taken from: of the run, or beside the case.
+    within : float or None
+        Seconds within which the levels of the reference that are solved shall end.
+    coarser : int
+        How many times as large as the case asks the elements of its reference are, to that end.
     """
 
     scene: Scene
@@ -69,6 +74,8 @@ class CasePlan:
     held: list[Job] = field(default_factory=list)
     awaited: dict[str, int] = field(default_factory=dict)
     bundle: ReferenceBundle | None = None
+    within: float | None = None
+    coarser: int = 1
 
     @property
     def count(self) -> int:
@@ -145,9 +152,12 @@ def plan_case(
     bundle: ReferenceBundle | None = None,
 ) -> CasePlan:
     """Lay out the solves of `scene` that are known before any has run."""
-    physics, solvers = physics_digest(scene), solvers_of(scene, options)
     as_stored = options.cache and not parameters_of(REFERENCE, options.parameters)
     kept = bundle or (bundle_of_case(scene) if as_stored else None)
+    coarser = 1
+    if options.within and kept is None:
+        scene, coarser = coarser_reference(scene, options.within)
+    physics, solvers = physics_digest(scene), solvers_of(scene, options)
     found = {name: loaded.get(name, Loaded()) for name in solvers}
 
     def job_of(name: str, level: int) -> Job:
@@ -164,7 +174,8 @@ def plan_case(
             parameters=parameters,
         )
 
-    plan = CasePlan(scene, solvers, job_of, bundle=kept)
+    within = None if kept else options.within
+    plan = CasePlan(scene, solvers, job_of, bundle=kept, within=within, coarser=coarser)
     for name in plan.solvers:
         job = job_of(name, 0)
         if (error := found[name].error) and not (kept and name == REFERENCE):
@@ -173,7 +184,7 @@ def plan_case(
         plan.jobs.append(job)
         expected = scene.reference.levels if name == REFERENCE else scene.mesh.count
         plan.awaited[name] = expected - 1
-    if kept is None and not scene.judged_by_exact:
+    if kept is None and not scene.judged_by_exact and not within:
         plan.most_levels = scene.reference.max_levels or 0
     if options.judged and bundle is None and scene.adequacy.models:
         folder = directory.case_folder(scene.name)
@@ -309,3 +320,42 @@ def levels_in_vain(
         f"needs {_FEWEST} levels"
     )
     return [(job, job.blank(Status.FAILED, reason)) for job in levels if job in waiting]
+
+
+def levels_to_come(plan: CasePlan, solved: Job, record: SolveRecord) -> list[LevelCost]:
+    """Forecast the finer levels of a case's own reference when one is solved."""
+    own = solved.solver == REFERENCE and not solved.model and not plan.scene.judged_by_exact
+    if not own or record.status is not Status.SOLVED:
+        return []
+    return finer_costs(plan.scene, record, plan.scene.reference.levels)
+
+
+def levels_left_out(
+    plan: CasePlan, solved: Job, records: Sequence[SolveRecord], waiting: Collection[Job]
+) -> list[tuple[Job, SolveRecord]]:
+    """List the levels of a reference that would end too late, each with a record that says so.
+
+    Parameters
+    ----------
+    plan : CasePlan
+    solved : Job
+        A level of its reference.
+    records : sequence of SolveRecord
+        Of all levels that are solved, that of `solved` last.
+    waiting : collection of Job
+        Of all cases.
+    """
+    if plan.within is None or not records:
+        return []
+    spent = sum(record.wall or 0.0 for record in records)
+    late: list[tuple[Job, SolveRecord]] = []
+    for row in levels_to_come(plan, solved, records[-1]):
+        spent += row.seconds
+        job = plan.job_of(REFERENCE, row.level)
+        if job in waiting and (late or spent > plan.within):
+            reason = (
+                f"left out: levels to {row.level} are expected to take {duration_text(spent)}, and "
+                f"--within asks for {duration_text(plan.within)}"
+            )
+            late.append((job, job.blank(Status.REFUSED, reason)))
+    return late

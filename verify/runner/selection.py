@@ -180,6 +180,9 @@ class Options:
         MPI ranks of each reference.
     judge_only : tuple of str
         Solvers that are judged; empty: all that are asked and do not refuse the case.
+    within : float or None
+        Seconds in which the reference of each case shall end: with larger elements, by a forecast
+        from the case alone, and without its finest levels, by one from those that are solved.
     judged : bool
         Whether the references that judge are solved with the rest; without them only `solvers` run.
     """
@@ -195,6 +198,7 @@ class Options:
     cluster: str | None = None
     ranks: int = 1
     judge_only: tuple[str, ...] = ()
+    within: float | None = None
     judged: bool = True
 
     def of_result(self) -> dict[str, Any]:
@@ -203,6 +207,7 @@ class Options:
             "solvers": list(self.solvers),
             "repetitions": self.repetitions,
             "parameters": self.parameters,
+            **({"within": self.within} if self.within else {}),
         }
 
     def record(self) -> dict[str, Any]:

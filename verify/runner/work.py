@@ -11,9 +11,10 @@ from typing import Any, Protocol
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line
-from verify.result import LOG, CaseResult, SolveRecord, Status, write_result
+from verify.result import FORECAST, LOG, CaseResult, SolveRecord, Status, write_result
 from verify.runner.child import POLL_SECONDS, Ending, death
 from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
+from verify.runner.cost import forecast_text
 from verify.runner.directory import (
     LEVELS,
     Job,
@@ -27,7 +28,14 @@ from verify.runner.directory import (
 )
 from verify.runner.engines import ClusterEngine, Engine, LocalEngine, Running
 from verify.runner.fingerprint import code_of_comparison, digest_of
-from verify.runner.plan import CasePlan, begun_after, further_level, levels_in_vain
+from verify.runner.plan import (
+    CasePlan,
+    begun_after,
+    further_level,
+    levels_in_vain,
+    levels_left_out,
+    levels_to_come,
+)
 from verify.runner.references import REFERENCE, ReferenceBundle, ReferenceCache
 from verify.runner.selection import Options
 from verify.scene import RatioCheck, Scene, scene_content
@@ -259,8 +267,19 @@ class Work:
             trouble = self.references.keep(self.plans[job.case].scene_of(job), job, record)
             if trouble:
                 record.notes["cache"] = trouble
+        self._foretell(job, record)
         record = self._kept(job, record)
         self._solve_done(job, record, reused=False)
+
+    def _foretell(self, job: Job, record: SolveRecord) -> None:
+        """Note what finer levels of a reference will take, and whether its elements are larger."""
+        plan = self.plans[job.case]
+        if finer := levels_to_come(plan, job, record):
+            limits = self.options.timeout, self.memory
+            record.notes[FORECAST] = forecast_text(plan.scene, finer, *limits)
+        if plan.coarser > 1 and job.solver == REFERENCE:
+            times = f"elements {plan.coarser} times as large as the case asks"
+            record.notes["within"] = f"{times}: --within {self.options.within:g}"
 
     def _kept(self, job: Job, record: SolveRecord) -> SolveRecord:
         """Store a record; its solution may be gone, or be removed by a solver later."""
@@ -307,11 +326,20 @@ class Work:
         self._wait(plan.following(job, record, levels_told(job)))
         if plan.count != before:
             self._say_plan()
-        for other, without in levels_in_vain(plan, job, record, self.waiting):
+        left_out = levels_in_vain(plan, job, record, self.waiting)
+        if job.solver == REFERENCE and "cache" not in record.notes:
+            left_out += levels_left_out(plan, job, self._levels_until(job, plan), self.waiting)
+        for other, without in left_out:
             self.waiting.remove(other)
             self.progress.solved(other.label, self._kept(other, without), reused=False)
         if not self._is_open(job.case):
             self.to_judge.append(job.case)
+
+    def _levels_until(self, job: Job, plan: CasePlan) -> list[SolveRecord]:
+        """Read the records of the levels of a reference that are solved, up to one."""
+        own = [one for one in plan.ordered() if one.solver == job.solver and one.level <= job.level]
+        records = [load_record(one.folder) for one in own if one.folder in self.records]
+        return [record for record in records if record.status is Status.SOLVED]
 
     def _restore(self, plan: CasePlan, jobs: Sequence[Job]) -> None:
         """Write anew what a solver may have removed or changed: the scene and the records."""
