@@ -557,3 +557,29 @@ def test_pieces_that_share_an_edge_alone_are_warned_of(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(text)
     err = said_by_check(tmp_path, capsys)[1]
     assert f"in 2 pieces that share no facet, the least of {len(mesh.cells)} cells around" in err
+
+
+def test_what_lies_inside_of_a_group_holds_nothing_and_it_is_said(tmp_path, capsys):
+    """Of facets between cells no solver makes a clamp; the rim of a section is none either."""
+    mesh = box_mesh((2, 2, 2), (0.0,) * 3, (1.0,) * 3)
+    points, cells = mesh.points, mesh.cells
+    first, middle = (faces(cells, np.abs(points[:, 0] - x) < 1e-9) for x in (0.0, 0.5))
+    low = points[cells].mean(axis=1)[:, 0] < 0.5
+    blocks = [("tetra", cells), ("triangle", first), ("triangle", middle)]
+    for beside, expected in ((5, "no facet of the boundary lies in 'group:part=3'"),
+                             (3, "50.0% of 'group:part=3' is inside the body")):  # fmt: skip
+        parts = [np.where(low, 1, 2), np.full(len(first), beside), np.full(len(middle), 3)]
+        meshio.Mesh(points, blocks, cell_data={"part": parts}).write(tmp_path / "body.vtu")
+        case(tmp_path, "body.vtu", None, "group:part=2", "group:part=3", "x > 0.999")
+        said = said_by_check(tmp_path, capsys, code=2 * (beside == 5))
+        assert f"supports[0]{'.where' * (beside == 5)}: {expected}" in said[1 - (beside == 5)]
+    case(tmp_path, "body.vtu", None, "group:part=2", "group:part=1", "x > 0.999")
+    said = said_by_check(tmp_path, capsys)[1]
+    assert "of the cells of 'group:part=1' their part of the boundary alone counts" in said
+    nodes = [f"{i + 1}," for i in np.flatnonzero(points[:, 0] < 0.6)]
+    file, _ = write(tmp_path, "abaqus", points, cells, low, [first, first])
+    text = (tmp_path / file).read_text() + "\n".join(["*NSET, NSET=LAYER", *nodes, ""])
+    (tmp_path / file).write_text(text)
+    case(tmp_path, file, None, "group:HARD", "group:LAYER", "x > 0.999")
+    said = said_by_check(tmp_path, capsys)[1]
+    assert "supports[0]: 1 of 18 nodes of 'group:LAYER' are inside the body" in said

@@ -265,6 +265,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
     from verify.runner.cost import body_text
     from verify.runner.mesh_faults import (
         body_notes,
+        inner_warning,
         mesh_warning,
         pieces_warning,
         unit_warning,
@@ -280,7 +281,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         error_row = {"title": None, "error": one_line(error), "body": ""}
         return {"file": file, **error_row, "notes": [], "warnings": [], "cost": []}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
-    warnings = (mesh_warning, pieces_warning, unit_warning, unused_groups)
+    warnings = (mesh_warning, pieces_warning, unit_warning, inner_warning, unused_groups)
     return {
         "file": file,
         "title": f"{scenes[0].title}{rows}",

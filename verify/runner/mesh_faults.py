@@ -7,12 +7,14 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from verify.errors import InputError
 from verify.geometry.simplices import feet, measures
 from verify.result import Notice, NoticeKind
-from verify.scene import Gravity, MeshFile, Scene, read_mesh
+from verify.scene import Gravity, MeshFile, Scene, Traction, read_mesh
 from verify.scene.geometry import GROUP
+from verify.scene.parts import pieces_on_part
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,6 +25,7 @@ _CLOSE = 1e-6
 _FLAT = 1e-9  # of the same: what lies in the plane of a triangle
 # A gap is at most as wide as coordinates of three digits leave it, and narrow beside its facets.
 _GAP, _NARROW = 1e-3, 0.1
+_INSIDE = 1e-6  # of a group: what may be left of it inside the body, as round-off
 _PARTS = {1: ("nodes", ""), 2: ("lines", "m"), 3: ("triangles", "m²"), 4: ("tetrahedra", "m³")}
 _LISTED = 5
 
@@ -154,6 +157,39 @@ def unused_groups(scene: Scene) -> str:
     return f"groups of '{scene.geometry.file}' that the case does not use: {names}"
 
 
+def inner_warning(scene: Scene) -> str:
+    """Warn of a group, at which a support or traction acts, of which much is no boundary, or ""."""
+    if not isinstance(scene.geometry, MeshFile):
+        return ""
+    skin = _Skin(*read_mesh(scene))
+    boundary = skin.points[skin.facets]
+    acting = {f"supports[{i}]": one.where for i, one in enumerate(scene.supports)}
+    acting |= {f"loads[{i}]": one.where for i, one in enumerate(scene.loads)
+               if isinstance(one, Traction)}  # fmt: skip
+    said = []
+    for key, where in acting.items():
+        if not scene.geometry.is_part(where):
+            continue
+        group = scene.geometry.body().group(where.removeprefix(GROUP))
+        if 1 in group.parts:
+            nodes = group.parts[1][:, 0]
+            away = cKDTree(boundary.reshape(-1, scene.dimension)).query(nodes)[0]
+            if inside := np.count_nonzero(away):
+                said.append(
+                    f"{key}: {inside} of {len(nodes)} nodes of '{where}' are inside the body, and "
+                    "left out"
+                )
+        elif boundary.shape[1] in group.parts:
+            pieces = pieces_on_part(scene.geometry, where, boundary)
+            on = measures(boundary) @ pieces.covered(len(boundary))
+            inside = 1.0 - on / measures(group.parts[boundary.shape[1]]).sum()
+            if inside > _INSIDE:
+                said.append(f"{key}: {inside:.1%} of '{where}' is inside the body, and left out")
+        elif not group.parts:
+            said.append(f"{key}: of the cells of '{where}' their part of the boundary alone counts")
+    return "; ".join(said)
+
+
 def _used_groups(scene: Scene) -> set[str]:
     places = [*scene.supports, *scene.loads, *scene.material.regions]
     texts = [getattr(one, "where", "") for one in places]
@@ -162,7 +198,7 @@ def _used_groups(scene: Scene) -> set[str]:
 
 def mesh_notices(scene: Scene) -> list[Notice]:
     """Return the warnings of a mesh file and what was done to it, for the record of a case."""
-    said = filter(None, [mesh_warning(scene), unit_warning(scene)])
+    said = filter(None, [mesh_warning(scene), unit_warning(scene), inner_warning(scene)])
     notices = [Notice(NoticeKind.WARNING, "mesh file", None, text) for text in said]
     if isinstance(scene.geometry, MeshFile):
         done = _done_to_the_mesh(scene)

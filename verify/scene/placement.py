@@ -3,7 +3,7 @@
 Each function says in words what is wrong, key first, or nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import combinations, product
 from typing import Any
 
@@ -150,15 +150,25 @@ def _without_facets(scene: SceneTables, facets: Array, where_it_is: str) -> str 
     points = facets.reshape(-1, scene.dimension)
     for key, where, area in _inequalities(scene):
         touched = on_part(scene.geometry, where, points, float(np.ptp(points, axis=0).max()))
+        of_facets = facets.shape[1] in _corners_of_group(scene, where)
         if area:
             acts = len(pieces_on_part(scene.geometry, where, facets).facet) > 0
         else:
-            acts = bool(touched.any() or held_facets(scene.geometry, where, facets).held.any())
+            held = held_facets(scene.geometry, where, facets).held.any()
+            acts = bool(held or (touched.any() and not of_facets))
         if not acts:
-            what = "facet" if area else "node"
-            hint = NO_POINT_LOADS if area and touched.any() else ""
+            what = "facet" if area or of_facets else "node"
+            hint = NO_POINT_LOADS if area and touched.any() and not of_facets else ""
+            hint = "; its facets are inside the body" if of_facets else hint
             return f"{key}: no {what} of the boundary lies in '{where}'{where_it_is}{hint}"
     return None
+
+
+def _corners_of_group(scene: SceneTables, where: str) -> Iterable[int]:
+    """Numbers of corners of the parts, below cells, of a group of a mesh file."""
+    if not isinstance(scene.geometry, MeshFile) or not scene.geometry.is_part(where):
+        return ()
+    return scene.geometry.body().group(where.removeprefix(GROUP)).parts
 
 
 def _boundary(scene: SceneTables) -> list[Array]:
