@@ -157,10 +157,10 @@ def cost(
         scenes = growing_scenes(scene, steps)
         # on the other mesh of this solver only the cut cells are made anew
         given = {"conforming": {"mesh": "remeshed"}} if "conforming" in asked else {}
-        start, place = perf_counter(), f"cost-{folder_of_case(scene.name)}"
+        place = f"cost-{folder_of_case(scene.name)}"
         making.announce(f"{steps} steps of the cut '{scene.cuts[0].name}', into {place}")
         results = making.run(scenes, place, asked, repetitions, given)
-        return cost_study(scene.name, results, metric, perf_counter() - start)
+        return cost_study(scene.name, results, metric)
 
     return _written("cost", answer, study)
 
@@ -291,11 +291,12 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
     def announce(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    new = not answer.out.exists()
+    new, start = not answer.out.exists(), perf_counter()
     make_directory(answer.out)  # before minutes of work
     making = Making(answer.out, announce, progress=lambda: progress_on(sys.stderr))
     try:
         found = study(making)
+        found = replace(found, seconds=perf_counter() - start)
     except InputError:
         if new:
             with suppress(OSError):  # something is in it

@@ -107,7 +107,9 @@ EXACT = 1e-7
 Solutions = Mapping[str, Solution]
 
 
-def is_field(scene: Scene, field: Field, energy: float | None = None) -> Check:
+def is_field(
+    name: str, claim: str, scene: Scene, field: Field, energy: float | None = None
+) -> Check:
     """Make a check that an answer is `field`; the strain energy of the answer is `energy`."""
     law = hooke(scene.material)
 
@@ -130,12 +132,7 @@ def is_field(scene: Scene, field: Field, energy: float | None = None) -> Check:
             return Finding(abs(found - energy), allowed, note)
         return Finding(off, EXACT)
 
-    return Check(scene.name, "", [Trial(scene.name, scene)], judge)
-
-
-def named(check: Check, name: str, claim: str) -> Check:
-    """Give a check another name, and its claim."""
-    return Check(name, claim, check.trials, check.judge)
+    return Check(name, claim, [Trial(scene.name, scene)], judge)
 
 
 def _moved(scene: Scene, solution: Solution) -> str:

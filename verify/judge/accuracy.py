@@ -5,7 +5,7 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Protocol
 
@@ -121,42 +121,18 @@ def assess_accuracy(
         raise InputError("the scene is judged by its exact solution, which was not given")
     law = law_of(scene)
     body, missing = _body(scene, exact)
-    reference = None
+    measured = [_noted(record, _named(scene, missing)) for record in records]
+    reference: Reference | None = None
     if body is not None:
         rules_for = cache(partial(Rules, body))
-        records, solutions = _fit(scene, records, solutions)
+        measured, solutions = _fit(scene, records, solutions)
         reference, missing = _reference(scene, solutions, exact, body, law, rules_for)
-    measured: list[SolveRecord] = list(records)
-    for level in sorted({record.level for record in records}):
-        rows = [i for i, record in enumerate(records) if record.level == level]
-        own = {i: s for i in rows if (s := _solved(records[i], solutions)) is not None}
-        if body is None:
-            measured = [_noted(r, _named(scene, missing)) for r in measured]
-            continue
-        before = {i: one for i in own if kept and (one := kept.measured(records[i])) is not None}
-        for i, one in before.items():
-            measured[i] = one
-        if len(before) < len(own):
-            # the same points for all solvers of a level: their errors are compared
-            finest = min(compared_size(s, body) for s in own.values())
-            alone = not scene.judged_by_exact and all(records[i].solver == REFERENCE for i in own)
-            rules = rules_for(finest, 3 if reference and not alone else 1)
-            judge_of = reference
-            if reference and rules is not reference.rules:
-                judge_of = replace(reference, motion=reference.motion.afresh())
-            for i, solution in own.items():
-                if i in before:
-                    continue
-                announce(records[i])
-                try:
-                    here = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
-                    measured[i] = _measure(records[i], here, judge_of, missing, rules, exact)
-                    if kept:
-                        kept.keep(measured[i])
-                except Exception as problem:  # a fault of the comparison costs this solve alone
-                    traceback.print_exception(problem)  # for the log
-                    why = one_line(f"{type(problem).__name__}: {problem}")
-                    measured[i] = not_compared(scene, records[i], why)
+        held = _HeldAgainst(reference, missing, exact, rules_for, announce, kept)
+        for level in sorted({record.level for record in records}):
+            own = {i: s for i, r in enumerate(measured)
+                   if r.level == level and (s := _solved(r, solutions)) is not None}  # fmt: skip
+            if own:
+                _measure_level(scene, measured, own, body, law, held)
     rates = _rates(scene, measured)
     record = reference.record if reference else ReferenceRecord("none", reason=missing)
     if record.kind == "conforming":
@@ -172,6 +148,48 @@ def assess_accuracy(
         *ringing_factors(scene, solutions.get(REFERENCE, {})),
     ]
     return result_of(scene, record, measured, rates=rates, notices=notices)
+
+
+@dataclass(frozen=True)
+class _HeldAgainst:
+    """What all solves of a case are held against, who is told, and what was measured before."""
+
+    reference: Reference | None
+    missing: str  # why there is no reference
+    exact: ExactField | None
+    rules_for: Callable[[float, int], Rules]
+    announce: Callable[[SolveRecord], None]
+    kept: Kept | None
+
+
+def _measure_level(
+    scene: Scene, measured: list[SolveRecord], own: Mapping[int, Solution], body: AnyBody,
+    law: Law, held: _HeldAgainst,
+) -> None:  # fmt: skip
+    """Measure the solves of a level, by their places among all, as far as that is to be done.
+
+    At the same points for all of them: their errors are compared.
+    """
+    reference, finest = held.reference, min(compared_size(one, body) for one in own.values())
+    alone = not scene.judged_by_exact and all(measured[i].solver == REFERENCE for i in own)
+    rules = held.rules_for(finest, 3 if reference and not alone else 1)
+    if reference and rules is not reference.rules:
+        held = replace(held, reference=replace(reference, motion=reference.motion.afresh()))
+    for i, solution in own.items():
+        record = measured[i]
+        if held.kept and (before := held.kept.measured(record)) is not None:
+            measured[i] = before
+            continue
+        held.announce(record)
+        try:
+            here = Measured(solution, body, law, scene, measured_cut(solution, body, rules))
+            measured[i] = _measure(record, here, held, rules)
+            if held.kept:
+                held.kept.keep(measured[i])
+        except Exception as problem:  # a fault of the comparison costs this solve alone
+            traceback.print_exception(problem)  # for the log
+            why = one_line(f"{type(problem).__name__}: {problem}")
+            measured[i] = not_compared(scene, record, why)
 
 
 def _body(scene: Scene, exact: ExactField | None) -> tuple[AnyBody | None, str]:
@@ -263,16 +281,9 @@ def _noted(record: SolveRecord, notes: dict[str, str]) -> SolveRecord:
     return replace(record, notes={**record.notes, **notes})
 
 
-def _measure(
-    record: SolveRecord,
-    one: Measured,
-    reference: Reference | None,
-    missing: str,
-    rules: Rules,
-    exact: ExactField | None,
-) -> SolveRecord:
+def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rules) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
-    scene = one.scene
+    scene, reference = one.scene, held.reference
     assert scene is not None
     record, other = with_cut(record, one, rules)
     if defect := _defect(scene, one):
@@ -288,7 +299,7 @@ def _measure(
     if scene.analysis.kind == "dynamic":
         account = motion_account(scene, one.solution, one.law)
         parts = part_records(scene, one.solution, account)
-        truth = exact if scene.judged_by_exact else None
+        truth = held.exact if scene.judged_by_exact else None
         size = compared_size(one.solution, one.body)
         for kept, why in (
             account_metrics(scene, account),
@@ -304,7 +315,7 @@ def _measure(
             history |= resultants_over_time(one.weak_form, scene.quantities)
         record = replace(record, account=history, parts=parts)
     if reference is None:
-        without = _named(scene, missing)
+        without = _named(scene, held.missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
     elif not own:
         errors, why, record = _errors(one, reference, rules, record, other)

@@ -163,7 +163,7 @@ def why_times_are_no_sample(results: Sequence[CaseResult], solvers: Sequence[str
     fewest = min((max(map(len, s.timings.values())) for s in own), default=_SAMPLE)
     if fewest < _SAMPLE:
         said.add(f"solves that were timed fewer than {_SAMPLE} times have no interval ({fewest})")
-    return sorted(f"{why}: by time all are tied" for why in said)
+    return sorted(said)
 
 
 def _tied(standings: Sequence[Standing]) -> list[Standing]:

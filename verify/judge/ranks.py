@@ -76,7 +76,7 @@ def rank_solvers(
 
 
 def _why_times_may_be_off(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:
-    said = why_times_are_no_sample(results, solvers)
+    said = [f"{why}: by time all are tied" for why in why_times_are_no_sample(results, solvers)]
     known = {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
     return sorted({*said, *(n for n in known if not any(why.startswith(n) for why in said))})
 

@@ -10,7 +10,6 @@ third of an element more.
 """
 
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from verify.solvers.body_of_scene import background_mesh
 from verify.study.budget_chain import JUDGED, Chain, Missing, Solve, make_chain
 from verify.study.budget_parts import Budget, Part, Times, error_budget, norm_names
 from verify.study.candidates import Candidate, cheapest_adequate, find_candidates
-from verify.study.study import Finding, Study
+from verify.study.study import Finding, Study, held
 
 Array = NDArray[np.float64]
 
@@ -207,7 +206,6 @@ def budget_study(
         If `level` or `metric` is none of the scene, the scene is played and not solved, or
         something without which there is no budget was not solved.
     """
-    start = perf_counter()
     if scene.played_only:
         raise InputError(scene.played_only, str(scene.file or scene.name))
     if quick:
@@ -239,7 +237,6 @@ def budget_study(
         notes=chain.notes,
         ends=_ends(chain, level),
         quick=quick,
-        seconds=perf_counter() - start,
     )
 
 
@@ -284,12 +281,11 @@ def _finding(budget: Budget) -> Finding:
         return Finding(topic, "every part and the total are round-off.", expected, Verdict.PASS)
     parts = [f"{part.source} {_said(part)}" for part in budget.parts]
     known = total.round_off or total.uncertainty < 0.1 * abs(total.value)
-    verdict = Verdict.PASS if budget.closes else Verdict.FAIL
     return Finding(
         topic,
         f"{'; '.join(parts)}; total {_said(total)}. Most of it: {budget.largest.source}.",
         expected,
-        verdict if known or not budget.closes else Verdict.UNDECIDED,
+        held(budget.closes if known or not budget.closes else None),
     )
 
 

@@ -1,6 +1,6 @@
 """The cost study: a cut grows, every solver follows it, and they are compared at equal accuracy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,14 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
+from verify.judge.cost import (
+    WorkPoint,
+    pareto_front,
+    time_at,
+    why_times_are_no_sample,
+    work_points,
+)
 from verify.judge.models import changed
-from verify.result import CaseResult, SolveRecord, Status, Verdict
+from verify.result import REFERENCE, CaseResult, Status, Verdict, ranked_solvers
 from verify.scene import PolylineCut, Scene
-from verify.study.study import Finding, Study
+from verify.study.study import Finding, Study, held
 
-REFERENCE = "reference"
-SAMPLE = 3  # repetitions from which on their range bounds a time
+_LEFT_OUT = ("case", "solver", "level", "status", "reason")
+type _Times = tuple[float, float, float]  # median, least, most, s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +50,7 @@ class CostStudy(Study):
     case: str
     metric: str
     steps: list[dict[str, Any]]
-    running: dict[str, list[tuple[float, float, float] | None]]
+    running: dict[str, list[_Times | None]]
     points: list[dict[str, Any]]
     front: list[tuple[str, int]]
     left_out: list[dict[str, Any]]
@@ -61,9 +67,7 @@ class CostStudy(Study):
         ]  # fmt: skip
 
 
-def cost_study(
-    case: str, results: Sequence[CaseResult], metric: str, seconds: float = 0.0
-) -> CostStudy:
+def cost_study(case: str, results: Sequence[CaseResult], metric: str) -> CostStudy:
     """Compare the cost of the solvers over the steps of a growing cut.
 
     At each step the wanted error is the least that every solver reaches on some level; the time
@@ -76,10 +80,9 @@ def cost_study(
         Of the steps, in order.
     metric : str
         The relative error that is held equal.
-    seconds : float
-        Wall time of all solves, for the record.
     """
-    steps, sums = [], _Running()
+    steps: list[dict[str, Any]] = []
+    running: dict[str, list[_Times | None]] = {}
     for number, result in enumerate(results, start=1):
         own = [record for record in result.solves if record.solver != REFERENCE]
         points = _by_solver(work_points(own, metric))
@@ -89,12 +92,12 @@ def cost_study(
         times = {name: time_at(points.get(name, []), wanted) for name in names}
         once = {name: max((p.once for p in points.get(name, [])), default=0.0) for name in names}
         steps.append({"step": number, "error": wanted, "times": times})
-        sums.add(times, once)
+        for name, step in times.items():
+            _add(running.setdefault(name, []), step, once[name])
     last = [record for record in results[-1].solves if record.solver != REFERENCE]
     final = work_points(last, metric)
-    notes = [r.notes.get("timing", "") for result in results for r in result.solves]
-    contended = next((note for note in notes if note), "") or _too_few(results)
-    running = sums.sums
+    contended = "; ".join(why_times_are_no_sample(results, ranked_solvers(results)))
+    unsolved = [r for result in results for r in result.solves if r.status is not Status.SOLVED]
     return CostStudy(
         case=case,
         metric=metric,
@@ -102,33 +105,19 @@ def cost_study(
         running=running,
         points=[asdict(point) for point in final],
         front=[(p.solver, p.level) for p in pareto_front(final)],
-        left_out=[_reason(r) for result in results for r in result.solves if _failed(r)],
-        findings=_findings(running, steps, metric, contended, final),
+        left_out=[{name: getattr(r, name) for name in _LEFT_OUT} for r in unsolved],
+        findings=list(_findings(running, steps, metric, contended, final)),
         contended=contended,
-        seconds=seconds,
     )
 
 
-class _Running:
-    """Time so far, per solver."""
-
-    def __init__(self) -> None:
-        self.sums: dict[str, list[tuple[float, float, float] | None]] = {}
-
-    def add(
-        self,
-        times: Mapping[str, tuple[float, float, float] | None],
-        once: Mapping[str, float],
-    ) -> None:
-        """Add a step."""
-        for name, step in times.items():
-            own = self.sums.setdefault(name, [])
-            before = own[-1] if own else (once[name],) * 3
-            together = None
-            if before is not None and step is not None:
-                a, b, c = (x + y for x, y in zip(before, step, strict=True))
-                together = (a, b, c)
-            own.append(together)
+def _add(sums: list[_Times | None], step: _Times | None, once: float) -> None:
+    """Add a step to the sums of a solver, the first with what is paid once; None from then on."""
+    before = sums[-1] if sums else (once, once, once)
+    if before is None or step is None:
+        sums.append(None)
+    else:
+        sums.append((before[0] + step[0], before[1] + step[1], before[2] + step[2]))
 
 
 def _by_solver(points: Sequence[WorkPoint]) -> dict[str, list[WorkPoint]]:
@@ -138,80 +127,42 @@ def _by_solver(points: Sequence[WorkPoint]) -> dict[str, list[WorkPoint]]:
     return found
 
 
-def _failed(record: SolveRecord) -> bool:
-    return record.status is not Status.SOLVED
-
-
-def _reason(record: SolveRecord) -> dict[str, Any]:
-    return {
-        "case": record.case,
-        "solver": record.solver,
-        "level": record.level,
-        "status": str(record.status),
-        "reason": record.reason,
-    }
-
-
-def _too_few(results: Sequence[CaseResult]) -> str:
-    """Say that the repetitions are no sample: two have a range that says nothing of a third."""
-    timed = [r for result in results for r in result.solves if r.timings and r.solver != REFERENCE]
-    fewest = min((max(map(len, r.timings.values())) for r in timed), default=SAMPLE)
-    return f"of {fewest} repetitions; {SAMPLE} are a sample" if fewest < SAMPLE else ""
-
-
 def _findings(
-    running: Mapping[str, Sequence[tuple[float, float, float] | None]],
+    running: Mapping[str, Sequence[_Times | None]],
     steps: Sequence[Mapping[str, Any]],
     metric: str,
     contended: str,
     final: Sequence[WorkPoint],
-) -> list[Finding]:
-    ends = {name: sums[-1] for name, sums in running.items() if sums and sums[-1] is not None}
-    found = []
-    if "xfem" in ends:
-        own = ends["xfem"]
-        for name, other in ends.items():
-            if name == "xfem" or own is None or other is None:
-                continue
-            least, most = other[1] / own[2], other[2] / own[1]
-            verdict = Verdict.PASS if least > 1 else Verdict.FAIL if most < 1 else Verdict.UNDECIDED
-            if contended and least < 2.0 and most > 0.5:
-                verdict = Verdict.UNDECIDED
-            found.append(
-                Finding(
-                    f"running cost over {len(steps)} steps, {name}",
-                    f"At equal {metric.replace('_', ' ')} ({steps[-1]['error']:.2g} at the last "
-                    f"step) {name} takes {other[0]:.3g} s and XFEM {own[0]:.3g} s: "
-                    f"{other[0] / own[0]:.3g} times as much (between {least:.3g} and {most:.3g} "
-                    "over the repetitions)." + (f" Times are {contended}." if contended else ""),
-                    "XFEM is the cheaper, with all of the spread",
-                    verdict,
-                )
-            )
+) -> Iterator[Finding]:
+    ends = {name: sums[-1] for name, sums in running.items() if sums}
+    own, said = ends.get("xfem"), f" Of the times: {contended}." if contended else ""
+    for name, other in ends.items():
+        if name == "xfem" or own is None or other is None:
+            continue
+        least, most = other[1] / own[2], other[2] / own[1]
+        near = least < 2.0 and most > 0.5 if contended else least <= 1.0 <= most
+        yield Finding(
+            f"running cost over {len(steps)} steps, {name}",
+            f"At equal {metric.replace('_', ' ')} ({steps[-1]['error']:.2g} at the last "
+            f"step) {name} takes {other[0]:.3g} s and XFEM {own[0]:.3g} s: "
+            f"{other[0] / own[0]:.3g} times as much (between {least:.3g} and {most:.3g} "
+            f"over the repetitions).{said}",
+            "XFEM is the cheaper, with all of the spread",
+            held(None if near else least > 1.0),
+        )
     for name, sums in running.items():
         if sums and sums[-1] is None:
-            step = next(i for i, entry in enumerate(sums, start=1) if entry is None)
-            found.append(
-                Finding(
-                    f"running cost, {name}",
-                    f"{name} has no time at step {step}: none of its levels was solved, measured "
-                    "and accurate enough.",
-                    "a time at every step",
-                    Verdict.UNDECIDED,
-                )
+            yield Finding(
+                f"running cost, {name}",
+                f"{name} has no time at step {1 + sums.index(None)}: none of its levels was "
+                "solved, measured and accurate enough.",
+                "a time at every step",
+                Verdict.UNDECIDED,
             )
-    front = pareto_front(final)
-    if front:
-        said = ", ".join(f"{p.solver} level {p.level}" for p in front)
-        found.append(
-            Finding(
-                "Pareto front at the last step",
-                f"No other solve is both faster and more accurate than {said}.",
-                "shown, not judged",
-                None,
-            )
-        )
-    return found
+    if front := pareto_front(final):
+        names = ", ".join(f"{p.solver} level {p.level}" for p in front)
+        text = f"No other solve is both faster and more accurate than {names}."
+        yield Finding("Pareto front at the last step", text, "shown, not judged", None)
 
 
 def growing_scenes(scene: Scene, steps: int) -> list[Scene]:

@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from verify.scene import Scene, ValueCheck, restore_scene, scene_content
 from verify.solution import handed_over
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import checked_refusal, one_name, parameters_in, solver_in
-from verify.study.study import Finding, Making, Study
+from verify.study.study import Finding, Making, Study, held
 
 AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
 
@@ -268,12 +267,8 @@ def energy_study(
             cases.setdefault(name, []).append(scene)
     if not cases:
         raise InputError("no case with a dynamic analysis; see `verify list`")
-    start = perf_counter()
     every = measured_families("energy", measured_scene, cases, variants, making)
-    return MeasuredStudy(
-        findings=list(_findings(every)), seconds=perf_counter() - start, quick=quick,
-        measurements=every,
-    )  # fmt: skip
+    return MeasuredStudy(findings=list(_findings(every)), quick=quick, measurements=every)
 
 
 def _findings(measured: Sequence[Measurement]) -> Iterator[Finding]:
@@ -297,18 +292,16 @@ def account_findings(topic: str, own: Sequence[Measurement]) -> Iterator[Finding
         values = {m.size: m.value or 0.0 for m in own if m.quantity == "energy_drift"}
         most = max([*tops.values(), value])
         least = max(2 * v - tops.get(size, v) for size, v in values.items())
-        verdict = Verdict.PASS if most <= _DRIFT else Verdict.FAIL
-        if least <= _DRIFT < most:
-            verdict = Verdict.UNDECIDED
-            text += f" Its interval reaches up to {most:.2g}."
-        yield Finding(topic, text, f"at most {_DRIFT:g} over the run", verdict)
+        kept = None if least <= _DRIFT < most else most <= _DRIFT
+        text += "" if kept is not None else f" Its interval reaches up to {most:.2g}."
+        yield Finding(topic, text, f"at most {_DRIFT:g} over the run", held(kept))
     for name in dict.fromkeys(m.quantity for m in own if m.quantity.startswith("deviation of")):
         found, limit = _worst(own, name), min(m.limit or 0.0 for m in own if m.quantity == name)
         if found is not None:
             value, at = found
-            verdict = Verdict.PASS if value <= limit else Verdict.FAIL
             text = f"The {name} from the value that the case states is {value:.2g}{at}."
-            yield Finding(topic, text, f"at most {limit:g}, as the case asks", verdict)
+            expected = f"at most {limit:g}, as the case asks"
+            yield Finding(topic, text, expected, held(value <= limit))
 
 
 def _worst(own: Sequence[Measurement], quantity: str) -> tuple[float, str] | None:

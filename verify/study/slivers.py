@@ -3,9 +3,8 @@
 Its findings say what errors, conditioning and explicit steps do as the parameter of a family falls.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from verify.study.measured_scenes import (
     missing_solutions,
 )
 from verify.study.step_by_running import step_by_running
-from verify.study.study import Finding, Making
+from verify.study.study import Finding, Making, held
 from verify.system import (
     CONDITION,
     FREQUENCY,
@@ -85,13 +84,10 @@ def sliver_study(
             families.setdefault(scene.row.family, []).append(scene)
     if not families:
         raise InputError("no case with a list of values for a parameter; see `verify list`")
-    start = perf_counter()
     every = measured_families("slivers", measured_row, families, variants, making)
     growths = _growths(every)
-    return SliverStudy(
-        findings=list(findings(every, growths)), seconds=perf_counter() - start, quick=quick,
-        measurements=every, growths=growths,
-    )  # fmt: skip
+    found = list(findings(every, growths))
+    return SliverStudy(findings=found, quick=quick, measurements=every, growths=growths)
 
 
 def measured_row(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
@@ -279,8 +275,7 @@ def _near(topic: str, error: str, values: Values) -> Iterator[Finding]:
     worst = max(small, key=lambda e: abs(small[e] / base - 1.0))
     off = small[worst] / base - 1.0
     text = f"{error} at ε = {worst:g} is {small[worst]:.4g}, {off:+.2%} from that at ε = 0."
-    verdict = Verdict.PASS if abs(off) <= _NEAR_LIMIT else Verdict.FAIL
-    yield Finding(topic, text, expected, verdict)
+    yield Finding(topic, text, expected, held(abs(off) <= _NEAR_LIMIT))
 
 
 def _far(topic: str, error: str, values: Values, others: Values) -> Iterator[Finding]:
@@ -289,8 +284,8 @@ def _far(topic: str, error: str, values: Values, others: Values) -> Iterator[Fin
         return
     worst = max(both, key=lambda e: both[e])
     text = f"{error} at ε = {worst:g} is {both[worst]:.3f} times that of the conforming mesh."
-    verdict = Verdict.PASS if both[worst] <= _FAR_LIMIT else Verdict.FAIL
-    yield Finding(topic, text, f"at most {_FAR_LIMIT:g}, for ε > {NEAR:g}", verdict)
+    expected = f"at most {_FAR_LIMIT:g}, for ε > {NEAR:g}"
+    yield Finding(topic, text, expected, held(both[worst] <= _FAR_LIMIT))
 
 
 def _frequency(topic: str, own: Sequence[Measurement], solver: str) -> Iterator[Finding]:
@@ -310,14 +305,10 @@ def _system(
     if steps and whole:
         least = min(steps, key=lambda e: steps[e])
         text = f"The critical step is least at ε = {least:g}: {steps[least] / whole:.3g} of that "
-        kept = Verdict.PASS if steps[least] >= _STEP_LIMIT * whole else Verdict.FAIL
+        kept = held(steps[least] >= _STEP_LIMIT * whole)
         expected = f"at least {_STEP_LIMIT:g} of the uncut body's"
         yield Finding(topic, f"{text}of the uncut body.", expected, kept)
-    judged: dict[str, Callable[[float], Verdict | None]] = {
-        CONDITION: lambda ratio: None,
-        SCALED: lambda ratio: Verdict.PASS if ratio <= _SCALED_LIMIT else Verdict.FAIL,
-    }
-    for quantity, judge in judged.items():
+    for quantity in (CONDITION, SCALED):
         values = _values(own, solver, quantity)
         if not values:
             continue
@@ -328,5 +319,8 @@ def _system(
         )  # fmt: skip
         grows = f", ∝ ε^{law['exponent']:.2f}" if law.get("exponent") is not None else ""
         text = f"The {quantity} is {low:.3g} to {high:.3g}{grows}."
-        expected = f"bounded: at most {_SCALED_LIMIT:g} times its least"
-        yield Finding(topic, text, expected if quantity == SCALED else "shown", judge(high / low))
+        if quantity == CONDITION:
+            yield Finding(topic, text, "shown", None)
+        else:
+            expected = f"bounded: at most {_SCALED_LIMIT:g} times its least"
+            yield Finding(topic, text, expected, held(high / low <= _SCALED_LIMIT))

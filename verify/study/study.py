@@ -50,6 +50,11 @@ class Finding:
     verdict: Verdict | None
 
 
+def held(kept: bool | None) -> Verdict:
+    """Return the verdict on a limit that is kept, broken, or neither for certain (None)."""
+    return Verdict.UNDECIDED if kept is None else Verdict.PASS if kept else Verdict.FAIL
+
+
 SCHEMA = 1
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from time import perf_counter
 from typing import Any
 
 from verify.judge.models import coarsest
@@ -117,7 +116,6 @@ def thesis_study(making: Making, quick: bool) -> ThesisStudy:
     ChildProcessError
         If a table cannot be measured; what is finished is kept.
     """
-    start = perf_counter()
     names, solvers = (CASES[:2], SOLVERS[:4]) if quick else (CASES, SOLVERS)
     scenes = [coarsest(load_scene(name), 2 if quick else 3) for name in names]
     making.announce(f"{len(solvers)} solvers on {', '.join(names)}, into thesis-cases")
@@ -148,9 +146,7 @@ def thesis_study(making: Making, quick: bool) -> ThesisStudy:
         methods=compare_methods(results, [one for _ in steps for one in next(rest)]),
     )
     findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
-    return ThesisStudy(
-        findings=findings, seconds=perf_counter() - start, measured=measured, quick=quick
-    )
+    return ThesisStudy(findings=findings, measured=measured, quick=quick)
 
 
 def _tables(quick: bool) -> dict[str, Task]:

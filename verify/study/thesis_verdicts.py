@@ -13,7 +13,7 @@ from verify.simulator.thesis import (
     StepTime,
     StripCount,
 )
-from verify.study.study import Finding
+from verify.study.study import Finding, held
 from verify.study.thesis_measured import Measured, MethodOnCase, SliverSystem, exponent
 
 _NEAR = 0.2  # of the thesis' increments: another face, other strokes, two nodes less for each end
@@ -33,10 +33,6 @@ def verdicts_on_cost(measured: Measured) -> list[Finding]:
     ]
 
 
-def _said(kept: bool) -> Verdict:
-    return Verdict.PASS if kept else Verdict.FAIL
-
-
 def _unknowns(strips: Sequence[StripCount], face: Sequence[FaceCount]) -> Iterator[Finding]:
     off = [strip for strip in strips if strip.enriched != strip.triangles + 2]
     longest = max(strip.triangles for strip in strips)
@@ -45,7 +41,7 @@ def _unknowns(strips: Sequence[StripCount], face: Sequence[FaceCount]) -> Iterat
         f"{len(strips) - len(off)} of {len(strips)} strips of up to {longest} triangles cut "
         "along, on four patterns of diagonals, enrich two nodes more than triangles",
         "n cut triangles enrich n + 2 nodes, exactly",
-        _said(not off),
+        held(not off),
     )
     last = face[-1]
     far = [row for row in face if row.asked >= 50] or [last]
@@ -58,7 +54,7 @@ def _unknowns(strips: Sequence[StripCount], face: Sequence[FaceCount]) -> Iterat
         f"from {far[0].asked} cuts on; counted at once and while cutting "
         f"{'the same' if played else 'not the same'}",
         f"within {_NEAR:.0%} of the thesis from 50 cuts on",
-        _said(played and all(abs(share - 1.0) <= _NEAR for share in shares)),
+        held(played and all(abs(share - 1.0) <= _NEAR for share in shares)),
     )
     ours, theirs = last.added["xfem"], last.added["snapping_subdivision 0.02"]
     ratio, known = ours / theirs, last.thesis["xfem"] / last.thesis["snapping_subdivision"]
@@ -68,7 +64,7 @@ def _unknowns(strips: Sequence[StripCount], face: Sequence[FaceCount]) -> Iterat
         f"of an edge, that is {ratio:.2f} (thesis: {known:.2f}); subdivision alone "
         f"{last.added['subdivision']}",
         "about half: 0.4 to 0.65",
-        _said(0.4 <= ratio <= 0.65),
+        held(0.4 <= ratio <= 0.65),
     )
     others = {name: n for name, n in last.added.items() if name.startswith("snapping")}
     least = min(others, key=lambda name: others[name])
@@ -77,7 +73,7 @@ def _unknowns(strips: Sequence[StripCount], face: Sequence[FaceCount]) -> Iterat
         "fewer unknowns: the catch",
         f"by threshold {at}; nodes only moved onto the cut: {others['snapping']}; XFEM {ours}",
         "XFEM adds fewer nodes than whatever snaps, at every threshold",
-        _said(ours < others[least]),
+        held(ours < others[least]),
     )
 
 
@@ -96,7 +92,7 @@ def _steps(steps: Sequence[StepTime]) -> Iterator[Finding]:
         "part of it: theirs is of 2009, one core of 2 GHz. In 60 steps it would be "
         f"{1e3 * 60 * column[-1].step:.0f} ms",
         f"beaten by {_BEATEN:.0f} times",
-        _said(min(faster) >= _BEATEN),
+        held(min(faster) >= _BEATEN),
     )
     pairs = [
         (cut, bare)
@@ -111,7 +107,7 @@ def _steps(steps: Sequence[StepTime]) -> Iterator[Finding]:
         f"{last} cuts make a step {min(dearer):.2f} to {max(dearer):.2f} times as long as on the "
         f"uncut mesh (thesis: {min(known):.2f} to {max(known):.2f})",
         "less than in the thesis on every mesh",
-        _said(all(ours < theirs for ours, theirs in zip(dearer, known, strict=True))),
+        held(all(ours < theirs for ours, theirs in zip(dearer, known, strict=True))),
     )
     added = [(cut.nodes - bare.nodes) / cut.cuts for cut, bare in pairs]
     yield Finding(
@@ -119,16 +115,14 @@ def _steps(steps: Sequence[StepTime]) -> Iterator[Finding]:
         f"a cut element adds {min(added):.2f} to {max(added):.2f} nodes; the thesis' columns are "
         "the uncut mesh and exactly 50 per 50 cuts, which is an assumption and no count",
         "one node per cut at most",
-        _said(max(added) <= 1.0),
+        held(max(added) <= 1.0),
     )
 
 
 def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
     for name, limit in LIMITS.items():
         kept = hand.within[name] == 1.0
-        verdict = _said(kept)
-        if not kept and contended and hand.slowest <= _CONTENDED * limit:
-            verdict = Verdict.UNDECIDED
+        doubted = not kept and contended and hand.slowest <= _CONTENDED * limit
         yield Finding(
             f"real time: every step within {name}",
             f"{hand.within[name]:.1%} of {hand.steps} steps in processor time of one thread "
@@ -140,7 +134,7 @@ def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
             f"inner surface, mapping and collision included; kernel {1e3 * hand.kernel:.1f} ms"
             + (f" ({contended})" if contended else ""),
             f"all steps within {name}, on one core",
-            verdict,
+            held(None if doubted else kept),
         )
     yield Finding(
         "stable: the hand while it is cut and pulled open",
@@ -148,7 +142,7 @@ def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
         f"{hand.inverted} elements or facets inside out, energy beyond the work done "
         f"{hand.energy_gain:.1e} of it",
         "1e-12, none, none, 1e-9",
-        _said(
+        held(
             hand.volume_error <= 1e-12
             and hand.loose_edges == hand.inverted == 0
             and hand.energy_gain <= _SAME
@@ -164,7 +158,7 @@ def _delays(delays: Sequence[Delay], frames: Sequence[Frames]) -> Iterator[Findi
         f"with frames of {lengths} ms instead of 16.7 ms every delay is the same to {worst:.1e}; "
         f"on the screen an element opens up to {late:.2f} frames later",
         "the same to 1e-9; at most one frame later",
-        _said(worst <= _SAME and late <= 1.0 + _SAME),
+        held(worst <= _SAME and late <= 1.0 + _SAME),
     )
     size = [row.delay * row.speed / row.edge for row in delays]
     spread = max(size) / min(size) - 1.0
@@ -177,7 +171,7 @@ def _delays(delays: Sequence[Delay], frames: Sequence[Frames]) -> Iterator[Findi
             for name, speed in {row.speed_name: row.speed for row in delays}.items()
         ),
         f"one number within {_ROUND:.0%}",
-        _said(spread <= _ROUND),
+        held(spread <= _ROUND),
     )
     fall = {name: _fall(delays, name) for name in SPEEDS}
     said = ", ".join(f"{name} {theirs:.2f}" for name, (theirs, _) in fall.items())
@@ -190,7 +184,7 @@ def _delays(delays: Sequence[Delay], frames: Sequence[Frames]) -> Iterator[Findi
         "two steps that its Table 4.4 takes for a second (0.14 to 1.39 s): they were not measured "
         "in the same setting",
         f"all three within {_ROUND:.0%} of {ours:.2f}",
-        _said(all(abs(theirs / ours - 1.0) <= _ROUND for theirs, _ in fall.values())),
+        held(all(abs(theirs / ours - 1.0) <= _ROUND for theirs, _ in fall.values())),
     )
 
 
@@ -238,9 +232,7 @@ def _slivers(steps: Sequence[SliverSystem]) -> Iterator[Finding]:
             f"critical step is at least {least:.3g} of that of the uncut body, with exponents "
             f"{exponents}",
             f"at least {_KEPT} of the uncut step, exponent within {_FLAT} of 0",
-            Verdict.PASS
-            if least >= _KEPT and all(abs(slope) <= _FLAT for slope in slopes.values())
-            else Verdict.FAIL,
+            held(least >= _KEPT and all(abs(slope) <= _FLAT for slope in slopes.values())),
         )
 
 
@@ -255,7 +247,7 @@ def _face(row: FaceCount) -> Finding:
         f"{row.cuts} cut elements, critical explicit step over that of the uncut face (smallest "
         f"element or piece over its element): {said}",
         f"XFEM at least {_KEPT}, and more than whatever divides elements",
-        Verdict.PASS if kept else Verdict.FAIL,
+        held(kept),
     )
 
 
@@ -291,7 +283,6 @@ def _accuracy(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
             words.append(f"{title} {one[0]:.3g} against {other[0]:.3g}")
         kept = bool(ratios) and all(high <= 1.0 for _, high in ratios)
         broken = any(low > 1.0 for low, _ in ratios)
-        verdict = Verdict.PASS if kept else Verdict.FAIL if broken else Verdict.UNDECIDED
         steps = {r.solver: r.critical_step for r in finest.values() if r.critical_step}
         said = ", ".join(f"{name} {step:.2g}" for name, step in steps.items())
         yield Finding(
@@ -300,7 +291,7 @@ def _accuracy(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
             f"{finest['xfem'].level}: {'; '.join(words) or 'none measured'}. "
             f"Critical steps over that of the uncut mesh: {said}",
             f"at most {limits[0]:g} (L²) and {limits[1]:g} times (energy norm) the conforming one",
-            verdict,
+            held(kept if kept or broken else None),
         )
 
 
@@ -319,7 +310,7 @@ def _wrong(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
             f"within {_TIPS:g} times XFEM's error: {', '.join(good)}; worse: "
             + (", ".join(f"{name} {ratio:.0f} times" for name, ratio in bad.items()) or "none"),
             f"every method within {_TIPS:g} times",
-            Verdict.FAIL if bad else Verdict.PASS,
+            held(not bad),
         )
         if _TIP_CASE in case:
             yield from _tips(methods, case)
@@ -348,7 +339,7 @@ def _tips(methods: Sequence[MethodOnCase], case: str) -> Iterator[Finding]:
         + " times that of a conforming mesh whose node is the tip, from coarse to fine; "
         f"{rows['xfem'][levels[0]].changed or 'nothing else changed'}",
         f"at most {_AS_GOOD:g} times",
-        Verdict.PASS if max(ratios) <= _AS_GOOD else Verdict.FAIL,
+        held(max(ratios) <= _AS_GOOD),
     )
 
 
@@ -362,5 +353,5 @@ def _small(pieces: Sequence[SliverSystem]) -> Iterator[Finding]:
             f"goes from {first.condition:.1e} to {last.condition:.1e}; scaled by its diagonal it "
             f"goes from {first.scaled:.0f} to {last.scaled:.0f}",
             "condition number after scaling less than twice that at the first ε",
-            Verdict.PASS if last.scaled <= 2.0 * first.scaled else Verdict.FAIL,
+            held(last.scaled <= 2.0 * first.scaled),
         )
