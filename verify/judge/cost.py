@@ -73,12 +73,10 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
         measured = record.metric(metric)
         if record.status is not Status.SOLVED or measured is None or not record.timings:
             continue
-        once = ONCE.get(record.solver, ())
-        error = error_interval(measured)
-        paid = {name: times for name, times in record.timings.items() if name not in once}
-        totals = [sum(times) for times in zip(*paid.values(), strict=False)]
+        totals = paid_times(record)
         if not totals:
             continue
+        error, once = error_interval(measured), ONCE.get(record.solver, ())
         points.append(
             WorkPoint(
                 solver=record.solver,
@@ -96,6 +94,13 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
             )
         )
     return points
+
+
+def paid_times(record: SolveRecord) -> list[float]:
+    """Return the wall time of what each cut costs anew, s, by repetition."""
+    once = ONCE.get(record.solver, ())
+    paid = [times for name, times in record.timings.items() if name not in once]
+    return [sum(times) for times in zip(*paid, strict=False)]
 
 
 def time_at(points: Sequence[WorkPoint], error: float) -> tuple[float, float, float] | None:

@@ -5,9 +5,9 @@ reason. Its change is then part of the next link that can be made, which says so
 still add up to the total.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -39,23 +39,9 @@ from verify.study.study import Solved
 REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
 
 
-class Solve(Protocol):
-    """Runs scenes."""
-
-    def __call__(
-        self,
-        scenes: Sequence[Scene],
-        place: str,
-        solvers: tuple[str, ...],
-        parameters: Mapping[str, Mapping[str, Any]] | None = None,
-        timed: bool = False,
-    ) -> list[Solved]:
-        """Solve all levels of `scenes` by `solvers` with `parameters`, and by no others.
-
-        `place` names what is kept of it for later; `timed` runs are repeated.
-        """
-        ...
-
+# Of scenes, a place, solvers, their parameters and whether they are timed: solves all levels by
+# these solvers and no others. The place names what is kept of it; timed runs are repeated.
+type Solve = Callable[..., list[Solved]]
 
 _SAME = 1e-9  # of the body's size
 

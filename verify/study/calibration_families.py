@@ -113,7 +113,9 @@ class Family:
             "levels": self.levels,
             "degree": self.degrees[index % len(self.degrees)],
         }
-        return Scene.model_validate({**content, "reference": reference}), values
+        demand = "The stated uncertainty of the reference shall cover its true error."
+        scene = {**content, "requirement": demand, "reference": reference}
+        return Scene.model_validate(scene), values
 
 
 def families(quick: bool) -> list[Family]:

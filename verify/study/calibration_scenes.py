@@ -3,7 +3,7 @@
 Cracks, sinusoids and cut balls at rest; bars, sudden cracks and strips with a blade in motion.
 """
 
-from math import cos, radians, sin, sqrt
+from math import sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -49,7 +49,6 @@ def scene_of(
     """Return the content of a scene that asks for an opening and the displacement of a place."""
     return {
         "title": exact[0],
-        "requirement": "The stated uncertainty of the reference shall cover its true error.",
         "geometry": geometry,
         "mesh": {"cells": [cells]},
         "material": {"young": 1.0, **material},
@@ -95,6 +94,11 @@ def around(centre: Array, half: float) -> Content:
     }
 
 
+def _direction(angle: float) -> Array:
+    """Return the unit vector (2,) at an angle, degrees, to the first axis."""
+    return np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+
+
 def _distance(point: Array, cut: Content) -> float:
     if cut["kind"] == "arc":
         return abs(float(np.linalg.norm(point - cut["centre"])) - float(cut["radius"]))
@@ -133,7 +137,7 @@ def tip(random: Random) -> Content:
     """Return a cut from the boundary of a square to a tip in it, in any mixed mode."""
     at, angle = random.uniform(-0.3, 0.3, 2), float(random.uniform(-180.0, 180.0))
     intensity = [float(random.uniform(0.3, 1.0)), float(random.uniform(-1.0, 1.0))]
-    along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    along = _direction(angle)
     cut = {"kind": "polyline", "points": [(at - _LONG * along).tolist(), at.tolist()]}
     parameters = {"tip": at.tolist(), "angle": angle, "intensity": intensity}
     opened = 1.0 - float(random.uniform(0.15, 0.5)) / _LONG
@@ -144,10 +148,7 @@ def tip(random: Random) -> Content:
 def griffith(random: Random) -> Content:
     """Return a crack inside a square, under a remote stress that opens it."""
     centre, angle = random.uniform(-0.3, 0.3, 2), float(random.uniform(-90.0, 90.0))
-    a, along = (
-        float(random.uniform(0.6, 1.1)),
-        np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))]),
-    )
+    a, along = float(random.uniform(0.6, 1.1)), _direction(angle)
     axes = np.array([along, [-along[1], along[0]]])
     shear = float(random.uniform(-0.7, 0.7))
     local = np.array([[float(random.uniform(-0.5, 1.0)), shear], [shear, 1.0]])
@@ -165,7 +166,7 @@ def griffith(random: Random) -> Content:
 def _through(random: Random, name: str, sides: Content) -> Content:
     """Return a cut through the unit square at any angle."""
     point, angle = random.uniform(0.35, 0.65, 2), float(random.uniform(-90.0, 90.0))
-    along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    along = _direction(angle)
     reach = 0.5 * _LONG * along
     cut = {"kind": "polyline", "points": [(point - reach).tolist(), (point + reach).tolist()]}
     parameters = {"point": point.tolist(), "angle": angle, **sides}
@@ -187,9 +188,8 @@ def ring_and_disc(random: Random) -> Content:
     parameters = {**place, "outward": float(random.uniform(0.05, 0.15)), "at": 1.0}
     middle, sweep = (90.0, 300.0) if beside else (45.0, 200.0)
     cut = {"kind": "arc", **place, "start": middle - 0.5 * sweep, "sweep": sweep}
-    geometry = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
     at = 0.5 + float(random.uniform(-10.0, 10.0)) / sweep
-    scene = plane_scene(random, geometry, ("circular_cut", parameters), cut, at)
+    scene = plane_scene(random, _UNIT, ("circular_cut", parameters), cut, at)
     if random.integers(2):
         held = [{"where": side, "displacement": "exact"} for side in ("left", "right", "bottom")]
         scene["supports"] = held
@@ -225,7 +225,7 @@ def _arc(
     place = {"centre": centre.tolist(), "radius": radius}
     parameters = {**place, "angle": turn, "half_angle": half, "stress": stress}
     cut = {"kind": "arc", **place, "start": turn - half, "sweep": 2 * half}
-    away = np.array([np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))])
+    away = _direction(turn)
     return (("arc_crack", parameters), cut), centre + radius * away, radius
 
 
@@ -311,47 +311,27 @@ def bar(random: Random) -> Content:
     at, strain = float(random.uniform(0.3, 0.7)), float(random.uniform(0.005, 0.02))
     run = float(random.uniform(0.7, 2.4)) * (min(at, 1 - at) if cut else _LENGTH)
     points = [float(random.uniform(*span)) for span in ((0.05, at - 0.05), (at + 0.05, 0.95))]
-    shares = random.choice([0.4, 0.6, 0.8, 1.0], 4, replace=False).tolist()  # output times
-    sides = ["bottom", "top", *(["front", "back"] if dimension == 3 else [])]
-    across = {"bottom": "yz"[dimension - 2], "top": "yz"[dimension - 2], "front": "y", "back": "y"}
-    area = float(np.prod(upper[1:]))
-    content: Content = {
-        "title": "bar",
-        "requirement": "The stated uncertainty of the reference shall cover its true error.",
-        "geometry": {"kind": "rectangle" if dimension == 2 else "box",
-                     "lower": [0.0] * dimension, "upper": upper},
-        "mesh": {"cells": [[8, *[1] * (dimension - 1)]]},
-        "material": {"young": _YOUNG, "poisson": poisson, "density": _DENSITY,
-                     **({"plane": "strain"} if dimension == 2 else {})},
-        "analysis": {"kind": "dynamic", "duration": run / speed, "outputs": 6},
-        "supports": [
-            {"where": "left", "components": ["x"], "displacement": [0.0]},
-            *({"where": s, "components": [across[s]], "displacement": [0.0]} for s in sides),
-        ],
-        "quantities": [{"kind": "strain_energy"}],
-    }  # fmt: skip
-    middle = [0.47 * w for w in upper[1:]]
-    values: dict[str, float] = {}
-    for k, (x, share) in enumerate(zip(points if cut else points * 2, shares, strict=False)):
-        name, time = f"u {k}", share * run
-        content["quantities"].append(
-            {"kind": "displacement", "name": name, "point": [x, *middle], "component": "x",
-             "time": time / speed}
-        )  # fmt: skip
+    # output times
+    runs = [run * share for share in random.choice([0.4, 0.6, 0.8, 1.0], 4, replace=False).tolist()]
+    content = _held_bar(upper, poisson, run / speed)
+    middle, values = [0.47 * w for w in upper[1:]], {}
+    for k, (x, time) in enumerate(zip(points if cut else points * 2, runs, strict=False)):
+        asked = {"kind": "displacement", "name": f"u {k}", "point": [x, *middle], "component": "x"}
+        content["quantities"].append({**asked, "time": time / speed})
         if not cut:
-            values[name] = strain * _moved(_LENGTH - x, _LENGTH, time)
-        elif x < at:
-            values[name] = strain * (x - _moved(at - x, at, time))
+            moved = _moved(_LENGTH - x, _LENGTH, time)
         else:
-            values[name] = strain * (x + _moved(x - at, _LENGTH - at, time))
+            moved = x + (-_moved(at - x, at, time) if x < at
+                         else _moved(x - at, _LENGTH - at, time))  # fmt: skip
+        values[f"u {k}"] = strain * moved
     if cut:
         content["initial"] = {"kind": "equilibrium"}
         pulled = {"where": "right", "components": ["x"], "displacement": [strain * _LENGTH]}
         content["supports"].append(pulled)
         content["cuts"] = [_across(at, upper)]
         place = {"at": 0.45} if dimension == 2 else {"point": [at, *middle]}
-        for k, share in enumerate(shares[2:]):
-            name, time = f"opening {k}", share * run
+        for k, time in enumerate(runs[2:]):
+            name = f"opening {k}"
             asked = {"kind": "opening", "name": name, "time": time / speed}
             content["quantities"].append(asked | place)
             values[name] = strain * (_moved(0.0, at, time) + _moved(0.0, _LENGTH - at, time))
@@ -360,8 +340,29 @@ def bar(random: Random) -> Content:
         pull = [modulus * strain, *[0.0] * (dimension - 1)]
         content["loads"] = [{"kind": "traction", "where": "right", "traction": pull}]
         energy = stretched(_LENGTH, run)
-    values["strain_energy"] = 0.5 * modulus * strain**2 * area * energy
+    values["strain_energy"] = 0.5 * modulus * strain**2 * float(np.prod(upper[1:])) * energy
     return {**content, "values": values}
+
+
+def _held_bar(upper: list[float], poisson: float, duration: float) -> Content:
+    """Return a bar from the origin to a corner, held on its left and against contraction."""
+    dimension = len(upper)
+    last = "yz"[dimension - 2]
+    across = {"bottom": last, "top": last} | ({"front": "y", "back": "y"} if dimension == 3 else {})
+    return {
+        "title": "bar",
+        "geometry": {"kind": "rectangle" if dimension == 2 else "box",
+                     "lower": [0.0] * dimension, "upper": upper},
+        "mesh": {"cells": [[8, *[1] * (dimension - 1)]]},
+        "material": {"young": _YOUNG, "poisson": poisson, "density": _DENSITY,
+                     **({"plane": "strain"} if dimension == 2 else {})},
+        "analysis": {"kind": "dynamic", "duration": duration, "outputs": 6},
+        "supports": [
+            {"where": side, "components": [axis], "displacement": [0.0]}
+            for side, axis in ({"left": "x"} | across).items()
+        ],
+        "quantities": [{"kind": "strain_energy"}],
+    }  # fmt: skip
 
 
 def _across(at: float, upper: list[float]) -> Content:
@@ -383,12 +384,12 @@ def sudden_crack(random: Random) -> Content:
     angle = float(random.uniform(15.0, 45.0) * random.choice([-1.0, 1.0]))
     speed = sqrt((1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)))
     middle = np.array([1.1, 0.95]) + random.uniform(-0.05, 0.05, 2)
-    ahead = 0.5 * np.array([cos(radians(angle)), sin(radians(angle))])
+    ahead = 0.5 * _direction(angle)
     duration = float(random.uniform(0.6, 0.95)) / speed
     material = {"young": _YOUNG, "poisson": poisson, "density": _DENSITY, "plane": "strain"}
     law = hooke(Material.model_validate(material))
-    normal, along = cos(radians(angle)), sin(radians(angle))
-    stress: dict[Literal["I", "II"], float] = {"I": normal**2, "II": normal * along}
+    normal, along = _direction(angle)
+    stress: dict[Literal["I", "II"], float] = {"I": float(normal**2), "II": float(normal * along)}
     quantities, values = [], {}
     for end in ("start", "end"):
         for k, share in enumerate((float(random.choice([0.5, 0.75])), 1.0)):  # output times
@@ -400,7 +401,6 @@ def sudden_crack(random: Random) -> Content:
             values[name] = sudden_intensity(mode, stress[mode], law, time)
     return {
         "title": "sudden crack",
-        "requirement": "The stated uncertainty of the reference shall cover its true error.",
         "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [2.2, 1.9]},
         "mesh": {"cells": [[10, 8]]},
         "material": material,
@@ -425,13 +425,12 @@ def blade_strip(random: Random) -> Content:
     to seven tenths of it.
     """
     speed, angle = float(random.uniform(0.1, 0.7)), float(random.uniform(-15.0, 15.0))
-    ahead = np.array([cos(radians(angle)), sin(radians(angle))])
+    ahead = _direction(angle)
     tip = random.uniform([-0.08, -0.01], [0.0, 0.01])
     duration = float(random.uniform(0.05, 0.09)) / speed
     sides = ["left", "right", "front", "back"]
     content: Content = {
         "title": "blade strip",
-        "requirement": "The stated uncertainty of the reference shall cover its true error.",
         "geometry": {"kind": "box", "lower": [-0.15, -0.05, 0.0], "upper": [0.15, 0.05, 0.006]},
         "mesh": {"cells": [[24, 8, 1]]},
         "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},

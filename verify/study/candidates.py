@@ -10,6 +10,7 @@ from verify.compare.error_norm import ErrorNorm, rules, spread_of
 from verify.compare.hooke import Law, hooke, law_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.cost import paid_times
 from verify.judge.models import at_rest, with_kinematics
 from verify.judge.quantities import Measured
 from verify.judge.reference import Reference, size_of
@@ -219,9 +220,7 @@ def _candidate(
     one: _Tried, record: SolveRecord, solution: Solution, error: tuple[float, float]
 ) -> Candidate:
     value, width = error
-    # the background mesh is there before the cut is
-    phases = [times for name, times in record.timings.items() if name != "meshing"]
-    totals = [sum(times) for times in zip(*phases, strict=False)] or [_NONE]
+    totals = paid_times(record) or [_NONE]
     return Candidate(
         one.kinematics, one.choices, record.level, size_of(solution), solution.unknowns, value,
         max(value - width, 0.0), value + width, median(totals), min(totals), max(totals),
