@@ -135,13 +135,13 @@ def thesis_study(making: Making, quick: bool) -> ThesisStudy:
     found = making.parts("thesis", [*tables.values(), *slivers, *steps])
     rest = iter(found[len(tables) :])
     own = dict(zip(tables, found, strict=False))
-    timed, waited = own.pop("hand"), own.pop("waits")
+    (hand, contended), (late, frames) = own.pop("hand"), own.pop("waits")
     measured = Measured(
         **own,
-        delays=waited.delays,
-        frames=waited.frames,
-        hand=timed.hand,
-        contended=timed.contended,
+        delays=late,
+        frames=frames,
+        hand=hand,
+        contended=contended,
         slivers=[one for _ in slivers for one in next(rest)],
         methods=compare_methods(results, [one for _ in steps for one in next(rest)]),
     )
@@ -167,31 +167,17 @@ def _tables(quick: bool) -> dict[str, Task]:
     return {key: Task(*one) for key, one in asked.items()}
 
 
-@dataclass(frozen=True)
-class TimedHand:
-    """Real time of the hand, and why times may be too long, if they may."""
-
-    hand: RealTime
-    contended: str
-
-
-def timed_hand() -> TimedHand:
+def timed_hand() -> tuple[RealTime, str]:
     """Measure the hand, and say so if the machine has more to do than it has cores."""
     hand = real_time()
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     busy = f"the machine was busy: load {load:.1f} on {cores} cores" if load > cores else ""
-    return TimedHand(hand, busy)
+    return hand, busy
 
 
-@dataclass(frozen=True)
-class Waits:
-    """Table 4.6: delays, and what other lengths of frames change of them."""
-
-    delays: list[Delay]
-    frames: list[Frames]
-
-
-def waits(tetrahedra: Sequence[int], other: int, frames: Sequence[float]) -> Waits:
+def waits(
+    tetrahedra: Sequence[int], other: int, frames: Sequence[float]
+) -> tuple[list[Delay], list[Frames]]:
     """Measure delays over sizes of meshes, and at the fastest speed with frames of other lengths.
 
     Parameters
@@ -204,4 +190,4 @@ def waits(tetrahedra: Sequence[int], other: int, frames: Sequence[float]) -> Wai
     """
     found = delays(tetrahedra)
     fast = next(row.speed for row in found if row.speed_name == SPEEDS[-1])
-    return Waits(found, with_other_frames(other, fast, frames))
+    return found, with_other_frames(other, fast, frames)

@@ -12,6 +12,7 @@ import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.cost import work_points
+from verify.judge.intervals import error_interval
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scenes, restore_scene
 from verify.simulator.thesis import Delay, FaceCount, Frames, RealTime, StepTime, StripCount
@@ -169,11 +170,8 @@ def _summed_up(
 def _interval(metric: Metric | None) -> tuple[float, float, float] | None:
     if metric is None:
         return None
-    return (
-        metric.value,
-        max(metric.value - metric.uncertainty, 0.0),
-        (metric.value + metric.uncertainty),
-    )
+    found = error_interval(metric)
+    return found.value, found.low, found.high
 
 
 def _relative(metric: Metric | None) -> float | None:
