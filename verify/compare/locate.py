@@ -315,7 +315,7 @@ class SolutionField:
         points = np.ascontiguousarray(points, dtype=float)
         if self.solution.order == 1:
             u = evaluate_linear(points, cells, self._origin, self._first, self._slope)
-            return u, self._slope[cells]
+            return u, self._slope.take(cells, axis=0)
         u, gradient = evaluate_quadratic(
             points, cells, self._cells, self._nodal, self.shape.corners, self.shape.gradients
         )

@@ -53,6 +53,11 @@ class Faces:
     behind: Ints
     across: Ints
 
+    @property
+    def on_cut(self) -> NDArray[np.bool_]:
+        """Whether each (f,) is the face of a cut."""
+        return np.asarray(self.across != self.behind)
+
     def take(self, kept: NDArray[np.bool_]) -> "Faces":
         """Return some of them."""
         return Faces(self.nodes[kept], self.behind[kept], self.across[kept])
@@ -148,15 +153,21 @@ def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[
     field : SolutionField
         With the nodal displacements that are asked about.
     """
-    middle = solution.points[faces.nodes].mean(axis=1)
-    here, there = (field.in_cells(middle, cells)[0] for cells in (faces.behind, faces.across))
-    together = np.linalg.norm(there - here, axis=1) <= ROUND_OFF * field.scale
-    return np.asarray(together & (faces.across != faces.behind))
+    glued = faces.on_cut
+    cut = faces.take(glued)
+    middle = solution.points[cut.nodes].mean(axis=1)
+    here, there = (field.in_cells(middle, cells)[0] for cells in (cut.behind, cut.across))
+    glued[glued] = np.linalg.norm(there - here, axis=1) <= ROUND_OFF * field.scale
+    return glued
 
 
 def _turn(corners: Array) -> Array:
     """Signed volume (m,), up to a factor."""
-    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    edges = np.moveaxis(corners[:, 1:] - corners[:, :1], (1, 2), (0, 1))
+    if len(edges) == 2:
+        return np.asarray(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
+    a, (b, c, d), (e, f, g) = edges
+    return np.asarray(a[0] * (c * g - d * f) + a[1] * (d * e - b * g) + a[2] * (b * f - c * e))
 
 
 def _swapped(d: int, order: int) -> list[int]:
@@ -228,14 +239,15 @@ class OverlapSearch:
     def at(self, step: int = -1) -> Overlap:
         """Overlap at an output time, by its number."""
         u = self.solution.displacement[step]
-        places = self.solution.points + u
-        faces = self._apart(u)
         if not np.isfinite(u).all():
             return Overlap()
-        lost = self._inside_out(places)[faces.behind]
-        cut = faces.across != faces.behind
-        turned = int(np.sum(lost & cut))
-        faces, cut = faces.take(~lost), cut[~lost]
+        places, faces = self.solution.points + u, self._faces
+        faces = faces.take(~is_glued(faces, self.solution, self._field.with_nodal(u)))
+        corners = self.solution.cells[faces.behind, : self.solution.dimension + 1]
+        lost = _turn(self.solution.points[corners]) * _turn(places[corners]) <= 0.0
+        turned = int(np.sum(lost & faces.on_cut))
+        faces = faces.take(~lost)
+        cut = faces.on_cut
         if not cut.any():
             return Overlap(inside_out=turned)
         region = places[faces.nodes[cut]].reshape(-1, places.shape[1])
@@ -245,19 +257,6 @@ class OverlapSearch:
         near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
         cells = deformed_cells(self.solution, u, low, high)
         return replace(self._overlap(faces.take(near), cells, places), inside_out=turned)
-
-    def _apart(self, u: Array) -> Faces:
-        """Faces whose sides do not move as one."""
-        faces = self._faces
-        kept = ~is_glued(faces, self.solution, self._field.with_nodal(u))
-        return faces.take(kept)
-
-    def _inside_out(self, places: Array) -> NDArray[np.bool_]:
-        """Cells (m,) of the solution whose corners are turned round by the deformation."""
-        corners = self.solution.cells[:, : self.solution.dimension + 1]
-        before, after = self.solution.points[corners], places[corners]
-        turns = [np.linalg.det(x[:, 1:] - x[:, :1]) for x in (before, after)]
-        return np.asarray(turns[0] * turns[1] <= 0.0)
 
     def _overlap(self, faces: Faces, cells: DeformedCells, places: Array) -> Overlap:
         depth, shares, which = self._depths(faces, cells, places)
@@ -302,7 +301,7 @@ class OverlapSearch:
         out = self._ways_out(faces, cells, held, outside)
         depth = np.minimum(depth, facet_distances(points, out, corners, normals))
         # a point of the body's outside counts where it went in through a face of a cut
-        cut = faces.across != faces.behind
+        cut = faces.on_cut
         depth[~(cut[which] | cut[leaving])] = 0.0
         return np.maximum(depth, 0.0), shares, which
 
