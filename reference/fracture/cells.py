@@ -7,6 +7,7 @@ volume that balances the stress is what is given, less the inertia.
 from collections.abc import Callable
 from functools import partial
 from itertools import combinations
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +24,8 @@ Array = NDArray[np.float64]
 # Gauss points per direction of the collapsed square or cube: exact to degree 10 in the plane and
 # 4 in space, where a tube has a hundred times the cells of a ring
 _ORDER = {2: 6, 3: 3}
-_PRODUCT = 3  # of div u times a hat: degree 2 in a straight cell, 3 in a curved one in the plane
 _EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of VTK; the first three in the plane
 MIXED = "displacement and pressure"  # what a solution's note on its unknowns says
-_CHUNK = 20_000  # cells
 Force = Array | Callable[[Array], Array] | None
 
 
@@ -138,7 +137,7 @@ class NodalPressure:
     Parameters
     ----------
     solution : Solution
-        Quadratic.
+        Quadratic, with straight edges.
     law : Hooke
     step : int
         Which output time; default the last.
@@ -148,16 +147,17 @@ class NodalPressure:
         d = solution.dimension
         corners, self._place = np.unique(solution.cells[:, : d + 1], return_inverse=True)
         self._place = self._place.reshape(-1, d + 1)
-        right, measure = np.zeros(len(corners)), np.empty(len(self._place))
-        for start in range(0, len(self._place), _CHUNK):
-            cells = np.arange(start, min(start + _CHUNK, len(self._place)))
-            at = cell_gradients(solution, cells, step, _PRODUCT)
-            divergence = np.trace(at.gradient, axis1=2, axis2=3) * at.weights
-            shares = law.lame * divergence @ at.corner_shares
-            right += np.bincount(self._place[cells].ravel(), shares.ravel(), len(corners))
-            measure[cells] = at.weights.sum(axis=1)
+        edges = solution.points[solution.cells[:, 1 : d + 1]]
+        edges = edges - solution.points[solution.cells[:, :1]]
+        inverse = np.linalg.inv(edges.swapaxes(1, 2))
+        # in a straight cell div u is linear: its values at the corners, times the mass below
+        slope = _quadratic(np.vstack([np.zeros(d), np.eye(d)]))[1]
+        moved = inverse @ solution.displacement[step][solution.cells].swapaxes(1, 2)
+        divergence = moved.reshape(len(moved), -1) @ slope.transpose(2, 1, 0).reshape(-1, d + 1)
         ones = np.ones((d + 1, d + 1)) + np.eye(d + 1)
-        mass = measure[:, None, None] * ones / ((d + 1) * (d + 2))
+        mass = np.abs(np.linalg.det(edges))[:, None, None] * (ones / factorial(d + 2))
+        shares = law.lame * (mass @ divergence[:, :, None])
+        right = np.bincount(self._place.ravel(), shares.ravel(), len(corners))
         rows = np.broadcast_to(self._place[:, :, None], mass.shape)
         matrix = sparse.csr_matrix((mass.ravel(), (rows.ravel(), rows.swapaxes(1, 2).ravel())))
         # a mass in units of its diagonal has a condition number of at most 10: some 30 iterations
