@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +117,7 @@ def examine() -> list[Finding]:
         _tried("SLEPc", _probe("slepc"), f"{_FENICSX}; only eigenfrequencies need it", False),
         _tried("MPI", _probe("mpi"), _FENICSX),
         *examine_forms(),
-        _tried("off-screen VTK", _script(_PICTURE), "apt-get install -y libegl1 (or libosmesa6)"),
+        _tried("off-screen VTK", _script(_PICTURE), _vtk_line()),
     ]
     return found
 
@@ -144,6 +145,12 @@ def _commit(machine: dict[str, Any]) -> str:
 def _compiler_line() -> str:
     version = f"python3.{sys.version_info.minor}"
     return f"apt-get install -y gcc libc6-dev {version}-dev (a C compiler and Python.h)"
+
+
+def _vtk_line() -> str:
+    if find_spec("pyvista") is None:
+        return "python -m pip install pyvista"
+    return "apt-get install -y libegl1 (or libosmesa6)"
 
 
 def _script(code: str) -> list[str]:

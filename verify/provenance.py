@@ -358,7 +358,7 @@ class CompileTimes:
 def compile_times() -> Iterator[CompileTimes]:
     """Measure what is compiled meanwhile; nothing if numba has not been imported by then."""
     times = CompileTimes()
-    if "numba" not in sys.modules:  # what does not need it is not to wait for its import
+    if sys.modules.get("numba") is None:  # what does not need it is not to wait for its import
         yield times
         return
     from numba.core import event

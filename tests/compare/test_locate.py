@@ -2,11 +2,19 @@ import numpy as np
 import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
+from verify.compare import cell_tree, locate, sides
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
 from verify.solution import Solution
 
 RNG = np.random.default_rng(1)
+
+
+@pytest.fixture(autouse=True, params=[True, False], ids=["kernels", "numpy"])
+def compiled(request, monkeypatch):
+    """Try both forms of the search: the compiled one, and that of an environment without numba."""
+    for module in (cell_tree, locate, sides):
+        monkeypatch.setattr(module, "COMPILED", request.param)
 
 
 def second_degree(points):
@@ -107,3 +115,21 @@ def test_a_quadratic_field_on_a_quadratic_triangle_in_space_is_reproduced_along_
     slope = np.einsum("cab,nb->nca", form + form.swapaxes(1, 2), inside)
     for along in corners[1:] - corners[0]:
         assert gradient @ along == pytest.approx(slope @ along, abs=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_foot_on_segments_is_the_nearest_of_many_points_on_them(d):
+    segments, points = RNG.random((7, 2, d)), 2.0 * RNG.random((50, d)) - 0.5
+    segments[3, 1] = segments[3, 0]  # one without a length
+    distance, foot, which = sides.nearest_segments(points, segments)
+    share = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    on_them = (1 - share) * segments[:, 0] + share * segments[:, 1]
+    away = np.linalg.norm(points[:, None, None] - on_them, axis=3).min(axis=1)
+    spacing = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max() / 2000
+    assert np.allclose(np.linalg.norm(points - foot, axis=1), distance, atol=1e-14)
+    assert (distance <= away.min(axis=1) + 1e-14).all()
+    assert (distance >= away.min(axis=1) - spacing).all()
+    assert (away[np.arange(50), which] <= distance + spacing).all()
+    nowhere = sides.nearest_segments(points, segments[:0])
+    assert np.isinf(nowhere[0]).all()
+    assert (nowhere[2] == -1).all()

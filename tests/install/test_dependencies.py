@@ -65,10 +65,10 @@ def imported(*folders):
 @pytest.mark.parametrize(
     ("folder", "groups", "besides"),
     [
-        ("verify", [None], {"pytest", "distributed", "h5py"}),
+        ("verify", [None, "xfem", "pictures"], {"pytest", "distributed", "h5py"}),
         ("reference", [None, "gmsh", "fenicsx"], set()),
         # pytest's own protocol has no public name; conftest.py repeats it
-        ("tests", [None, "gmsh", "fenicsx", "test", "dev"], {"_pytest"}),
+        ("tests", [None, "xfem", "pictures", "gmsh", "fenicsx", "test", "dev"], {"_pytest"}),
     ],
 )
 def test_a_package_imports_only_what_is_declared_for_it(folder, groups, besides):

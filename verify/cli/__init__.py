@@ -46,11 +46,10 @@ def _run(argv: Sequence[str] | None) -> int:
     except (InputError, UnsupportedSceneError) as error:
         return _fail(str(error), 2)
     except ModuleNotFoundError as error:
-        if error.name != "numba":  # all else that may be missing is asked for by name
+        if error.name not in ("numba", "pyvista"):  # all else that may be missing is asked for
             raise
-        return _fail(
-            "this command needs numba, which is not installed: python -m pip install numba", 3
-        )
+        missing = f"{error.name}, which is not installed: python -m pip install {error.name}"
+        return _fail(f"this command needs {missing}", 3)
     except RunStoppedError as stop:
         return _fail(f"{stop}; the same command resumes it", 128 + stop.signum)
     except KeyboardInterrupt:

@@ -121,13 +121,14 @@ def import_(
     from verify.report.rendering import render
     from verify.runner import Options, exit_code
     from verify.runner.checking import check_solver_name
+    from verify.runner.fingerprint import cache_folder
     from verify.scene import load_scene
 
     for name in beside:
         check_solver_name(name, "--beside")
     scene = load_scene(case)
     found = read_answers(scene, answers)
-    options = Options(solvers=tuple(beside), repetitions=repetitions, timeout=timeout)
+    options = Options(tuple(beside), repetitions, timeout=timeout, cache=cache_folder())
     with progress_on(sys.stderr) as progress:
         result = compare_answers(
             scene, found, solver, out, options, progress, judged_as, command_line()

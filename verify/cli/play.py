@@ -5,6 +5,7 @@ import io
 import os
 import shutil
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -96,6 +97,8 @@ def _check_outputs(out: Path | None, window: bool, frames: int, records: Path | 
         raise InputError(f"--out {out}: expected a name that ends in .gif, .mp4 or .png")
     if out is not None and out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError("--out: MP4 needs the program ffmpeg, which is not in the path")
+    if (out is not None or window) and find_spec("pyvista") is None:
+        raise ModuleNotFoundError("No module named 'pyvista'", name="pyvista")
     for path in (out, records):
         if path is not None and not path.resolve().parent.is_dir():
             raise InputError(f"no directory '{path.parent}' to write into")

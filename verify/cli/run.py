@@ -153,9 +153,9 @@ def run(
     if not asked.solvers or any(":" not in name for name in asked.solvers):
         from verify.processes import start_server
 
+        if find_spec("numba") is None:  # this process does without, its solvers do not
+            raise ModuleNotFoundError("No module named 'numba'", name="numba")
         start_server()  # it loads while this process does
-    if find_spec("numba") is None:  # this process does without, those that it starts do not
-        raise ModuleNotFoundError("No module named 'numba'", name="numba")
     from verify.cli.run_text import costs_of, run_line, suites_line, verdict_lines
     from verify.runner import exit_code, select_cases
     from verify.runner.run import NOTHING_RAN

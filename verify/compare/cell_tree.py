@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from verify.compiled import COMPILED, njit
 
 LEAF = 4  # cells per leaf
 # Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
@@ -338,11 +339,56 @@ def find_cells(
     """
     found = np.full(len(points), -1)
     some = directions if len(directions) == len(points) else points
+    sided, axes = some is directions, axes_of(points.shape[1])
+    left: Any = slice(None)
+    if not COMPILED:
+        _holding_in_numpy(points, some, sided, wanted, searched, sides, tolerance, found)
+        left = np.flatnonzero(found < 0) if nearest else []
+    rest = found[left]  # all of `found` itself, or a copy of what numpy has left
     _find_cells(
-        points, some, some is directions, wanted, searched, sides, tolerance, nearest,
-        axes_of(points.shape[1]), found,
+        points[left], some[left], sided, wanted[left], searched, sides, tolerance, nearest, axes,
+        rest,
     )  # fmt: skip
+    found[left] = rest
     return found
+
+
+def _holding_in_numpy(
+    points: Floats, directions: Floats, sided: bool, wanted: NDArray[np.int8],
+    searched: SearchedCells, sides: NDArray[np.int8], tolerance: float, found: Ints,
+) -> None:  # fmt: skip
+    """Do as `_containing` for all points at once, level by level of the tree."""
+    lower, upper, cells, corners, normals, centres = searched
+    leaves, at_once = len(lower) // 2, 1 << 15
+    low, high = corners.min(axis=1) - tolerance, corners.max(axis=1) + tolerance
+    offsets = np.einsum("mka,mka->mk", normals, np.roll(corners, -1, axis=1))
+    for first in range(0, len(points), at_once):
+        x = points[first : first + at_once]
+        row, node = np.arange(len(x)), np.ones(len(x), dtype=np.int64)
+        while True:
+            near = (x[row] >= lower[node] - tolerance) & (x[row] <= upper[node] + tolerance)
+            row, node = row[near.all(axis=1)], node[near.all(axis=1)]
+            if not len(node) or node[0] >= leaves:
+                break
+            row, node = row.repeat(2), (2 * node[:, None] + (0, 1)).ravel()
+        if not len(node):
+            continue
+        cell = cells.reshape(leaves, -1)[node - leaves]
+        row, cell = row.repeat(cell.shape[1]), cell.ravel()
+        row, cell = row[cell >= 0], cell[cell >= 0]
+        near = ((x[row] >= low[cell]) & (x[row] <= high[cell])).all(axis=1)
+        row, cell = row[near], cell[near]
+        depth = (np.einsum("nka,na->nk", normals[cell], x[row]) - offsets[cell]).min(axis=1)
+        there = depth >= -tolerance
+        there &= (wanted[first + row] * sides[cell] >= 0).all(axis=1)
+        row, cell, depth = row[there], cell[there], depth[there]
+        inside = depth > tolerance
+        on_side = inside
+        if sided:
+            towards = (directions[first + row] * (centres[cell] - x[row])).sum(axis=1)
+            on_side = inside | (towards > 0.0)
+        order = np.lexsort((depth, on_side, inside))
+        found[first + row[order]] = cell[order]  # the last of each point stays
 
 
 @njit(cache=True)

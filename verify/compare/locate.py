@@ -9,7 +9,6 @@ from copy import copy
 from typing import Protocol, Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import (
@@ -30,6 +29,7 @@ from verify.compare.simplices import (
     straight_or_raise,
     triangle_frames,
 )
+from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.solution import Solution
 
@@ -38,6 +38,8 @@ def evaluate_linear(
     points: Floats, found: Ints, origins: Floats, values: Floats, slopes: Floats
 ) -> Floats:
     """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
+    if not COMPILED:
+        return values[found] + np.einsum("nca,na->nc", slopes[found], points - origins[found])
     result = np.empty(points.shape)
     _evaluate_linear(points, found, origins, values, slopes, axes_of(points.shape[1]), result)
     return result
@@ -60,6 +62,8 @@ def evaluate_quadratic(
 ) -> tuple[Floats, Floats]:
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape
+    if not COMPILED:
+        return _quadratic_in_numpy(points, values[nodes[found]], corners[found], gradients[found])
     u, grad = np.empty((n, d)), np.empty((n, d, d))
     axes, vertices = axes_of(d), axes_of(corners.shape[1])  # a triangle in space has three of each
     _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad)
@@ -101,8 +105,24 @@ def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, 
                     grad[i, c, a] += slope[a] * value
 
 
+def _quadratic_in_numpy(
+    points: Floats, values: Floats, corners: Floats, gradients: Floats
+) -> tuple[Floats, Floats]:
+    """Do as `_evaluate_quadratic`, of nodal values, corners and gradients by point."""
+    from_facet = points[:, None] - np.roll(corners, -1, axis=1)
+    weight = np.einsum("nka,nka->nk", gradients, from_facet)
+    edges = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: values.shape[1] - weight.shape[1]]
+    p, q = np.transpose(edges)
+    shape = np.hstack([weight * (2.0 * weight - 1.0), 4.0 * weight[:, p] * weight[:, q]])
+    both = weight[:, p, None] * gradients[:, q] + weight[:, q, None] * gradients[:, p]
+    slope = np.hstack([(4.0 * weight - 1.0)[..., None] * gradients, 4.0 * both])
+    return np.einsum("nk,nkc->nc", shape, values), np.einsum("nka,nkc->nca", slope, values)
+
+
 def squares(values: Floats) -> Floats:
     """Sum (n,) of the squares of the entries of each of `values` (n, ...)."""
+    if not COMPILED:
+        return np.asarray((values**2).reshape(len(values), -1).sum(axis=1))
     found = np.empty(len(values))
     _squares(np.ascontiguousarray(values).reshape(len(values), -1), found)
     return found
@@ -118,6 +138,9 @@ def _squares(values, found):
 
 def strain_squares(gradient: Floats) -> tuple[Floats, Floats]:
     """tr² ε (n,) and ε : ε (n,) of the strain ε of displacement gradients (n, d, d)."""
+    if not COMPILED:
+        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+        return np.trace(strain, axis1=1, axis2=2) ** 2, squares(strain)
     trace2, square = np.empty(len(gradient)), np.empty(len(gradient))
     _strain_squares(np.ascontiguousarray(gradient), axes_of(gradient.shape[1]), trace2, square)
     return trace2, square

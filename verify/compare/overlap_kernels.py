@@ -5,9 +5,9 @@ the material. `lower`, `upper` and `cells` are a tree, see `verify.compare.cell_
 """
 
 import numpy as np
-from numba import njit
 
 from verify.compare.cell_tree import Floats, Ints, box_distance2, segment_distance2
+from verify.compiled import njit
 
 # A ray through an edge must not slip between two facets.
 _EDGE = 1e-9

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from verify.compiled import COMPILED, njit
 from verify.geometry.curves import Piece
 from verify.geometry.patches import Patch
 
@@ -32,8 +32,25 @@ def nearest_segments(
     distance, foot = np.empty(len(points)), np.array(points, dtype=float)
     which = np.empty(len(points), dtype=np.int64)
     starts, ends = (np.ascontiguousarray(segments[:, k]) for k in (0, 1))
+    if not COMPILED:
+        return _nearest_in_numpy(points, starts, ends)
     axes = tuple(range(points.shape[1]))  # a loop over a tuple is unrolled
     _nearest(np.ascontiguousarray(points), starts, ends, axes, distance, foot, which)
+    return distance, foot, which
+
+
+def _nearest_in_numpy(
+    points: _Floats, starts: _Floats, ends: _Floats
+) -> tuple[_Floats, _Floats, NDArray[np.int64]]:
+    distance, foot = np.full(len(points), np.inf), np.array(points, dtype=float)
+    which = np.full(len(points), -1)
+    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        length2 = float((end - start) @ (end - start))
+        t = ((points - start) @ (end - start) / (length2 or 1.0)).clip(0.0, 1.0)[:, None]
+        on_it = (1 - t) * start + t * end
+        away = np.linalg.norm(points - on_it, axis=1)
+        nearer = away < distance
+        distance[nearer], foot[nearer], which[nearer] = away[nearer], on_it[nearer], k
     return distance, foot, which
 
 

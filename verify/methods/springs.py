@@ -19,9 +19,9 @@ where the edges are arranged as in equilateral triangles.
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from verify.compiled import njit
 from verify.xfem.arrays import Floats, XfemError, check_choice
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Material

@@ -97,6 +97,13 @@ def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> Overview:
     return view
 
 
+# what a judge alone is installed without -> what it cannot do
+_WITHOUT = {
+    "numba": "numba, without which xfem and the other ways to cut do not solve",
+    "dolfinx": "DOLFINx, without which no reference is solved: those of bundles judge",
+}
+
+
 def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return name and value of where the numbers of a run come from."""
     origin = record.get("provenance")
@@ -117,6 +124,8 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     said += [(key, str(value)) for key, value in origin.items()]
     if isinstance(versions, dict):
         said.append(("versions", ", ".join(f"{name} {v}" for name, v in versions.items())))
+        missing = [text for name, text in _WITHOUT.items() if name not in versions]
+        said += [("not installed", "; ".join(missing))] if missing else []
     if isinstance(options := record.get("options"), dict):
         written = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
         said.append(("options", written))

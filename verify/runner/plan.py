@@ -144,6 +144,12 @@ def check_judged(scenes: Sequence[Scene], options: Options) -> None:
             raise InputError(f"solver '{name}' is not asked{nearest(name, asked)}", "--judge")
 
 
+def stored_beside(scene: Scene, options: Options) -> ReferenceBundle | None:
+    """Return the bundle beside a case, if a run with `options` takes its reference from there."""
+    as_stored = options.cache and not parameters_of(REFERENCE, options.parameters)
+    return bundle_of_case(scene) if as_stored else None
+
+
 def plan_case(
     scene: Scene,
     options: Options,
@@ -152,8 +158,7 @@ def plan_case(
     bundle: ReferenceBundle | None = None,
 ) -> CasePlan:
     """Lay out the solves of `scene` that are known before any has run."""
-    as_stored = options.cache and not parameters_of(REFERENCE, options.parameters)
-    kept = bundle or (bundle_of_case(scene) if as_stored else None)
+    kept = bundle or stored_beside(scene, options)
     coarser = 1
     if options.within and kept is None:
         scene, coarser = coarser_reference(scene, options.within)

@@ -14,19 +14,21 @@ import gc
 import os
 import signal
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import psutil
-from numba.core import event
 
-from verify.first_use import STAGES
 from verify.processes import PARENT_VARIABLE, die_with_parent
 
 _NEEDED = (
-    "numpy.random", "verify.provenance", "verify.solvers.xfem", "verify.solvers.methods_adapter",
-    "verify.runner.solve", "meshio", "reference.exact", "verify.runner.judging",
+    "numpy.random", "verify.provenance", "verify.runner.solve", "meshio", "reference.exact",
+    "verify.runner.judging",
 )  # fmt: skip
-_IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")
+_IF_THERE = (
+    "verify.solvers.xfem", "verify.solvers.methods_adapter", "ufl", "basix.ufl", "ffcx.main",
+    "reference.elasticity",
+)  # fmt: skip
 _PR_SET_CHILD_SUBREAPER = 36
 
 
@@ -55,10 +57,8 @@ def _load() -> None:
     for name in _IF_THERE:
         with contextlib.suppress(ImportError):
             import_module(name)
-    with event.install_listener("numba:compile", _CompilingNothing()):
-        for stage in (call for name, call in STAGES.items() if "scalpel" not in name):
-            with contextlib.suppress(_NotCompiledError):
-                stage()
+    if find_spec("numba") is not None:
+        _load_kernels()
     gc.freeze()  # what all share is not touched by their collections
     gc.enable()
 
@@ -67,12 +67,22 @@ class _NotCompiledError(Exception):
     """A kernel is not in the cache; who needs it compiles it."""
 
 
-class _CompilingNothing(event.Listener):
-    def on_start(self, event_: Any) -> None:
-        raise _NotCompiledError
+def _load_kernels() -> None:
+    from numba.core import event
 
-    def on_end(self, event_: Any) -> None:
-        pass
+    from verify.first_use import STAGES
+
+    class CompilingNothing(event.Listener):
+        def on_start(self, event_: Any) -> None:
+            raise _NotCompiledError
+
+        def on_end(self, event_: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", CompilingNothing()):
+        for stage in (call for name, call in STAGES.items() if "scalpel" not in name):
+            with contextlib.suppress(_NotCompiledError):
+                stage()
 
 
 if os.environ.get(PARENT_VARIABLE) == str(os.getppid()):

@@ -25,7 +25,7 @@ from verify.runner.directory import claimed, folder_name, write_run
 from verify.runner.engines import ClusterEngine
 from verify.runner.fingerprint import code_of_solver
 from verify.runner.loading import load_solvers
-from verify.runner.plan import check_judged, plan_case, solvers_of
+from verify.runner.plan import check_judged, plan_case, solvers_of, stored_beside
 from verify.runner.ranks import mpiexec
 from verify.runner.references import REFERENCE, ReferenceBundle
 from verify.runner.selection import Options
@@ -140,7 +140,11 @@ def run_cases(
             for scene in scenes:
                 if REFERENCE in solvers_of(scene, options):
                     bundle.levels(scene)  # or say now that there are none
-        needed = [name for name in names if bundle is None or name != REFERENCE]
+        solved = bundle is None and any(
+            REFERENCE in solvers_of(scene, options) and stored_beside(scene, options) is None
+            for scene in scenes
+        )
+        needed = [name for name in names if solved or name != REFERENCE]
         loaded = load_solvers(needed, options, stop.check)
         with claimed(out, identity) as directory:
             record: dict[str, Any] = {

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from verify.compiled import njit
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.phantom import PhantomMesh
 

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from verify.compiled import njit
 from verify.xfem.arrays import (
     Bools,
     Floats,

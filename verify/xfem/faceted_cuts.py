@@ -18,9 +18,9 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from verify.compiled import njit
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError, finite_array, index_array
 from verify.xfem.mesh import facets_of, neighbours_across
 

@@ -15,9 +15,9 @@ from math import factorial
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from verify.compiled import njit
 from verify.xfem.arrays import (
     Bools,
     Floats,

@@ -10,8 +10,8 @@ fail) is taken instead.
 """
 
 import numpy as np
-from numba import njit
 
+from verify.compiled import njit
 from verify.xfem.arrays import Floats
 
 _NEWTON_STEPS = 12
