@@ -39,26 +39,29 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import SPINS, adjugate
 
 State = Literal["plane strain", "plane stress", "solid"]
+Law = Literal["hooke", "neo_hookean", "stable_neo_hookean"]
 
 
 @dataclass(frozen=True)
 class Material:
-    """σ = λ tr(ε) I + 2 μ ε, with the λ that suits the state.
+    """σ = λ tr(ε) I + 2 μ ε, with the λ that suits the state; or a law with that tangent at rest.
 
-    There is no seam for another law. This one is written out here, in `energy_momentum` (for it
-    alone), `explicit`, `ghost_penalty`, and the kernels of `verify.accelerated`. That K is constant
-    in linear kinematics is relied on by `solve_static` and `implicit`; that P is linear in E, by
-    every product with the rotation-fixed tangent.
+    Hooke's law is written out here, in `energy_momentum` (for it alone), `explicit`,
+    `ghost_penalty`, and the kernels of `verify.accelerated`; the others, of solids and plane strain
+    at finite rotation, in `hyperelastic`. Their rotation-fixed tangent is Hooke's: viscous forces
+    and descents of Newton's method are by it.
 
     Attributes
     ----------
     lam, mu : (m,) or () float array
         Lamé parameters in pascal (of membranes times the thickness, in N/m), for all cells of the
         uncut mesh or one for each.
+    law : {"hooke", "neo_hookean", "stable_neo_hookean"}
     """
 
     lam: Floats
     mu: Floats
+    law: Law = "hooke"
 
     def of_cells(self, count: int) -> tuple[Floats, Floats]:
         """λ and μ (m,) of so many cells of the uncut mesh, in pascal.

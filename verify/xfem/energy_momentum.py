@@ -234,6 +234,11 @@ class EnergyMomentum(NewtonIntegrator):
     def __init__(self, body: DynamicBody, step_size: float) -> None:
         if not body.force.has_stress:
             raise XfemError("springs have no stress field; expected an integrator that needs none")
+        if body.force.law != "hooke":
+            raise XfemError(
+                f"the energy-momentum scheme averages Hooke's stress; the law is "
+                f"'{body.force.law}', expected another integrator"
+            )
         super().__init__(body, step_size)
         self._before: Configuration | None = None  # at the start, once it is needed
         self._evaluations = 0

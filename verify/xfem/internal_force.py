@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 from verify.xfem.arrays import Floats, Ints, XfemError, check_choice, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import (
+    Law,
     Material,
     add_force,
     add_moduli,
@@ -28,6 +29,7 @@ from verify.xfem.element import (
     tension_forces,
     tension_moduli,
 )
+from verify.xfem.hyperelastic import add_hyperelastic_force, hyperelastic_moduli
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
@@ -137,7 +139,10 @@ class InternalForce:
         check_choice(kinematics, Kinematics, "kinematics")
         self.phantom, self.kinematics = phantom, kinematics
         self.kernels, self.ghost = kernels, ghost
-        self.elements = elements_of(phantom, material)
+        self.elements, self.law = elements_of(phantom, material), material.law
+        check_choice(self.law, Law, "law")
+        if self.law != "hooke" and (not self.is_corotational or self.is_membrane):
+            raise XfemError(f"law '{self.law}' of solids at finite rotation; this body is another")
         cells, space = len(phantom.cells), phantom.mesh.space
         self._unturned = np.tile(np.eye(space), (cells, 1, 1))
         self._quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1))
@@ -156,8 +161,9 @@ class InternalForce:
 
     @property
     def has_one_pass(self) -> bool:
-        """Whether force and stiffness are found in one pass of the kernels: of tetrahedra."""
-        return self.phantom.mesh.dim == 3 and self.kernels.one_pass is not None
+        """Whether force and stiffness are found in one pass of the kernels: Hooke's tetrahedra."""
+        accelerated = self.kernels.one_pass is not None
+        return self.law == "hooke" and self.phantom.mesh.dim == 3 and accelerated
 
     @property
     def couplings(self) -> Ints | None:
@@ -218,8 +224,14 @@ class InternalForce:
         """As `evaluate`, for a configuration."""
         force = np.empty(self._shape) if out is None else out
         self._check(force=force)
-        force[:] = 0.0
-        energy = self._add_force(at.R, at.F, 1.0, 1.0, force)
+        if self.law == "hooke":
+            force[:] = 0.0
+            energy = self._add_force(at.R, at.F, 1.0, 1.0, force)
+        else:
+            corner_force = np.zeros_like(self.phantom.corners.node_points)
+            stable = self.law == "stable_neo_hookean"
+            energy = float(add_hyperelastic_force(self.elements, stable, at.F, corner_force))
+            force[:] = self.phantom.restrict(corner_force)
         self.add_penalty(at.displacement, 1.0, force)
         return force, energy + self.penalty_energy(at.displacement)
 
@@ -317,7 +329,11 @@ class InternalForce:
             for start in range(0, len(at.F), _CHUNK):
                 some = slice(start, start + _CHUNK)
                 elements = self.elements.part(some)
-                moduli, singular = consistent_moduli(elements, at.R[some], at.F[some])
+                if self.law == "hooke":
+                    moduli, singular = consistent_moduli(elements, at.R[some], at.F[some])
+                else:
+                    stable = self.law == "stable_neo_hookean"
+                    moduli, singular = hyperelastic_moduli(elements, stable, at.F[some]), 0
                 add_moduli(elements, moduli, scale, targets[some], added)
                 left_out += singular
         pattern.fold(added, blocks)
