@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from reference.boundary_conditions import load_forces, nodes_on_part
 from reference.large_strain import solve_large_strain
-from reference.law import law_of, mass_matrix
+from reference.law import energy_of, law_of, mass_matrix
 from reference.linear_solvers import Kind
 from reference.meshing import ConformingMesh, open_cut
 from reference.nodal_algebra import NodalMatrix, NodalSolver, TiedSolver
@@ -355,7 +355,10 @@ class MovingBody:
             pairs = zip(self._supports, factors, strict=True)
             return self._filled([one.values(share * factor, 0.0) for one, factor in pairs])
 
-        found = solve_large_strain(self.scene.material, self.space, self.held, prescribed, load)
+        material = self.scene.material
+        found = solve_large_strain(
+            material, self.space, self.held, prescribed, load, energy_of(material)
+        )
         return found.displacement.ravel()
 
     def accelerations(self, forces: Array) -> Array:

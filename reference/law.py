@@ -88,6 +88,17 @@ def neo_hookean(state: Deformation) -> Strain:
     return Strain((ufl.inner(state.F, state.F) - d) / 2 - log, log)
 
 
+def stable_neo_hookean(state: Deformation) -> Strain:
+    """½ (tr C − d) − (J − 1) + ½ (J − 1)² and J − 1: finite where J ≤ 0 (Macklin & Müller 2021).
+
+    That is ½ μ (tr C − d) − μ (J − 1) + ½ (λ + μ) (J − 1)².
+    """
+    import ufl
+
+    d, away = len(state.F[0, :]), state.J - 1
+    return Strain((ufl.inner(state.F, state.F) - d) / 2 - away + away**2 / 2, away)
+
+
 @dataclass(frozen=True)
 class Energy:
     """What is known of an energy.
@@ -111,6 +122,7 @@ ENERGIES = {
     "linear": Energy(linear),
     "corotated": Energy(corotated, PolarStretch, 1e-3),
     "neo_hookean": Energy(neo_hookean),
+    "stable_neo_hookean": Energy(stable_neo_hookean),
 }
 
 
@@ -375,7 +387,12 @@ def law_of(
     """Make the law of the kinematics of a scene."""
     if kinematics == "linear":
         return LinearLaw(material, space, pressure)
-    return Law(material, space, "corotated", pressure)
+    return Law(material, space, energy_of(material), pressure)
+
+
+def energy_of(material: Material) -> str:
+    """Return the name in `ENERGIES` of a material at finite rotation."""
+    return "corotated" if material.model == "hooke" else material.model
 
 
 def mass_matrix(material: Material, unknowns: Unknowns, where: str = "") -> Any:

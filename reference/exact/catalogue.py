@@ -34,8 +34,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
     "rolled_halves": (
         RolledHalves,
-        "finite rotation: each side of a straight cut bent away to a circle: point, slope or "
-        "angle, thickness, curvature, shift",
+        "finite rotation, of each material.model: each side of a straight cut bent away to a "
+        "circle: point, slope or angle, thickness, curvature, shift",
     ),
     "airy": (
         Airy,
@@ -84,7 +84,7 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     "straight_front": (
         StraightFrontField,
         "3D: field of modes I, II and III at the straight front of a plane crack: point, normal, "
-        "axis (the direction ahead), intensity (K_I, K_II, K_III)",
+        "axis (the direction ahead), intensity (K_I, K_II, K_III); neo-Hookean too: III alone",
     ),
     "blade_strip": (
         BladeStrip,
@@ -106,6 +106,7 @@ _IN_SPACE = (
     "blade_strip", "released_bar",
 )  # fmt: skip
 _IN_BOTH = ("linear", "released_bar")
+_AT_ANY_STRAIN = ("rolled_halves", "straight_front")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 
@@ -158,6 +159,11 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         given.close()
         return solution
     make, _ = _CATALOGUE[name]
+    if material.model != "hooke" and name not in _AT_ANY_STRAIN:
+        raise InputError(
+            f"exact solution '{name}' is of Hooke's law; material.model = '{material.model}' "
+            f"knows {', '.join(_AT_ANY_STRAIN)}"
+        )
     if law.dimension == 3 and name not in _IN_SPACE:
         raise InputError(
             f"exact solution '{name}' is plane; material.plane = 'strain' or 'stress' is missing"

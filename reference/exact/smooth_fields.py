@@ -8,6 +8,8 @@ of the jump, which shears, is a rotation of the second material.
 """
 
 import numpy as np
+from numpy.polynomial import Chebyshev
+from scipy.optimize import root
 
 from reference.exact.solution import (
     Above,
@@ -23,6 +25,9 @@ from reference.exact.solution import (
 )
 from verify.errors import InputError
 from verify.scene import Material, Scene
+
+_COLLOCATED = 24  # degree across a strip; its analytic radius is known to round-off then
+_SOLVED = 1e-8  # residual over μ: round-off of second derivatives is below it
 
 
 class Linear(ExactSolution):
@@ -259,9 +264,12 @@ class Layers(TwoSidedSolution):
 class RolledHalves(TwoSidedSolution):
     """Strips on both sides of a cut, each bent away from the other to a circle of its own.
 
-    In the energy μ‖U − I‖² + ½ λ tr²(U − I) a strip |ξ| < h/2 takes the places
-    (r cos cs, r sin cs) with r = A cosh cξ + B sinh cξ + b/c, b = 2(λ + μ)/(λ + 2μ): equilibrium
-    without body force, free of traction at ξ = ±h/2. At s = 0 the middle lines stay where they are.
+    A strip |ξ| < h/2 takes the places (r cos cs, r sin cs), with stretches λ₁ = dr/dξ across and
+    λ₂ = c r along it. Without body force and free of traction at ξ = ±h/2 it is in equilibrium in
+    the energy W(λ₁, λ₂) if d/dξ ∂W/∂λ₁ = c ∂W/∂λ₂ and ∂W/∂λ₁ = 0 there (Rivlin, Proc. R. Soc. Lond.
+    A 195, 1949). In the energy μ‖U − I‖² + ½ λ tr²(U − I) that is r = A cosh cξ + B sinh cξ + b/c,
+    b = 2(λ + μ)/(λ + 2μ); in a neo-Hookean one it is found by collocation, to 1e-12. At s = 0 the
+    middle lines stay where they are.
 
     Parameters ``thickness`` h (m) and ``curvature`` c (1/m, positive) per side; ``shift`` (m,
     normal to the cut) per side.
@@ -278,6 +286,9 @@ class RolledHalves(TwoSidedSolution):
         self._b = 2 * (lame + shear) / stiff
         spare = 2 * (lame + shear) - lame * self._b
         c, h = self._curvature, self._thickness
+        self._bent = None
+        if law.model != "hooke":
+            self._bent = [_bent(law, angle) for angle in c * h]
         self._sinh = spare * stiff / (c * np.cosh(0.5 * c * h) * (stiff**2 - lame**2))
         self._cosh = -lame * self._sinh / stiff
 
@@ -288,6 +299,11 @@ class RolledHalves(TwoSidedSolution):
     def _radius(self, xi: Array, above: Above) -> tuple[Array, Array]:
         """Radius r (n,), m, and dr/dξ (n,)."""
         c = side(self._curvature, above)
+        if self._bent is not None:
+            sides = zip(self._bent, self._curvature * self._thickness, strict=True)
+            one, other = (_values(R, 2 * c * xi / angle, angle) for R, angle in sides)
+            radius, slope = np.where(above, one, other)
+            return radius / c, slope
         even, odd = side(self._cosh, above), side(self._sinh, above)
         r = even * np.cosh(c * xi) + odd * np.sinh(c * xi) + self._b / c
         return r, c * (even * np.sinh(c * xi) + odd * np.cosh(c * xi))
@@ -296,7 +312,7 @@ class RolledHalves(TwoSidedSolution):
         sign, middle = np.where(above, 1.0, -1.0), 0.5 * side(self._thickness, above)
         (x, t), c = s.T, side(self._curvature, above)
         r, _ = self._radius(middle - sign * t, above)
-        at_middle = side(self._cosh, above) + self._b / c
+        at_middle, _ = self._radius(np.zeros(len(x)), above)
         # ξ points away from the centre of the circle: towards the cut
         rise = sign * (middle + at_middle - r * np.cos(c * x))
         return np.column_stack([r * np.sin(c * x) - x, rise - t])
@@ -308,3 +324,46 @@ class RolledHalves(TwoSidedSolution):
         cos, sin = np.cos(c * x), np.sin(c * x)
         return matrices([[c * r * cos - 1.0, -sign * slope * sin],
                          [sign * c * r * sin, slope * cos - 1.0]])  # fmt: skip
+
+
+def _values(R: Chebyshev, at: Array, angle: float) -> Array:
+    """R and dR/d(cξ) (2, n) at places from −1 to 1 across a strip that turns by an angle."""
+    return np.array([R(at), 2 / angle * R.deriv()(at)])
+
+
+def _bent(law: Hooke, angle: float) -> Chebyshev:
+    """R = c r over 2ξ/h of a neo-Hookean strip of thickness h bent to a curvature c = angle/h.
+
+    Raises
+    ------
+    InputError
+        If no equilibrium is found.
+    """
+    lame, shear = law.lame, law.shear
+
+    def slopes(one: Array, two: Array) -> tuple[Array, Array]:
+        """∂W/∂λ₁ and ∂W/∂λ₂, over μ."""
+        J = one * two
+        volume = (lame * np.log(J) / shear - 1) / J
+        if law.model == "stable_neo_hookean":
+            volume = (lame / shear + 1) * (J - 1) - 1
+        return one + volume * two, two + volume * one
+
+    at = np.cos(np.pi * np.arange(_COLLOCATED + 1) / _COLLOCATED)
+
+    def residual(values: Array) -> Array:
+        R = Chebyshev.fit(at, values, _COLLOCATED, domain=(-1.0, 1.0))
+        across, along = slopes(2 / angle * R.deriv()(at), values)
+        stress = Chebyshev.fit(at, across, _COLLOCATED, domain=(-1.0, 1.0))
+        left: Array = 2 / angle * stress.deriv()(at) - along
+        left[0], left[-1] = across[0], across[-1]
+        return left
+
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = root(residual, 1 + angle / 2 * at, tol=1e-14)
+        left = np.abs(residual(found.x)).max()
+    if not left <= _SOLVED:
+        raise InputError(
+            f"no neo-Hookean strip that turns by {angle:g} over its thickness is found"
+        )
+    return Chebyshev.fit(at, found.x, _COLLOCATED, domain=(-1.0, 1.0))

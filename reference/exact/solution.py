@@ -58,12 +58,15 @@ class Hooke:
     dimension : {2, 3}
     density : float, optional
         kg/m³; what moves needs it.
+    model : str
+        Energy at finite rotation, as in case files; the formulas here are Hooke's.
     """
 
     lame: float
     shear: float
     dimension: int
     density: float | None = None
+    model: str = "hooke"
 
     @property
     def eta(self) -> float:
@@ -97,7 +100,8 @@ def hooke(material: Material) -> Hooke:
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     if material.plane == "stress":
         lame = young * poisson / (1 - poisson**2)
-    return Hooke(lame, shear, 3 if material.plane is None else 2, material.density)
+    dimension = 3 if material.plane is None else 2
+    return Hooke(lame, shear, dimension, material.density, material.model)
 
 
 class Parameters:

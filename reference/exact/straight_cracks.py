@@ -239,6 +239,8 @@ class StraightFrontField(ExactSolution):
     In the axes ahead of the front, normal to the crack, and along the front (ahead × normal),
     with z = x + iy: the plane field of `CrackTip`, and u_3 = (2 K_III/μ) Im √(z/2π)
     (M. L. Williams, J. Appl. Mech. 24, 1957). The faces, behind the front, are free of traction.
+    Antiplane shear alone is exact for neo-Hookean material too, at any strain: det F is 1, and the
+    first Piola stress is μ (e₃ ⊗ ∇u_3 + ∇u_3 ⊗ e₃), as in linear elasticity.
 
     Parameters ``point`` of the front (m), ``normal`` of the crack towards its positive side,
     ``axis``, the direction ahead, projected onto its plane, and ``intensity`` (K_I, K_II, K_III),
@@ -251,6 +253,10 @@ class StraightFrontField(ExactSolution):
         ahead, _, normal = plane_axes(parameters)
         self._axes = np.stack([ahead, normal, np.cross(ahead, normal)])
         self._k = parameters.take("intensity", (3,))
+        if law.model != "hooke" and self._k[:2].any():
+            raise InputError(
+                "parameters: intensity I and II in neo-Hookean material; expected III alone"
+            )
         self._plane = _tip(law, self._k[:2])
         self._unit = _tip(law, np.array([1.0, 0.0]))  # its potential is √(z/2π)
 

@@ -3,11 +3,12 @@
 Linear: ½ σ:ε. Corotated: μ‖U − I‖² + ½ λ tr²(U − I), the energy whose gradient the corotational
 formulation with polar rotations is; U is the stretch of F = I + ∇u = R U. A membrane has the same
 of the two stretches in its tangent plane, times its thickness, with the λ of plane stress.
+Neo-Hookean: ½μ(‖F‖² − d) + H(J), J = det F, with H of one of two models.
 
 As full tensors in space the strain is ε = sym ∇u and the stress σ = λ tr(ε) I + 2μ ε; corotational
-kinematics and membranes have Biot strain U − I and Biot stress of the same form, material tensors
-that are the same for a body that is turned. What plane strain, plane stress or a membrane says of
-the direction across is filled in.
+kinematics and membranes have Biot strain U − I and Biot stress of the same form, neo-Hookean bodies
+that of their energy: material tensors that are the same for a body that is turned. What plane
+strain, plane stress or a membrane says of the direction across is filled in.
 """
 
 from collections.abc import Callable, Iterator
@@ -150,7 +151,46 @@ class MembraneLaw(Corotated):
         return Hooke.energy_density(self, np.swapaxes(left @ right, 1, 2) @ difference)
 
 
-Law = Hooke | Corotated | MembraneLaw
+@dataclass(frozen=True)
+class NeoHookean(Corotated):
+    """½μ(‖F‖² − d) + H(J) with the moduli of Hooke's law at rest; see `reference.law`.
+
+    Parameters
+    ----------
+    stable : bool
+        Whether H = −μ (J − 1) + ½(λ + μ)(J − 1)², and not −μ ln J + ½λ ln² J.
+    """
+
+    stable: bool = False
+
+    def energy_density(self, gradient: Array) -> Array:
+        """½μ(‖F‖² − d) + H(J) (n,) in J/m³; infinite where ln J is not defined."""
+        square = np.einsum("nij,nij->n", gradient, gradient)
+        trace, away = np.einsum("nii->n", gradient), _volume_change(gradient)
+        # ½μ(‖F‖² − d) − μ (J − 1), without cancellation at rest
+        shape = self.shear * (0.5 * square - (away - trace))
+        if self.stable:
+            return np.asarray(shape + 0.5 * (self.lame + self.shear) * away**2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            log = np.log1p(away)
+            density = shape + self.shear * (away - log) + 0.5 * self.lame * log**2
+        return np.where(away > -1.0, density, np.inf)
+
+    def power_density(self, gradient: Array, rate: Array) -> Array:
+        """P : rate (n,), W/m³."""
+        return np.einsum("nij,nij->n", self.piola(gradient), rate)
+
+    def piola(self, gradient: Array) -> Array:
+        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa."""
+        unit = np.eye(gradient.shape[1])
+        J = 1.0 + _volume_change(gradient)
+        slope = _slope_by_volume(J, self.lame, self.shear, self.stable)
+        cofactors = J[:, None, None] * np.swapaxes(np.linalg.inv(unit + gradient), 1, 2)
+        stress = np.reshape(self.shear, (-1, 1, 1)) * (unit + gradient)
+        return np.asarray(stress + slope[:, None, None] * cofactors)
+
+
+Law = Hooke | Corotated | MembraneLaw | NeoHookean
 
 
 def hooke(material: Material) -> Hooke:
@@ -167,6 +207,10 @@ def law_of(scene: Scene) -> Law:
     """Elasticity that a scene asks for."""
     if scene.cell_dimension < scene.dimension:
         return MembraneLaw(*_constants(scene.material), _if_several(scene.material))
+    model = scene.material.model
+    if model != "hooke":
+        law = NeoHookean(*_constants(scene.material), _if_several(scene.material))
+        return replace(law, stable=model == "stable_neo_hookean")
     make = corotated if scene.analysis.kinematics == "corotational" else hooke
     return make(scene.material)
 
@@ -207,6 +251,22 @@ def _principal_stretches(gradient: Array) -> Array:
     stretch = 1.0 + _less_one(excess)
     stretch[:, 0] *= np.where(np.linalg.det(np.eye(d) + gradient) < 0.0, -1.0, 1.0)
     return np.asarray(stretch)
+
+
+def _volume_change(gradient: Array) -> Array:
+    """J − 1 (n,) of displacement gradients (n, d, d): 1 is not added before it counts."""
+    trace = np.einsum("nii->n", gradient)
+    minors = 0.5 * (trace**2 - np.einsum("nij,nji->n", gradient, gradient))
+    change = trace + minors
+    return change if gradient.shape[1] == 2 else change + np.linalg.det(gradient)
+
+
+def _slope_by_volume(J: Array, lame: float | Array, shear: float | Array, stable: bool) -> Array:
+    """H′(J) (n,), Pa; not a number where the law is not defined."""
+    if stable:
+        return np.asarray((lame + shear) * (J - 1.0) - shear)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((lame * np.log(J) - shear) / J)
 
 
 def _less_one(excess: Array) -> Array:
@@ -254,10 +314,21 @@ def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]
         strain = np.swapaxes(frames, 1, 2) @ strain @ frames
     shear = moduli.young / (2.0 * (1.0 + moduli.poisson))
     lame = 2.0 * shear * moduli.poisson / (1.0 - 2.0 * moduli.poisson)
+    if scene.material.model != "hooke":
+        return strain, _biot_stress(strain, lame, shear, scene.material.model)
     trace = np.einsum("nii->n", strain)
     stress = 2.0 * shear[:, None, None] * strain
     stress += (lame * trace)[:, None, None] * np.eye(3)
     return strain, stress
+
+
+def _biot_stress(strain: Array, lame: Array, shear: Array, model: str) -> Array:
+    """RᵀP = μ U + H′(J) cof U (n, 3, 3), Pa, of neo-Hookean material and Biot strains U − I."""
+    stretch, J = np.eye(3) + strain, 1.0 + _volume_change(strain)
+    slope = _slope_by_volume(J, lame, shear, model == "stable_neo_hookean")
+    a, b, c = (stretch[:, k] for k in range(3))
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    return np.asarray(shear[:, None, None] * stretch + slope[:, None, None] * cofactors)
 
 
 def _biot_strain(gradient: Array) -> Array:

@@ -81,6 +81,11 @@ class Material(Strict):
         default=None, description="2D only: plane strain or plane stress"
     )
     thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
+    model: Literal["hooke", "neo_hookean", "stable_neo_hookean"] = Field(
+        default="hooke",
+        description="energy, of these moduli at rest: Hooke's of the strain, at finite rotation of "
+        "U − I; neo-Hookean with ln J, or without it (finite where cells are inside out)",
+    )
     regions: list[MaterialRegion] = Field(
         default_factory=list, description="other materials; what no region covers is this one"
     )

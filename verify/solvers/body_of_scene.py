@@ -93,7 +93,7 @@ def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
     young, poisson, _ = _moduli(scene, mesh.points[mesh.cells].mean(axis=1))
     thickness = scene.material.thickness
     if thickness is None:
-        return isotropic(young, poisson, state)
+        return replace(isotropic(young, poisson, state), law=scene.material.model)
     sheet = isotropic(young, poisson, "plane stress")
     return Material(thickness * sheet.lam, thickness * sheet.mu)
 

@@ -11,6 +11,7 @@ from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places, place_text
 from reference.installation import import_dolfinx
 from reference.large_strain import LargeStrainSolve, solve_large_strain
+from reference.law import energy_of
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
@@ -256,6 +257,7 @@ def _equilibrium(
             unknowns,
             lambda factor: constrained_values(scene, space, exact, factor)[1],
             load_forces(scene, space, exact),
+            energy_of(scene.material),
             pressure=pressure,
         )
     state = finite.orientation
