@@ -86,9 +86,10 @@ def export_case(
     entries = []
     for level in chosen:
         folder = level_folder(out, level)
-        problems = {"mesh": problem_of(scene, level)}
+        models = (scene.material.model,)  # the case file names it
+        problems = {"mesh": problem_of(scene, level, models=models)}
         if conforming:
-            problems["conforming"] = problem_of(scene, level, conforming=True)
+            problems["conforming"] = problem_of(scene, level, conforming=True, models=models)
         with asked_place(folder):
             folder.mkdir(parents=True, exist_ok=True)
             for name, problem in problems.items():

@@ -5,6 +5,7 @@ methods cut through. The *conforming* mesh is the background mesh with the cuts 
 opened (nodes doubled); any plain finite element program can solve on it.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -198,7 +199,9 @@ _WHOLE = 1e-12  # of a facet: what may be left of one that is loaded as a whole
 _DEGREE = 7  # of the rule for loads that vary: an exact field's traction is smooth on a facet
 
 
-def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
+def problem_of(
+    scene: Scene, level: int, conforming: bool = False, models: Collection[str] = ("hooke",)
+) -> Problem:
     """Lay out `scene` on mesh `level`.
 
     Parameters
@@ -208,15 +211,19 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
         0 is the coarsest.
     conforming : bool
         Whether the mesh shall conform to the cuts; not offered for meshes given in space.
+    models : collection of str
+        ``material.model`` that the solver knows.
 
     Raises
     ------
     UnsupportedSceneError
-        If a conforming mesh of the scene is not offered, a support or load is another field at
-        every time, or a load acts on the faces of a cut.
+        If the material is of another model, a conforming mesh of the scene is not offered, a
+        support or load is another field at every time, or a load acts on the faces of a cut.
     InputError
         If a support or load acts nowhere, or a mesh file is bad.
     """
+    if (model := scene.material.model) not in models:
+        raise UnsupportedSceneError(f"material.model '{model}'; expected {', '.join(models)}")
     exact = exact_of(scene)
     if any(isinstance(load, CutFaces) for load in scene.loads):
         raise UnsupportedSceneError("loads on the faces of a cut are not exported")

@@ -55,6 +55,8 @@ class Takes:
     dimensions, analyses, kinematics, cuts : list
         As in case files; ``cuts`` are their kinds.
     materials : {"one", "several"}
+    models : list of str
+        Of the material.
     opening : bool
         Whether cuts may open in the course of a motion.
     histories : bool
@@ -74,6 +76,7 @@ class Takes:
         ]
     )  # fmt: skip
     materials: Literal["one", "several"] = "several"
+    models: list[str] = field(default_factory=lambda: ["hooke"])
     opening: bool = False
     histories: bool = False
     membranes: bool = False
@@ -89,6 +92,7 @@ class Takes:
             ("dimension", scene.dimension, self.dimensions),
             ("analysis", analysis.kind, self.analyses),
             ("kinematics", analysis.kinematics, self.kinematics),
+            ("material model", scene.material.model, self.models),
             ("initial state", scene.initial.kind, self.initial),
             *(("cut", cut.kind, self.cuts) for cut in scene.cuts),
         ]

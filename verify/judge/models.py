@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 def with_kinematics(scene: Scene, kinematics: str) -> Scene:
     """Return `scene` in ``"linear"`` or ``"corotational"`` kinematics, without acceptance.
 
+    Linear kinematics are those of Hooke's law.
+
     Raises
     ------
     UnsupportedSceneError
@@ -38,7 +40,10 @@ def with_kinematics(scene: Scene, kinematics: str) -> Scene:
         raise UnsupportedSceneError(
             "the error of a membrane is not taken apart: it has no linear kinematics to begin with"
         )
-    return changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
+    changes: dict[str, Any] = {"analysis": {"kinematics": kinematics}}
+    if kinematics == "linear":
+        changes["material"] = {"model": "hooke"}
+    return changed(scene, kinematics, changes)
 
 
 def coarsest(scene: Scene, count: int) -> Scene:

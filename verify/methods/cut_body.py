@@ -96,7 +96,7 @@ class CutBody:
             for value in (given.lam, given.mu)
         )
         assert np.shape(lam) in ((), (count,))
-        return Material(lam, mu)
+        return replace(given, lam=lam, mu=mu)
 
 
 def make_body(

@@ -325,6 +325,8 @@ def _refusal(scene: Scene) -> str | None:
         return "a scene is played in time: it needs a dynamic analysis with a time_step"
     if scene.analysis.kinematics != "corotational":
         return "a scene is played at any rotation: kinematics must be 'corotational'"
+    if scene.material.model != "hooke":
+        return f"a scene of Hooke's law is played; material.model is '{scene.material.model}'"
     if not scene.material.is_uniform:
         return "a scene of one material is played; material.regions differ"
     if scene.initial.kind != "rest":

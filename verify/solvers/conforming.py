@@ -165,7 +165,8 @@ class ReferenceSolver:
     ) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
         behind = any(cut.on_the_way for cut in scene.cuts)
-        damped = behind or scene.analysis.kinematics == "linear"
+        linear, model = scene.analysis.kinematics == "linear", scene.material.model
+        damped = behind or linear or model != "hooke"
         scheme = "generalised_alpha" if damped else "energy_momentum"
         factors = any(isinstance(one, FractureQuantity) for one in scene.quantities)
         radius = _RADIUS_OF_JUMPS if behind or factors else _RADIUS

@@ -425,6 +425,8 @@ class MassSpringSolver(MethodSolver):
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         super()._check(scene, scheme, parameters)
+        if scene.material.model != "hooke":
+            raise UnsupportedSceneError(f"springs are no '{scene.material.model}' material")
         if scene.analysis.kind == "dynamic" and scheme in (*EXPLICIT, "energy_momentum"):
             raise UnsupportedSceneError(
                 f"{scheme} of springs: their critical step is not that of the elements, and they "

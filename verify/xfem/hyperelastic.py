@@ -17,14 +17,6 @@ In the plane (strain) the stretch across is 1, and ‖F‖² − d and J are tho
 import numpy as np
 from numba import njit
 
-from verify.xfem.arrays import Floats
-from verify.xfem.element import Elements
-
-_LEVI_CIVITA = np.zeros((3, 3, 3))
-_LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
-_LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
-_IN_PLANE = np.array([[0.0, 1.0], [-1.0, 0.0]])
-
 
 @njit(cache=True)
 def _cofactors(F, C):
@@ -82,24 +74,31 @@ def add_hyperelastic_force(elements, stable, F, force):
     return energy
 
 
-def hyperelastic_moduli(elements: Elements, stable: bool, F: Floats) -> Floats:
-    """Second derivative of the potential by F, (p, d, d, d, d) per volume."""
-    lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
-    d = F.shape[1]
-    if d == 2:
-        slope = np.einsum("kl,nm->knlm", _IN_PLANE, _IN_PLANE)[None]
-        C = np.einsum("knlm,plm->pkn", slope[0], F)
-    else:
-        slope = np.einsum("kla,nmb,pab->pknlm", _LEVI_CIVITA, _LEVI_CIVITA, F, optimize=True)
-        C = 0.5 * np.einsum("pknlm,plm->pkn", slope, F)
-    J = np.einsum("pk,pk->p", F[:, 0], C[:, 0])
-    if stable:
-        h, rate = (lam + mu) * (J - 1.0) - mu, lam + mu
-    else:
-        log = np.log(J)
-        h, rate = (lam * log - mu) / J, (lam + mu - lam * log) / J**2
-    A = np.einsum("pkn,plm->pknlm", rate[:, None, None] * C, C)
-    A += h[:, None, None, None, None] * slope
-    identity = np.eye(d)
-    A += mu[:, None, None, None, None] * np.einsum("kl,nm->knlm", identity, identity)
+@njit(cache=True)
+def hyperelastic_moduli(elements, stable, F):
+    """Second derivative of the potential by F (p, d, d): (p, d, d, d, d) per volume."""
+    _, parent, _, _, _, lam, mu, axes, _, _ = elements
+    d = len(axes)
+    C = np.empty((d, d))
+    A = np.empty((len(F), d, d, d, d))
+    for p in range(len(F)):
+        cell = parent[p]
+        J, l, m = _cofactors(F[p], C), lam[cell], mu[cell]
+        if stable:
+            h, rate = (l + m) * (J - 1.0) - m, l + m
+        else:
+            log = np.log(J)
+            h, rate = (l * log - m) / J, (l + m - l * log) / J**2
+        for k in range(d):
+            for n in range(d):
+                for q in range(d):
+                    for r in range(d):
+                        value = rate * C[k, n] * C[q, r]
+                        if k == q and n == r:
+                            value += m
+                        if k != q and n != r:  # ∂cof F: what is left of F without rows k, q
+                            sign = 1.0 if (q - k - r + n) % 3 == 0 else -1.0
+                            rest = F[p, 3 - k - q, 3 - n - r] if d == 3 else 1.0
+                            value += sign * h * rest
+                        A[p, k, n, q, r] = value
     return A

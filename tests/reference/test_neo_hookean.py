@@ -1,0 +1,114 @@
+"""Neo-Hookean bodies: UFL against the elements of `verify.xfem`, the comparison, exact fields."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fourth_order import difference
+from large_bodies import space_of
+from reference_scenes import needs_fenicsx
+
+import verify.xfem as xfem
+from reference.exact import exact_solution
+from reference.law import Law
+from verify.compare.hooke import law_of
+from verify.errors import InputError
+from verify.scene import Material, Scene, load_scene
+
+pytestmark = needs_fenicsx
+
+MODELS = ("neo_hookean", "stable_neo_hookean")
+
+
+def tissue(model, **more):
+    return Material(young=1.0, poisson=0.3, model=model, **more)
+
+
+def scene_of(model, d):
+    file = "rotation/neo_hookean_halves" if d == 2 else "rotation/tissue_strip_solid"
+    content = load_scene(file).model_dump(mode="json", by_alias=True)
+    content["material"] |= {"young": 1.0, "poisson": 0.3, "model": model}
+    return Scene.model_validate(content)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_energy_and_forces_are_those_of_other_elements_and_of_the_comparison(model):
+    space = space_of(1, (2, 1, 2))
+    mesh, x = space.mesh, space.node_points
+    u = 0.05 * np.random.default_rng(2).standard_normal(x.shape)
+    law = Law(tissue(model), space, model)
+    energy, force = law.energy(u.ravel()), law.force(u.ravel()).reshape(x.shape)
+    body = xfem.cut_mesh(xfem.SimplexMesh(x, space.cell_nodes), [])
+    elements = replace(xfem.isotropic(1.0, 0.3, "solid"), law=model)
+    other, same = xfem.InternalForce(body, elements).evaluate(u)
+    assert same == pytest.approx(energy, rel=1e-12)
+    assert np.abs(other - force).max() < 1e-12 * np.abs(force).max()
+    gradients = body.mesh.gradients
+    slope = np.einsum("mci,mcj->mij", u[body.mesh.cells], gradients)
+    density = law_of(scene_of(model, 3)).energy_density(slope)
+    assert body.volumes @ density == pytest.approx(energy, rel=1e-12)
+    assert len(mesh.points) == len(x)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_stress_of_the_comparison_is_the_derivative_of_its_energy(model, d):
+    law = law_of(scene_of(model, d))
+    H, rate = 0.2 * np.random.default_rng(4).standard_normal((2, 20, d, d))
+    H = H[np.linalg.det(np.eye(d) + H) > 0.2]
+    step, rate = 1e-5, rate[: len(H)]
+    slope = (law.energy_density(H + step * rate) - law.energy_density(H - step * rate)) / (2 * step)
+    assert law.power_density(H, rate) == pytest.approx(slope, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_halves_bent_to_circles_are_in_equilibrium_with_free_faces(model):
+    """Energy less radial stress times stretch is the same all across (first integral)."""
+    law = law_of(scene_of(model, 2))
+    given = {"point": [0, 0], "angle": 90.0, "thickness": [0.25, 0.4], "curvature": [1.2, 2.0]}
+    one = exact_solution("rolled_halves", given, tissue(model, plane="strain"))
+    for sign, thick in ((-1.0, 0.25), (1.0, 0.4)):
+        x = np.column_stack([sign * thick * np.linspace(1e-9, 1 - 1e-9, 9), np.full(9, 0.3)])
+        gradient = one.gradient(x)
+        assert difference(one.displacement, x[1:-1], 1e-3) == pytest.approx(
+            gradient[1:-1], abs=1e-9
+        )
+        stress = law.piola(gradient)
+        assert np.abs(stress[[0, -1], :, 0]).max() < 1e-8  # over E
+        radial = np.einsum("ni,ni->n", stress[:, :, 0], gradient[:, :, 0] + [1.0, 0.0])
+        first = law.energy_density(gradient) - radial
+        assert np.ptp(first) < 1e-9 * np.abs(law.energy_density(gradient)).max()
+
+
+def test_the_energy_of_a_bent_strip_is_the_catalogues():
+    """h = 0.1, c = π, L = 1, E = 1, ν = 0.3: 4.47404718e-4 J/m, found by another method."""
+    material = tissue("neo_hookean", plane="strain")
+    given = {"point": [0, 0], "angle": 90.0, "thickness": [0.1, 0.1], "curvature": [np.pi, np.pi]}
+    one, law = exact_solution("rolled_halves", given, material), law_of(scene_of("neo_hookean", 2))
+    node, weight = np.polynomial.legendre.leggauss(20)
+    x = np.column_stack([0.05 * (1 + node), np.full(20, 0.2)])
+    energy = 0.05 * weight @ law.energy_density(one.gradient(x))
+    assert energy == pytest.approx(4.47404718e-4, rel=1e-8)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_mode_iii_is_exact_at_any_strain_and_the_other_modes_are_refused(model):
+    given = {"point": [0, 0, 0], "normal": [0, 1, 0], "axis": [1, 0, 0], "intensity": [0, 0, 2.0]}
+    one, law = exact_solution("straight_front", given, tissue(model)), law_of(scene_of(model, 3))
+    x = np.random.default_rng(8).uniform(0.1, 0.4, (20, 3))
+
+    def stress(points):
+        return law.piola(one.gradient(points)).reshape(len(points), 9)
+
+    slope = difference(stress, x, 1e-3).reshape(len(x), 3, 3, 3)
+    assert np.abs(np.einsum("nijj->ni", slope)).max() < 1e-6 * np.abs(slope).max()
+    assert np.linalg.norm(one.gradient(x), axis=(1, 2)).max() > 2.0
+    face = np.column_stack([-x[:, 0], np.full(20, 1e-12), x[:, 2]])
+    assert np.abs(law.piola(one.gradient(face))[:, :, 1]).max() < 1e-4
+    with pytest.raises(InputError, match="III alone"):
+        exact_solution("straight_front", given | {"intensity": [1.0, 0, 0]}, tissue(model))
+
+
+def test_other_exact_fields_are_of_hookes_law():
+    with pytest.raises(InputError, match="Hooke's law"):
+        exact_solution("penny", {}, tissue("neo_hookean"))

@@ -1,0 +1,114 @@
+"""Neo-Hookean laws of cut bodies: derivatives, rotations, tension along cuts, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import verify.xfem as xfem
+from verify.xfem.block_pattern import body_pattern
+
+LAWS = ("neo_hookean", "stable_neo_hookean")
+E, NU = 1.0e3, 0.4
+
+
+def material(law, d):
+    return replace(xfem.isotropic(E, NU, "plane strain" if d == 2 else "solid"), law=law)
+
+
+def bar(d):
+    """Make a bar of length 2, cut along through the middle of cells."""
+    mesh = xfem.rectangle_mesh((5, 3), upper=(2.0, 1.0)) if d == 2 else (
+        xfem.box_mesh((4, 2, 2), upper=(2.0, 1.0, 1.0)))  # fmt: skip
+    if d == 2:
+        cut = xfem.Polyline([[-1.0, 0.37], [3.0, 0.37]])
+    else:
+        normal = np.array([0.0, 1.0, 0.6])
+        cut = xfem.Plane([0.0, 0.45, 0.4], normal)
+    return xfem.cut_mesh(mesh, [cut])
+
+
+def potential(law, F):
+    """Energy density of F (d, d), as the issue's sources state it."""
+    lam, mu = float(material(law, len(F)).lam), float(material(law, len(F)).mu)
+    J = np.linalg.det(F)
+    shape = 0.5 * mu * (np.sum(F**2) - len(F))
+    if law == "neo_hookean":
+        return shape - mu * np.log(J) + 0.5 * lam * np.log(J) ** 2
+    return shape - mu * (J - 1.0) + 0.5 * (lam + mu) * (J - 1.0) ** 2
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_force_and_tangent_are_the_derivatives_of_the_energy(law, d):
+    body = bar(d)
+    force = xfem.InternalForce(body, material(law, d))
+    shape, random = (body.node_count, d), np.random.default_rng(3)
+    u, way = 0.05 * random.standard_normal(shape), random.standard_normal(shape)
+    step = 1e-5
+    (more, up), (less, down) = (force.evaluate(u + s * way) for s in (step, -step))
+    found, _ = force.evaluate(u)
+    # central differences: step² times third derivatives, of order 100 here
+    assert np.vdot(found, way) == pytest.approx((up - down) / (2 * step), rel=1e-6)
+    pattern = body_pattern(body, None)
+    tangent = pattern.matrix(force.stiffness(pattern, u))
+    slope = ((more - less) / (2 * step)).ravel()
+    assert np.abs(tangent @ way.ravel() - slope).max() < 1e-6 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_turned_body_stores_what_it_did_and_its_forces_turn(law, d):
+    body = bar(d)
+    force = xfem.InternalForce(body, material(law, d))
+    turn = np.linalg.qr(np.random.default_rng(5).standard_normal((d, d)))[0]
+    turn[:, 0] *= np.linalg.det(turn)
+    x = body.node_points
+    u = 0.05 * np.random.default_rng(6).standard_normal(x.shape)
+    (f, energy), (turned, same) = force.evaluate(u), force.evaluate((x + u) @ turn.T - x)
+    assert same == pytest.approx(energy, rel=1e-11)
+    assert np.abs(turned - f @ turn.T).max() < 1e-11 * np.abs(f).max()
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_uniaxial_tension_to_twice_the_length_is_uniform_on_both_sides_of_a_cut(law, d):
+    """The cut lies along the tension and bears nothing; across, P = 0 gives the contraction."""
+
+    def across(thin):
+        step = 1e-6
+        F = [np.diag([2.0, *(d - 1) * [thin + s]]) for s in (step, -step)]
+        return potential(law, F[0]) - potential(law, F[1])
+
+    thin = brentq(across, 0.3, 1.0, xtol=1e-14)
+    body = bar(d)
+    force = xfem.InternalForce(body, material(law, d))
+    x = body.node_points
+    stretched = np.diag([2.0, *(d - 1) * [thin]])
+    wanted = x @ (stretched - np.eye(d))
+    fixed = np.zeros(x.shape, dtype=bool)
+    fixed[(x[:, 0] < 1e-9) | (x[:, 0] > 2.0 - 1e-9)] = True
+    found = xfem.static_equilibrium(force, fixed, lambda share: share * wanted, load_steps=4)
+    # the differences that `thin` comes from are right to 1e-9
+    assert np.abs(found.displacement - wanted).max() < 1e-7
+    volume = body.volumes.sum()
+    assert found.energy == pytest.approx(volume * potential(law, stretched), rel=1e-8)
+    assert found.check.stable
+
+
+def test_the_energy_with_a_logarithm_is_infinite_inside_out_and_the_stable_one_is_not():
+    body = xfem.cut_mesh(xfem.rectangle_mesh((1, 1)), [])
+    x = body.node_points
+    flipped = x * [-1.0, 1.0] - x
+    energies = [xfem.InternalForce(body, material(law, 2)).evaluate(flipped)[1] for law in LAWS]
+    assert energies[0] == np.inf
+    assert energies[1] == pytest.approx(potential(LAWS[1], np.diag([-1.0, 1.0])), rel=1e-13)
+
+
+def test_what_is_no_solid_at_finite_rotation_has_no_such_law():
+    body, law = bar(2), material("neo_hookean", 2)
+    with pytest.raises(xfem.XfemError, match="finite rotation"):
+        xfem.InternalForce(body, law, "linear")
+    with pytest.raises(xfem.XfemError, match="law"):
+        xfem.InternalForce(body, replace(law, law="mooney"))
