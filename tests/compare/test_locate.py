@@ -1,10 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
-from verify.compare import cell_tree, locate, sides
+from verify.compare import cell_tree, locate, mass, sides
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
+from verify.compare.mass import kinetic
 from verify.solution import Solution
 
 RNG = np.random.default_rng(1)
@@ -13,7 +16,7 @@ RNG = np.random.default_rng(1)
 @pytest.fixture(autouse=True, params=[True, False], ids=["kernels", "numpy"])
 def compiled(request, monkeypatch):
     """Try both forms of the search: the compiled one, and that of an environment without numba."""
-    for module in (cell_tree, locate, sides):
+    for module in (cell_tree, locate, mass, sides):
         monkeypatch.setattr(module, "COMPILED", request.param)
 
 
@@ -133,3 +136,22 @@ def test_the_foot_on_segments_is_the_nearest_of_many_points_on_them(d):
     nowhere = sides.nearest_segments(points, segments[:0])
     assert np.isinf(nowhere[0]).all()
     assert (nowhere[2] == -1).all()
+
+
+@pytest.mark.parametrize("mesh", [grid(5, 4), cube()], ids=["2D", "3D"])
+def test_energy_and_momenta_of_a_body_that_flies_and_turns_are_those_of_a_rigid_one(mesh):
+    """With the moment of inertia of a unit square or cube about its middle, m / 6."""
+    points, cells = mesh
+    d = points.shape[1]
+    flight, middle = np.arange(1.0, d + 1), np.full(d, 0.5)
+    spin = np.array([0.3, -0.2, 0.7]) if d == 3 else np.array([0.0, 0.0, 0.7])
+    arms = np.column_stack([points - middle, np.zeros((len(points), 3 - d))])
+    velocity = flight + np.cross(spin, arms)[:, :d]
+    moved = replace(solution(points, cells, np.zeros_like(points)), velocity=velocity[None])
+    found = kinetic(moved, 2.0)
+    own = 2.0 / 6.0 * spin[3 - len(found.spin[0]) :]
+    about = np.cross(*(np.append(one, np.zeros(3 - d)) for one in (middle, 2.0 * flight)))
+    assert found.energy == pytest.approx(flight @ flight + 0.5 * own @ spin[-len(own) :])
+    assert found.linear[0] == pytest.approx(2.0 * flight)
+    assert found.spin[0] == pytest.approx(own)
+    assert found.angular[0] == pytest.approx(own + about[-len(own) :])

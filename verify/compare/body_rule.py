@@ -19,7 +19,6 @@ from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
@@ -27,6 +26,7 @@ from verify.compare.cell_tree import morton_order
 from verify.compare.locate import Field, squares
 from verify.compare.simplex_bodies import SimplexBody
 from verify.compare.simplices import bisect, heights, in_frames, measures, points_in, split_at_level
+from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
 

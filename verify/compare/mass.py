@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, issparse
 from scipy.sparse.csgraph import connected_components
@@ -20,6 +19,7 @@ from scipy.spatial import cKDTree
 from verify.compare.cell_tree import axes_of
 from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule, simplices
+from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.handed_over import CONSISTENT
 from verify.scene import Scene
@@ -110,12 +110,32 @@ def kinetic(
     sums, centres = np.zeros((len(moved), 3 + d + 2 * turns)), np.empty((len(moved), d))
     for row, x, v in zip(range(len(moved)), moved, solution.velocity[steps], strict=True):
         centres[row] = np.tensordot(weights, x[nodes], 2) / max(total, 1e-300)
+        if not COMPILED:
+            sums[row] = _motion_in_numpy(hats @ x[nodes], hats @ v[nodes], mass, centres[row])
+            continue
         v = np.ascontiguousarray(v)
         _add_motion(x, v, nodes, hats, mass, centres[row], axes, sums[row])
     energy, scales, linear, angular, spin = np.split(sums, np.cumsum([1, 2, d, turns]), axis=1)
     return Kinetic(
         total, centres, energy[:, 0], linear, angular, spin, *scales.max(axis=0).tolist()
     )
+
+
+def _motion_in_numpy(place: Array, speed: Array, mass: Array, centre: Array) -> list[float]:
+    """Give the sums of `_add_motion`, of place and speed (m, q, d) at the points of cells."""
+    d = len(centre)
+
+    def total(values: Array) -> float:
+        return float((mass * values).sum())
+
+    size, arm = np.linalg.norm(speed, axis=2), np.linalg.norm(place - centre, axis=2)
+    turns = [
+        total(about[..., a] * speed[..., b] - about[..., b] * speed[..., a])
+        for about in (place, place - centre)
+        for a, b in (((1, 2), (2, 0), (0, 1)) if d == 3 else ((0, 1),))
+    ]
+    linear = [total(speed[..., a]) for a in range(d)]
+    return [0.5 * total(size**2), total(size), total(arm * size), *linear, *turns]
 
 
 @njit(cache=True)
