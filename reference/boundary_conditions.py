@@ -81,6 +81,10 @@ def nodes_on_part(
     near : (k, d) array
         Centroid of a cell of each: on its side of the cuts, m.
     """
+    if scene.geometry.holds_inside(where):
+        every = space.cell_nodes, space.mesh.points[space.mesh.cells]
+        chosen, _ = held_nodes(scene, where, space.node_points, every, key)
+        return chosen, space.beside_nodes()[chosen]
     nodes, owner = space.boundary_nodes()
     of_facets, corners = space.boundary_facets
     facets = np.searchsorted(nodes, of_facets), corners
@@ -91,8 +95,8 @@ def nodes_on_part(
 def support_ends(scene: Scene, space: ConformingSpace, size: float) -> list[Regularisation]:
     """Report where supports hold more than their parts; `size` is that of the elements, m."""
     corners = space.boundary_facets[1]
-    found = [held_facets(scene.geometry, support.where, corners) for support in scene.supports]
-    return shifted_ends(found, size)
+    ended = [s.where for s in scene.supports if not scene.geometry.holds_inside(s.where)]
+    return shifted_ends([held_facets(scene.geometry, where, corners) for where in ended], size)
 
 
 def _check_every_piece_is_held(

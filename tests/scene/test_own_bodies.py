@@ -11,10 +11,14 @@ from independent_p1 import energy, energy_of_field
 from scipy.spatial import cKDTree
 
 from verify.cli import main
+from verify.compare.load_work import nodes_held
 from verify.errors import InputError
 from verify.exchange import export_case, problem_of
+from verify.geometry.simplices import measures
+from verify.runner.checking import check_scene
 from verify.scene import load_scene, read_mesh, restore_scene, scene_content
 from verify.scene.mesh_file import read_body
+from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.mesh import box_mesh
 
@@ -479,6 +483,41 @@ def test_a_closed_surface_says_that_it_has_no_rim(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(text.split("[[cuts]]")[0])
     err, _ = said_by_check(tmp_path, capsys, code=2)
     assert "supports[0]: the surface is closed and has no rim to act on" in err
+
+
+@pytest.mark.parametrize("solver", ["xfem", "conforming"])
+def test_a_closed_surface_is_held_at_a_group_of_its_triangles_or_nodes(tmp_path, solver):
+    """A bag that falls: what is in the group stands still, on both sides of a cut through it."""
+    if solver == "conforming":
+        pytest.importorskip("dolfinx_solver")
+    points, cells, _, _, turn = block(0)
+    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(4)]), axis=1)
+    facets, count = np.unique(facets, axis=0, return_counts=True)
+    skin = facets[count == 1]
+    corner = np.flatnonzero((points[skin] > 0.999).any(axis=2).all(axis=1))[:1]
+    on = np.abs(points[skin][:, :, 1]).max(axis=1) < 1e-9  # y = 0, which the cut crosses
+    blocks = [("triangle", skin), ("vertex", skin[corner, :1])]
+    parts = [np.where(on, 2, 1), np.array([3])]
+    meshio.Mesh(points @ turn, blocks, cell_data={"part": parts}).write(tmp_path / "body.vtu")
+    cut = MIDDLE + np.array([[0.1, -9, -9], [-0.1, 9, -9], [0.05, 9, 9], [0.25, -9, 9]])
+    text = CASE.format(file="body.vtu", hard="x > 9", held="group:part=2", held_too="group:part=3",
+                       geometry='cells = "surface"', cut=(cut @ turn).tolist())  # fmt: skip
+    begin, end = text.index("[[material.regions]]"), text.index("[[supports]]")
+    motion = '[analysis]\nkind = "dynamic"\nduration = 1e-2\nkinematics = "corotational"\n'
+    text = text[:begin] + "thickness = 1e-3\n" + motion + text[end:]
+    (tmp_path / "case.toml").write_text(text)
+    scene = load_scene(tmp_path / "case.toml")
+    check_scene(scene)
+    found = find_solver(solver).solve(scene, 0, 0)
+    whole, node = nodes_held(scene, found, [one.where for one in scene.supports])
+    held = np.isin(found.cells, whole).all(axis=1)
+    assert measures(found.points[found.cells[held]]).sum() == pytest.approx(1.0, rel=1e-12)
+    assert len(node) == 1
+    moved = np.linalg.norm(found.displacement[-1], axis=1)
+    assert moved[[*whole, *node]].max() == 0.0
+    fallen = 0.5 * np.linalg.norm([1.0, 2.0, 9.81]) * 1e-4  # of what nothing has reached yet
+    assert np.median(moved[moved > 0.0]) == pytest.approx(fallen, rel=0.02)
+    assert (np.delete(moved, [*whole, *node]) > 0.0).all()
 
 
 def _mutations(form, text):

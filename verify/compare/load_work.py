@@ -202,10 +202,15 @@ def nodes_held(scene: Scene, solution: Solution, where: Sequence[str]) -> list[I
     own = np.unique(facets)
     corners = solution.points[facets[:, : solution.cell_dimension]]
     rows = np.searchsorted(own, facets), corners
-    return [
-        own[held_nodes(scene, one, solution.points[own], rows, f"supports[{i}].where")[0]]
-        for i, one in enumerate(where)
-    ]
+    every = solution.cells, solution.points[solution.cells[:, : solution.cell_dimension + 1]]
+    found = []
+    for i, one in enumerate(where):
+        key = f"supports[{i}].where"
+        if scene.geometry.holds_inside(one):
+            found.append(held_nodes(scene, one, solution.points, every, key)[0])
+        else:
+            found.append(own[held_nodes(scene, one, solution.points[own], rows, key)[0]])
+    return found
 
 
 def prescribed_nodes(scene: Scene, solution: Solution) -> PrescribedNodes:

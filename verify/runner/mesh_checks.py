@@ -71,9 +71,10 @@ def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array
     inside = samples.in_body(mesh, rng)[:, 0]
     for i, support in enumerate(scene.supports):
         if support.displacement != "exact":
-            on = on_part(scene.geometry, support.where, nodes, mesh.extent)
+            at = mesh.points if scene.geometry.holds_inside(support.where) else nodes
+            on = on_part(scene.geometry, support.where, at, mesh.extent)
             given = cast(list[Any], support.displacement)
-            yield f"supports[{i}].displacement", partial(field_values, given), nodes[on]
+            yield f"supports[{i}].displacement", partial(field_values, given), at[on]
     for i, load in enumerate(scene.loads):
         if isinstance(load, Traction) and not load.exact:
             on = on_part(scene.geometry, load.where, facets, mesh.extent)

@@ -168,7 +168,7 @@ def inner_warning(scene: Scene) -> str:
                if isinstance(one, Traction)}  # fmt: skip
     said = []
     for key, where in acting.items():
-        if not scene.geometry.is_part(where):
+        if not scene.geometry.is_part(where) or scene.geometry.holds_inside(where):
             continue
         group = scene.geometry.body().group(where.removeprefix(GROUP))
         if 1 in group.parts:

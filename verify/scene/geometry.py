@@ -50,6 +50,10 @@ class _Body(Strict):
         """Whether a text is the name of a part of it, not an inequality."""
         return where in self.parts()
 
+    def holds_inside(self, where: str) -> bool:
+        """Whether a support on `where` holds what it has of the whole body, not of its boundary."""
+        return False
+
     def extremes(self) -> Array:
         """Points (n, d) whose bounding box is that of the body; none where it is not known."""
         return np.zeros((0, 3))
@@ -220,6 +224,10 @@ class MeshFile(_Body):
     def is_part(self, where: str) -> bool:
         """Whether a text is the name of a group."""
         return where.startswith(GROUP)
+
+    def holds_inside(self, where: str) -> bool:
+        """Whether `where` is a group of a membrane, which may be closed."""
+        return self.is_membrane and self.is_part(where)
 
     def on(self, part: str, points: Array, tolerance: float) -> Bools:
         """Tell which points (n, d) of the boundary lie on a group, to a tolerance, m."""

@@ -123,12 +123,15 @@ def part_without_mesh(scene: SceneTables, points: Array, cells: Ints) -> str | N
     facets = np.sort(cells[:, rest].reshape(-1, corners - 1), axis=1)
     distinct, count = np.unique(facets, axis=0, return_counts=True)
     if not (count == 1).any():
-        acting = [f"supports[{i}]" for i in range(len(scene.supports))]
+        acting = [
+            f"supports[{i}]" for i, one in enumerate(scene.supports)
+            if not scene.geometry.holds_inside(one.where)
+        ]  # fmt: skip
         acting += [f"loads[{i}]" for i, one in enumerate(scene.loads) if isinstance(one, Traction)]
         if acting:
             return (
-                f"{acting[0]}: the surface is closed and has no rim to act on; leave the triangles "
-                "of a part out of the file, or let the body move freely in a dynamic analysis"
+                f"{acting[0]}: the surface is closed and has no rim to act on; hold a group of its "
+                "triangles or nodes, or let the body move freely in a dynamic analysis"
             )
     return _without_facets(scene, points[distinct[count == 1]], "")
 
@@ -149,6 +152,8 @@ def _without_facets(scene: SceneTables, facets: Array, where_it_is: str) -> str 
     """Which part has nothing of facets (k, corners, d), and for a support no node."""
     points = facets.reshape(-1, scene.dimension)
     for key, where, area in _inequalities(scene):
+        if not area and scene.geometry.holds_inside(where):
+            continue
         touched = on_part(scene.geometry, where, points, float(np.ptp(points, axis=0).max()))
         of_facets = facets.shape[1] in _corners_of_group(scene, where)
         if area:

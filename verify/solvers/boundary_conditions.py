@@ -63,7 +63,7 @@ class Boundary:
         cell, opposite = self.facets.T
         on_facet = np.ones((len(cell), self.cells.shape[1]), dtype=bool)
         on_facet[np.arange(len(cell)), opposite] = False
-        corners: _Ints = self.cells[cell][on_facet].reshape(len(cell), -1)
+        corners: _Ints = self.cells[cell][on_facet].reshape(len(cell), self.cells.shape[1] - 1)
         return corners
 
     @cached_property
@@ -98,6 +98,9 @@ class Boundary:
         InputError
             If there is none.
         """
+        if scene.geometry.holds_inside(where):
+            every = self.cells, self.points[self.cells]
+            return held_nodes(scene, where, self.points, every, key)
         facets = np.searchsorted(self.nodes, self.corners), self.places
         found, by = held_nodes(scene, where, self.points[self.nodes], facets, key)
         return self.nodes[found], by
@@ -389,7 +392,8 @@ def _filled(
 def support_ends(scene: Scene, phantom: PhantomMesh, size: float) -> list[Regularisation]:
     """Report where supports hold more than their parts; `size` is that of the elements, m."""
     parts = _boundary_parts(phantom)
-    return shifted_ends([_held_parts(scene, s.where, parts) for s in scene.supports], size)
+    ended = [s.where for s in scene.supports if not scene.geometry.holds_inside(s.where)]
+    return shifted_ends([_held_parts(scene, where, parts) for where in ended], size)
 
 
 def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
@@ -399,14 +403,20 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     So a part may end at a cut, and a cut close to a support frees what is behind it. Where a part
     is a mere point or line, it holds the unknowns whose material reaches there.
     """
-    parts, corners = _boundary_parts(phantom), _own_corners(phantom)
+    mesh, parts, corners = phantom.mesh, _boundary_parts(phantom), _own_corners(phantom)
     own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.boundary.nodes))
     found = []
     for i, support in enumerate(scene.supports):
         mark = np.zeros(phantom.node_count, dtype=bool)
-        unknowns = parts.unknowns[_held_parts(scene, support.where, parts).held]
+        if scene.geometry.holds_inside(support.where):
+            cells = held_facets(scene.geometry, support.where, mesh.points[mesh.cells]).held
+            unknowns = phantom.corner_node[phantom.cells[cells[phantom.parent]]]
+            asked = np.flatnonzero(corners)
+        else:
+            unknowns = parts.unknowns[_held_parts(scene, support.where, parts).held]
+            asked = own
         mark[unknowns[unknowns >= 0]] = True
-        mark[own] |= points_apart(scene, support.where, phantom.node_points[own], mark[own])
+        mark[asked] |= points_apart(scene, support.where, phantom.node_points[asked], mark[asked])
         at = np.flatnonzero(mark)
         if not len(at):
             raise no_node(scene, support.where, f"supports[{i}].where")
