@@ -15,7 +15,8 @@ In the plane (strain) the stretch across is 1, and ‖F‖² − d and J are tho
 """
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import njit
 
 
 @njit(cache=True)
