@@ -4,10 +4,12 @@ import meshio
 import numpy as np
 import pytest
 
+from verify.cli import main
 from verify.errors import InputError
 from verify.exchange import problem_of
 from verify.geometry.simplices import measures
 from verify.judge.convergence import extrapolate
+from verify.result import Verdict, read_result
 from verify.scene import load_scene, read_mesh
 from verify.scene.parts import pieces_on_part
 from verify.solvers import find_solver
@@ -259,3 +261,38 @@ def test_in_space_a_body_turns_in_along_edges(tmp_path):
     lines = singular_lines(scene, *read_mesh(scene), np.zeros((0, 3), dtype=int)) @ turn.T
     np.testing.assert_allclose(lines[..., :2], 0.5, atol=1e-12)
     assert np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1).sum() == pytest.approx(1.0)
+
+
+JUDGED = """
+[[acceptance]]
+check = "error"
+metric = "{metric}"
+at_most = 0.6
+"""
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(
+    ("d", "refine"), [(2, 0), pytest.param(3, 2, marks=pytest.mark.heavy)]
+)  # fmt: skip
+def test_what_the_reference_is_too_coarse_for_is_undecided(tmp_path, d, refine):
+    """At a tip of a cut amid a sponge the stress is not known from three levels.
+
+    In the plane they are refined uniformly, in space graded; displacements they do judge.
+    """
+    pytest.importorskip("dolfinx_solver")
+    mesh = body(d, 5, 4 if d == 2 else 2)
+    load = REGION + f'[[loads]]\nkind = "gravity"\nacceleration = {[3.0, 5.0, -9.81][:d]}\n'
+    case(tmp_path, d, mesh, cut_across(d, mesh[-1], reach=0.6), refine=refine, more=load)
+    checks = "".join(JUDGED.format(metric=one) for one in ("displacement_l2", "energy_norm"))
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(path.read_text() + checks)
+    run = ["run", str(path), "--solver", "xfem", "--no-conform", "--no-report", "--out", str(out)]
+    main([*run, "--repetitions", "1"])
+    result = read_result(out / "cases" / "case" / "result.json")
+    verdicts = {one.metric: one for one in result.verdicts}
+    assert verdicts["displacement_l2"].verdict is Verdict.PASS
+    assert verdicts["energy_norm"].verdict is Verdict.UNDECIDED
+    assert verdicts["energy_norm"].high > 0.6
+    assert result.reference.suffices is False
+    assert len(result.reference.levels) == 3
