@@ -5,7 +5,9 @@ import pytest
 from cut_meshes import STRAIGHT, layered, quadratic, scene, solution
 from judged_fields import Cubic, judged
 
+from verify.compare.body import body_of
 from verify.judge.accuracy import assess_accuracy
+from verify.judge.quantities import Measured
 from verify.judge.verdict import with_verdicts
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.runner.run import SOLVER_FAILED, exit_code
@@ -172,6 +174,24 @@ def test_a_solution_on_half_of_the_body_is_not_measured_but_named():
     result = assess([BOUND], {"xfem": {0: half}}, EXACT)
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert "cover 0.5 of the body" in result.verdicts[0].reason
+
+
+def test_of_many_cells_some_are_looked_at_and_enough_to_find_what_is_outside():
+    body = body_of(case([]))
+    one = interpolant(101)  # more cells than are looked at
+    beside = replace(one, points=one.points + np.array([0.3, 0.0]))
+    for found, share in ((one, 0.0), (beside, 0.3)):
+        assert Measured(found, body, None).outside == pytest.approx(share, abs=0.01)
+
+
+def test_an_energy_that_is_zero_is_known_as_far_as_strains_are():
+    """To 1e-10 of the displacement over the size of the body: ½ (λ + 2μ) ε² of the unit square."""
+    levels = {i: replace(one, displacement=0 * one.displacement + 0.3)
+              for i, one in LEVELS.items()}  # fmt: skip
+    found = assess([], {"reference": levels}, quantities=[{"kind": "strain_energy"}])
+    known = found.reference.metrics["strain_energy"]
+    assert known["reason"] == "zero but for round-off"
+    assert known["uncertainty"] == pytest.approx(0.5 * (0.3 + 0.4) / 0.52 * (0.3e-10) ** 2)
 
 
 def test_a_solution_beside_the_body_is_not_measured_but_named():

@@ -9,6 +9,7 @@ from cut_meshes import grid
 from judged_fields import Quadratic, judged
 from membrane_meshes import layers, line, membrane, roof
 
+from verify.compare.body import body_of
 from verify.result import Verdict
 from verify.scene import load_scene
 
@@ -114,3 +115,14 @@ def test_another_surface_or_a_part_of_one_is_an_error(sheet):
         result = judged(scene, {"xfem": {0: solution}}, TRUTH)
         assert result.verdicts[0].verdict is Verdict.ERROR
         assert reason in result.verdicts[0].reason
+
+
+def test_how_far_a_surface_lies_off_that_of_the_scene_is_said_beyond_round_off_of_its_size(sheet):
+    scene, whole = sheet(EXACT), interpolant(4)
+    size = body_of(scene).size
+    assert size > 1.2  # of one, shares and lengths were the same
+    for share, said in ((0.9, False), (2.5, True)):
+        lift = np.array([0.0, 0.0, share * 1e-10 * size])
+        (record,) = judged(scene, {"xfem": {0: replace(whole, points=whole.points + lift)}}, TRUTH
+                           ).solves  # fmt: skip
+        assert ("surface" in record.notes) is said

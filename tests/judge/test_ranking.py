@@ -67,13 +67,21 @@ def test_a_solver_that_fails_somewhere_is_listed_and_not_ranked_on_the_rest():
     assert ("b", "y") in {(e["case"], e["solver"]) for e in ranking["left_out"]}
 
 
+def test_of_a_case_that_the_reference_alone_solved_no_error_is_missed():
+    failed = solve("a", "x", 0, status=Status.FAILED, reason="singular")
+    ranking = rank_solvers([case_of("a", [solve("a", "reference", 0), failed])])
+    assert [entry["solver"] for entry in ranking["left_out"]] == ["x"]
+
+
 def test_a_case_that_is_exact_to_round_off_does_not_enter_the_mean():
     results = [
         case_of("patch", [solve("patch", "x", 0, 1e-15), solve("patch", "y", 0, 0.1)]),
         case_of("b", [solve("b", "x", 0, 0.2), solve("b", "y", 0, 0.1)]),
     ]
-    found, by = compared(rank_solvers(results))
+    ranking = rank_solvers(results)
+    found, by = compared(ranking)
     assert by["x"]["value"] == pytest.approx(2.0)
+    assert compared(ranking, view="where a solver is exact")[1]["x"]["rank"] == 1
     (entry,) = [e for e in found["left_out"] if e["case"] == "patch"]
     assert "round-off: x" in entry["reason"]
     assert "y 1.00e-01" in entry["reason"]
