@@ -144,6 +144,13 @@ def test_time_at_equal_error_is_that_of_the_power_laws():
     assert not found["left_out"]
 
 
+def test_time_is_compared_at_no_error_that_the_reference_cannot_tell_from_none():
+    solves = [solve("a", "x", 0, 0.1, 0.0, 1.0), solve("a", "x", 1, 0.05, 0.06, 100.0),
+              solve("a", "y", 0, 0.1, 0.0, 2.0), solve("a", "y", 1, 0.05, 0.0, 8.0)]  # fmt: skip
+    _, by = compared(rank_solvers([case_of("a", solves)]), "cost", view="time at equal error")
+    assert (by["x"]["value"], by["y"]["value"]) == pytest.approx((1.0, 2.0))
+
+
 @pytest.mark.parametrize(
     ("repetitions", "notes", "said"),
     [(1, {}, 1), (2, {}, 1), (3, {}, 0), (3, {"timing": "contended: load 9 on 2 cores"}, 1)],
