@@ -271,10 +271,9 @@ at_most = 0.6
 """
 
 
+@pytest.mark.heavy
 @pytest.mark.fenicsx
-@pytest.mark.parametrize(
-    ("d", "refine"), [(2, 0), pytest.param(3, 2, marks=pytest.mark.heavy)]
-)  # fmt: skip
+@pytest.mark.parametrize(("d", "refine"), [(2, 0), (3, 2)])
 def test_what_the_reference_is_too_coarse_for_is_undecided(tmp_path, d, refine):
     """At a tip of a cut amid a sponge the stress is not known from three levels.
 
