@@ -12,7 +12,8 @@ def speed():
     rows = {}
 
     def add(what, beside, size, ratio, most, exponent=""):
-        rows[f"{what}, {size}"] = [what, beside, size, f"{ratio:.2f}", f"{most:g}", exponent]
+        most = f"{most:.3g}" if most else "–"
+        rows[what, beside, size] = [what, beside, size, f"{ratio:.3g}", most, exponent]
 
     yield add
     if rows and "VERIFY_SPEED" in os.environ:

@@ -22,6 +22,7 @@ all nodes of the cell on its other side. The side of a dof node is that of its p
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
@@ -214,6 +215,7 @@ def number_nodes(
 _TIE = 1e-12
 
 
+@njit(cache=True)
 def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats) -> Sides:
     """Sides (p, cuts) of the cuts on which pieces lie; plus where a centroid is on the cut.
 
@@ -227,14 +229,18 @@ def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats
     weights : (p, d + 1) float array
         Barycentric coordinates of the centroids, up to a positive factor.
     """
-    # φ(centroid) = Σ_i λ_i φ_i, a corner at a time: there may be hundreds of cuts
-    level, whole = np.zeros((2, *label.shape))
-    for w, nodes in zip(weights.T, corners.T, strict=True):
-        share = w[:, None] * level_sets[nodes]
-        level += share
-        whole += np.abs(share)
-    side = np.where(level >= -_TIE * whole, 1, -1)
-    return np.where(label != 0, label, side).astype(np.int8)
+    # φ(centroid) = Σ_i λ_i φ_i, in one pass: there may be a thousand cuts
+    side = np.empty_like(label)
+    for piece in range(len(label)):
+        for k in range(label.shape[1]):
+            level = whole = 0.0
+            for i in range(corners.shape[1]):
+                share = weights[piece, i] * level_sets[corners[piece, i], k]
+                level += share
+                whole += abs(share)
+            own = 1 if level >= -_TIE * whole else -1
+            side[piece, k] = own if label[piece, k] == 0 else label[piece, k]
+    return side
 
 
 def node_sides(
@@ -267,7 +273,8 @@ def node_sides(
     share : (p,) float array
         Volume over that of the cell; 0 for whole cells, which have no vote.
     """
-    side = np.empty((len(node_parent), label.shape[1]), dtype=np.int8)
+    on_cut = level_sets == 0.0
+    side = np.where(level_sets >= 0.0, np.int8(1), np.int8(-1))[node_parent]
     # where a node's own material has no volume, its number is of an unknown beyond a cut
     own = np.zeros(len(node_parent), dtype=bool)
     piece, cut = np.nonzero(label)
@@ -275,21 +282,25 @@ def node_sides(
     against = np.zeros(cells.shape, dtype=np.int64)
     np.add.at(against, piece, label[piece, cut][:, None] * level < 0.0)
     own[cells[against == 0]] = True
-    voters = np.flatnonzero(share)
-    nodes = cells[voters].ravel()
+    # votes are asked where a node tells nothing: of another material, or exactly on a cut, where it
+    # has its own where its pieces are
+    asks = ~own | on_cut.any(axis=1)[node_parent]
+    voters = np.flatnonzero((share > 0.0) & asks[cells].any(axis=1))
+    nodes, number = np.unique(cells[voters], return_inverse=True)
+    number, count = number.ravel(), len(nodes)
     for k in range(label.shape[1]):
-        above, below = (_at_any(cells[sign * label[:, k] > 0], len(side)) for sign in (1, -1))
         weight = np.repeat(share[voters] * piece_side[voters, k], cells.shape[1])
-        vote = np.bincount(nodes, weight, minlength=len(node_parent))
-        vote[np.abs(vote) <= _TIE * np.bincount(nodes, np.abs(weight), len(node_parent))] = 0.0
-        level = level_sets[node_parent, k]
-        # a node exactly on the cut has its material where its pieces are
-        told = np.where((vote == 0.0) | (own & (level != 0.0)), level, vote)
-        side[:, k] = np.where(above != below, np.where(above, 1, -1), np.where(told >= 0, 1, -1))
+        vote = np.bincount(number, weight, count)
+        heard = np.abs(vote) > _TIE * np.bincount(number, np.abs(weight), count)
+        heard &= ~own[nodes] | on_cut[node_parent[nodes], k]
+        side[nodes[heard], k] = np.where(vote[heard] > 0.0, 1, -1)
+    # where all labelled pieces are on one side
+    at, of = cells[piece].ravel(), np.repeat(cut, cells.shape[1])
+    pairs, number = np.unique(at * label.shape[1] + of, return_inverse=True)
+    sign = np.repeat(label[piece, cut], cells.shape[1])
+    least, most = np.full((2, len(pairs)), [[1], [-1]], dtype=np.int8)
+    np.minimum.at(least, number, sign)
+    np.maximum.at(most, number, sign)
+    told = least == most
+    side[np.divmod(pairs[told], label.shape[1])] = least[told]
     return side
-
-
-def _at_any(cells: Ints, count: int) -> Bools:
-    found = np.zeros(count, dtype=bool)
-    found[cells] = True
-    return found
