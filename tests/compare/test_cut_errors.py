@@ -96,6 +96,7 @@ def test_a_tooth_inside_an_element_is_in_the_error(solver):
     assert record.cut.lateral > 0.1
     assert record.cut.errors["displacement_l2"] < 1e-10  # as it was judged before
     assert "there without continuation" in record.notes[CUT]
+    assert "cut beside where it was asked" in {one.kind for one in record.regularisations}
 
 
 def test_where_a_cut_lies_is_said_in_a_body_of_any_size():
