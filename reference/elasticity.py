@@ -111,15 +111,12 @@ def solve_linear(
     if pressure:
         _check_pressure(scene)
     law = Law(scene.material, space, "linear", pressure)
-    unknowns, v = law.unknowns, ufl.TestFunction(space.function_space)
-    held, values = constrained_values(scene, space, exact)
-    form, load = law.stiffness_form, fem.form(load_form(scene, space, v, exact))
+    unknowns, (held, values) = law.unknowns, constrained_values(scene, space, exact)
+    load = fem.form(load_form(scene, space, ufl.TestFunction(space.function_space), exact))
     start = perf_counter()
-    matrix = assembled_matrix(form)
-    if method is None:
-        most = _MOST_DIRECT_MIXED if pressure else _MOST_DIRECT
-        small = space.dimension == 2 or matrix.getSize()[0] <= most
-        method = "direct" if small else "multigrid"
+    matrix = assembled_matrix(law.stiffness_form)
+    most = _MOST_DIRECT_MIXED if pressure else _MOST_DIRECT
+    small = space.dimension == 2 or matrix.getSize()[0] <= most
     x, vector = law.solution.x.petsc_vec, matrix.createVecLeft()
     vector.array[:] = unknowns.own_part(nodal_forces(load, space))
     own, at = unknowns.own_unknowns(held)
@@ -127,7 +124,7 @@ def solve_linear(
     # symmetric elimination; the free rows keep their equilibrium, and any component can be held
     matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix), x, vector)
     timings = {"assembly": perf_counter() - start}
-    if method == "direct":
+    if method == "direct" or (method is None and small):
         solver = factorised(matrix, "symmetric" if pressure else "definite")
         timings["factorisation"] = perf_counter() - start - timings["assembly"]
         with naming_weak_places(scene, space, unknowns):
@@ -142,10 +139,10 @@ def solve_linear(
         answer = solve_by_multigrid(matrix, space, x, vector, tolerance, flat)
     timings["solve"] = perf_counter() - start - sum(timings.values())
     law.update()
-    stored, displacement = law.stored(), unknowns.everywhere(x.array)
+    found = LinearSolve(unknowns.everywhere(x.array), law.stored(), answer, timings)
     for entry in (matrix, vector):
         entry.destroy()
-    return LinearSolve(displacement, stored, answer, timings)
+    return found
 
 
 def _unknowns_of_flat_cells(matrix: Any, space: ConformingSpace) -> NDArray[np.int32]:

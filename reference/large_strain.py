@@ -13,11 +13,10 @@ from reference.deformation import MembraneStretch
 from reference.inside_out import Orientation, OrientationCheck, place_text
 from reference.law import ENERGIES, Law, quadrature
 from reference.linear_solvers import (
+    Cycle,
     mean_stiffness,
     modes_not_positive,
-    near_null_space,
     options,
-    set_multigrid,
     solve_directly,
 )
 from reference.space import ConformingSpace, LinearElements
@@ -86,6 +85,7 @@ class StrainEquations:
         from dolfinx.fem import petsc
 
         self._law, self._space, self.iterations = law, space, 0
+        self.method = "PETSc SNES, MUMPS Cholesky"
         self._most_inverted = most_inverted
         self._unknowns, self.solution = law.unknowns, law.solution
         self._own, self._at = self._unknowns.own_unknowns(held)
@@ -106,6 +106,7 @@ class StrainEquations:
         self._load.array[:] = 0.0 if load is None else self._unknowns.own_part(load)
         self._force = self._diagonal = 0.0
         self._first_residual = self._residual_before = self._contraction = np.inf
+        self._cycle: Cycle | None = None
         self._solver = self._newton()
         self._unproven = self._solver.getKSP().getType() == "preonly"
 
@@ -246,8 +247,9 @@ class StrainEquations:
     def destroy(self) -> None:
         """Free what PETSc holds."""
         for entry in (self._solver, self._matrix, self._vector, self._increment, self._load,
-                      self._held):  # fmt: skip
-            entry.destroy()
+                      self._held, self._cycle):  # fmt: skip
+            if entry is not None:
+                entry.destroy()
 
     def _assemble_residual(self, _snes: Any, x: Any, out: Any) -> None:
         self._take(x)
@@ -261,6 +263,19 @@ class StrainEquations:
         self._take(x)
         self._assemble(matrix, snes.getIterationNumber())
         matrix.zeroRowsColumns(self._held, self._diagonal)
+        self._renew_cycle()
+
+    def _renew_cycle(self) -> None:
+        """Let the multigrid cycle, if there is one, follow the tangent; make it of the first."""
+        linear = self._solver.getKSP()
+        if linear.getType() == "preonly":
+            return
+        if self._cycle is None:
+            self._cycle = Cycle(self._matrix, self._space, definite=False)
+            self._cycle.set(linear)
+            self.method = f"PETSc SNES, GMRES with {self._cycle.name}"
+        else:
+            self._cycle.update(self._matrix)
 
     def _follow(self, values: Array) -> None:
         """Let pieces turn with their supports; what is left is the linear response's."""
@@ -295,6 +310,7 @@ class StrainEquations:
         self._matrix.zeroRowsColumns(self._held, self._diagonal, increment, vector)
         linear = self._solver.getKSP()
         linear.setOperators(self._matrix)
+        self._renew_cycle()
         if self._unproven:  # at rest: what is held too weakly shows as in linear statics
             solve_directly(linear, self._matrix, increment, vector)
             self._unproven = False
@@ -360,14 +376,10 @@ class StrainEquations:
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
             linear.getPC().setFactorSolverType("mumps")
-            self.method = "PETSc SNES, MUMPS Cholesky"
             return solver
-        matrix.setNearNullSpace(near_null_space(matrix, space))
-        set_multigrid(linear)
         linear.setType("gmres")
         linear.setGMRESRestart(100)
         linear.setTolerances(rtol=_LINEAR, atol=0.0, max_it=400)
-        self.method = "PETSc SNES, GMRES with GAMG"
         return solver
 
 

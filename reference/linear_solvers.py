@@ -233,7 +233,7 @@ def solve_by_multigrid(
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
-    cycle = _Cycle(matrix, space)
+    cycle = Cycle(matrix, space)
     own = np.zeros(0, dtype=np.int32) if flat is None else flat
     if 0 < matrix.comm.tompi4py().allreduce(len(own)) < _MOST_FLAT * matrix.getSize()[0]:
         norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
@@ -258,15 +258,22 @@ def solve_by_multigrid(
         cycle.destroy()
 
 
-class _Cycle:
+class Cycle:
     """A multigrid cycle for the matrix of a space.
+
+    Parameters
+    ----------
+    matrix : PETSc Mat
+    space : ConformingSpace
+    definite : bool
+        Whether the matrix is positive definite.
 
     Attributes
     ----------
     name : str
     """
 
-    def __init__(self, matrix: Any, space: ConformingSpace) -> None:
+    def __init__(self, matrix: Any, space: ConformingSpace, definite: bool = True) -> None:
         from petsc4py import PETSc
 
         self.name = "GAMG"
@@ -281,12 +288,18 @@ class _Cycle:
         self._linear = PETSc.Mat().createAIJ(sizes, csr=parts, comm=matrix.comm)
         self._below = matrix.PtAP(self._linear)
         self._below.setBlockSize(d)
-        self._below.setOption(PETSc.Mat.Option.SPD, True)
+        kind = PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC
+        self._below.setOption(kind, True)
         self._entries = [self._linear, self._below]
         self._direct = shares.shape[1] <= _MOST_CORNERS
         if not self._direct:
             self._below.setNearNullSpace(near_null_space(self._below, space, corners))
         self.name = "linear elements" if self._direct else "linear elements and GAMG"
+
+    def update(self, matrix: Any) -> None:
+        """Follow a matrix whose entries have changed."""
+        if self._entries:
+            matrix.PtAP(self._linear, self._below)
 
     def set(self, solver: Any) -> None:
         """Let a PETSc KSP be preconditioned by the cycle, its norm that of the true residual."""
@@ -305,6 +318,7 @@ class _Cycle:
             solver.setUp()  # GAMG reads what it is to be then
 
     def destroy(self) -> None:
+        """Free what PETSc holds."""
         for entry in self._entries:
             entry.destroy()
 
@@ -312,7 +326,7 @@ class _Cycle:
 class _CyclesBetweenFlatCells:
     """Preconditioner of PETSc: flat cells directly, a multigrid cycle, flat cells directly."""
 
-    def __init__(self, matrix: Any, flat: NDArray[np.int32], cycle: _Cycle) -> None:
+    def __init__(self, matrix: Any, flat: NDArray[np.int32], cycle: Cycle) -> None:
         from petsc4py import PETSc
 
         self._matrix = matrix

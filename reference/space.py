@@ -316,6 +316,15 @@ class ConformingSpace(Unknowns):
         nodes = self.facet_nodes(*self.mesh.boundary.T)
         return nodes, self.node_points[nodes[:, : self.mesh.cell_dimension]]
 
+    @cached_property
+    def edge_ends(self) -> NDArray[np.int64]:
+        """(n, 2) corner nodes at the ends of the edge that each node halves; itself of a corner."""
+        k = self.mesh.cell_dimension
+        ends = np.repeat(np.arange(len(self.node_points))[:, None], 2, axis=1)
+        for e, edge in enumerate(_VTK_EDGES[: 3 * (k - 1)] if self.degree == 2 else ()):
+            ends[self.cell_nodes[:, k + 1 + e]] = self.cell_nodes[:, edge]
+        return ends
+
     def interpolation_of_corners(self) -> tuple[csr_array, NDArray[np.int64]]:
         """Interpolate linear elements on the same mesh by the quadratic ones of this space.
 
@@ -326,10 +335,7 @@ class ConformingSpace(Unknowns):
         corners : (c,) int array
             Nodes of this rank that are corners.
         """
-        k = self.mesh.cell_dimension
-        ends = np.repeat(np.arange(len(self.node_points))[:, None], 2, axis=1)
-        for e, edge in enumerate(_VTK_EDGES[: 3 * (k - 1)]):
-            ends[self.cell_nodes[:, k + 1 + e]] = self.cell_nodes[:, edge]
+        ends = self.edge_ends
         own = self.node_of_dof[: self.owned]
         every = np.concatenate(self.function_space.mesh.comm.allgather(own))
         is_corner = ends[:, 0] == ends[:, 1]
@@ -407,11 +413,10 @@ class LinearElements:
 
     def __init__(self, fine: ConformingSpace) -> None:
         comm, corners = fine.function_space.mesh.comm, fine.mesh.cell_dimension + 1
-        self.space = space = conforming_space(fine.mesh, 1, comm if comm.size > 1 else None)
-        self._ends = np.empty((len(fine.node_points), 2), dtype=np.int64)
-        pairs = [(k, k) for k in range(corners)] + _VTK_EDGES[: 3 * (corners - 2)]
-        for column, pair in enumerate(pairs):
-            self._ends[fine.cell_nodes[:, column]] = space.cell_nodes[:, pair]
+        self.space = conforming_space(fine.mesh, 1, comm if comm.size > 1 else None)
+        number = np.empty(len(fine.node_points), dtype=np.int64)
+        number[fine.cell_nodes[:, :corners]] = self.space.cell_nodes
+        self._ends = number[fine.edge_ends]
 
     def refined(self, u: Array) -> Array:
         """Displacements of the quadratic space that are those (n, d) of the linear elements."""

@@ -189,28 +189,42 @@ def stress_intensity(
     stresses = stresses or stress_of(solution, law, step)
     force = net_force(solution, material, body_force, drag, step)
     modes = tip_fields(material, tip, direction, arc)
-    u = solution.displacement[step]
-    values, released = [], []
+    found = []
     for radius in np.atleast_1d(radii):
         around = ring(solution, tip, float(radius), force is not None, step)
-        at = around.at
-        way, turn = ahead_of(at.points, tip, direction, arc)
-        moved = at.shape @ u[solution.cells[around.cells]]
-        change = np.einsum("mqij,mqj->mqi", at.gradient, way) - moved @ turn.T
-        stress = stresses(around.cells, at)
-        forces = None if force is None else force(around.cells, at)
-        found = [
-            _interaction(around, law, stress, change, way, turn, mode, forces) for mode in modes
-        ]
-        values.append([0.5 * law.plane_modulus * one for one in found])
-        flux = np.einsum("mqij,mqi->mqj", stress, change)
-        flux -= 0.5 * np.sum(stress * at.gradient, axis=(2, 3))[..., None] * way
-        released.append(_integral(around, flux, change, forces))
-    domains = np.array(values)
+        ways = ahead_of(around.at.points, tip, direction, arc)
+        moved = around.at.shape @ solution.displacement[step][solution.cells[around.cells]]
+        stress = stresses(around.cells, around.at)
+        forces = None if force is None else force(around.cells, around.at)
+        found.append(_of_ring(around, law, stress, moved, ways, modes, forces))
+    domains, release = np.array([factors for factors, _ in found]), [g for _, g in found]
+    mean, spread = _mean(domains)
+    return StressIntensity(*map(float, mean), float(np.mean(release)), spread, domains)
+
+
+def _mean(domains: Array) -> tuple[Array, Array]:
+    """Mean over domains, and the largest deviation of one from it."""
     mean = domains.mean(axis=0)
-    spread = np.abs(domains - mean).max(axis=0)
-    release = float(np.mean(released))
-    return StressIntensity(float(mean[0]), float(mean[1]), release, spread, domains)
+    return mean, np.abs(domains - mean).max(axis=0)
+
+
+def _of_ring(
+    around: Ring,
+    law: Hooke,
+    stress: Array,
+    moved: Array,
+    ways: tuple[Array, Array],
+    modes: list[list[tuple[float, ExactSolution]]],
+    forces: Array | None,
+) -> tuple[list[float], float]:
+    """K_I and K_II, and G, from one ring, of which stress and displacement are given."""
+    way, turn = ways
+    change = np.einsum("mqij,mqj->mqi", around.at.gradient, way) - moved @ turn.T
+    each = [_interaction(around, law, stress, change, way, turn, mode, forces) for mode in modes]
+    flux = np.einsum("mqij,mqi->mqj", stress, change)
+    flux -= 0.5 * np.sum(stress * around.at.gradient, axis=(2, 3))[..., None] * way
+    factors = [0.5 * law.plane_modulus * one for one in each]
+    return factors, _integral(around, flux, change, forces)
 
 
 def _interaction(
@@ -290,11 +304,10 @@ def front_intensity(
     terms of its curvature (M. Gosz & B. Moran, Eng. Fract. Mech. 69, 2002):
     M = ∫ (σ_ij û_i,k + σ̂_ij u_i,k − σ:ε̂ δ_kj) q_k,j
     + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − (f_i − ρ (ü_i + α u̇_i)) û_i,k) q_k dV. The virtual
-    extension q points
-    ahead of the front, falls off linearly from half the radius to the radius, and along the front
-    by a hat per station: K is a mean with that weight. Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds.
-    G is ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds, of the
-    field alone.
+    extension q points ahead of the front, falls off linearly from half the radius to the radius,
+    and along the front by a hat per station: K is a mean with that weight.
+    Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds. G is, of the field alone,
+    ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds.
 
     Parameters
     ----------
@@ -307,17 +320,11 @@ def front_intensity(
         Radii of the tubes, m, below the front's own radius.
     stations : int
         Number of stations; with one, a closed front gives its mean.
-    body_force : (3,) array or callable, optional
-        Force per volume, or its values (n, 3) at points (n, 3), N/m³.
-    drag : float
-        α, Rayleigh's damping by the mass, 1/s.
-    step : int
-        Which output time; default the last.
     fitted : bool
         Whether cells of the mesh must touch the front. They need not in a mesh whose cut ends
         beside the front.
-    stresses : callable, optional
-        What `stress_of` gives for the solution: where several fronts share it.
+    body_force, drag, step, stresses
+        As for `stress_intensity`; forces (3,) or at points (n, 3).
 
     Raises
     ------
@@ -334,13 +341,7 @@ def front_intensity(
     at = front.coordinates(solution.points[corners])
     away = np.hypot(at.ahead, at.across)
     centres, width = _stations(front, stations)
-    along = at.along[place[solution.cells[:, :4]]]
-    beside = np.ones(len(along), dtype=bool)
-    if not front.closed:  # hats are zero beyond its ends
-        beside = (along.max(axis=1) > 0.0) & (along.min(axis=1) < front.length)
-    for radius in radii:
-        _check_fit(solution, away[place[solution.cells[beside, :4]]], radius, fitted)
-    within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
+    within = _tube(solution, front, away[place], at.along[place], radii, fitted)
     nodes = place[solution.cells[within, :4]]
     force = net_force(solution, material, body_force, drag, step)
     stresses = stresses or stress_of(solution, hooke(material), step)
@@ -351,14 +352,9 @@ def front_intensity(
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
     extents = _lengths(front, solution.points[corners], nodes, away, hats)
-    if extents.min() <= 1e-3 * front.length / stations:
-        raise InputError(
-            f"{stations} stations along a front of {front.length:.4g} m: one of them has no node "
-            "of the mesh; ask for fewer, or refine"
-        )
     scale = np.array([modulus, modulus, hooke(material).shear, 1.0]) / extents[:, None]
     domains = np.array([(hats * fall) @ nodal * scale for fall in falls])
-    mean, spread = domains.mean(axis=0), np.abs(domains - domains.mean(axis=0)).max(axis=0)
+    mean, spread = _mean(domains)
     return FrontIntensity(centres, mean[:, :3], mean[:, 3], spread[:, :3], domains[:, :, :3])
 
 
@@ -381,6 +377,19 @@ def _hat(front: Front, along: Array, centre: float, width: float | None) -> Arra
     if front.closed:
         apart = np.mod(apart + 0.5 * front.length, front.length) - 0.5 * front.length
     return np.clip(1.0 - np.abs(apart) / width, 0.0, 1.0)
+
+
+def _tube(
+    solution: Solution, front: Front, away: Array, along: Array, radii: Array, fitted: bool
+) -> NDArray[np.int64]:
+    """Cells within the largest radius, by the distances and places of nodes; radii must fit."""
+    away, along = away[solution.cells[:, :4]], along[solution.cells[:, :4]]
+    beside = np.ones(len(along), dtype=bool)
+    if not front.closed:  # hats are zero beyond its ends
+        beside = (along.max(axis=1) > 0.0) & (along.min(axis=1) < front.length)
+    for radius in radii:
+        _check_fit(solution, away[beside], radius, fitted)
+    return np.flatnonzero((away < radii.max()).any(axis=1))
 
 
 def _lengths(
@@ -409,6 +418,11 @@ def _lengths(
         inside = int(share.min(axis=1).argmax())
         if share[inside].min() > -_ROUND_OFF:  # else beyond the surface of the body
             total += hats[:, cells[near[inside]]] @ share[inside]
+    if total.min() * step <= 1e-3 * front.length / len(hats):
+        raise InputError(
+            f"{len(hats)} stations along a front of {front.length:.4g} m: one of them has no node "
+            "of the mesh; ask for fewer, or refine"
+        )
     return total * step
 
 
