@@ -199,7 +199,8 @@ def stress_intensity(
         found.append(_of_ring(around, law, stress, moved, ways, modes, forces))
     domains, release = np.array([factors for factors, _ in found]), [g for _, g in found]
     mean, spread = _mean(domains)
-    return StressIntensity(*map(float, mean), float(np.mean(release)), spread, domains)
+    first, second = map(float, mean)
+    return StressIntensity(first, second, float(np.mean(release)), spread, domains)
 
 
 def _mean(domains: Array) -> tuple[Array, Array]:
