@@ -1,7 +1,8 @@
 """A mesh file read by gmsh, as a program: ``python -m reference.meshing.gmsh_file IN OUT.npz``.
 
 OUT has the points, for each entity with elements a block of their corners, and the names of the
-physical groups of the blocks. Elements of higher order are taken by their corners.
+physical groups of the blocks; in formats that have none, the numbers of entities, which are the
+properties of Nastran and the solids of an STL. Elements of higher order are taken by their corners.
 """
 
 import sys
@@ -29,12 +30,12 @@ def main(source: str, out: str) -> None:
         gmsh.option.setNumber("General.Terminal", 0)
         try:
             gmsh.merge(str(copy))
-            _write(out)
+            _write(out, has_names=copy.suffix == ".msh")
         finally:
             gmsh.finalize()
 
 
-def _write(out: str) -> None:
+def _write(out: str, has_names: bool) -> None:
     tags, places, _ = gmsh.model.mesh.getNodes()
     if not len(tags):
         raise SystemExit("it has no nodes")
@@ -43,11 +44,13 @@ def _write(out: str) -> None:
     blocks: dict[str, Any] = {}
     kinds: list[str] = []
     groups: list[tuple[str, str]] = []
+    has_names = has_names or bool(gmsh.model.getPhysicalGroups())
     for dimension, entity in gmsh.model.getEntities():
         names = [
             gmsh.model.getPhysicalName(dimension, int(tag)) or str(tag)
             for tag in gmsh.model.getPhysicalGroupsForEntity(dimension, entity)
         ]
+        names = names if has_names else [str(entity)]
         types, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
         for kind, own in zip(types, nodes, strict=True):
             _, _, _, count, _, corners = gmsh.model.mesh.getElementProperties(kind)

@@ -427,7 +427,7 @@ def test_xdmf_in_hdf5_is_read_with_its_tags(tmp_path):
 
 
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("version", ["1", "4.1 with a part in no group"])
+@pytest.mark.parametrize("version", ["1", "4.1 with a part in no group", "of Nastran"])
 def test_what_meshio_does_not_read_gmsh_does(tmp_path, version):
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
     if version == "1":
@@ -440,7 +440,15 @@ def test_what_meshio_does_not_read_gmsh_does(tmp_path, version):
         text = msh41(np.array(points, float), parts, {"fat": (1, 3)})
         (tmp_path / "body.msh").write_text(text)
         groups = {"fat": [0]}
-    body = read_body(tmp_path / "body.msh", 3)
+    name = "body.msh"
+    if version == "of Nastran":  # two properties, without the rest of a deck
+        name, groups = "body.bdf", {"7": [0], "9": [1]}
+        rows = ["".join(f"{x:<8}" for x in ("GRID", i + 1, 0, *map(float, p)))
+                for i, p in enumerate(points)]  # fmt: skip
+        rows += ["".join(f"{x:<8}" for x in ("CTETRA", i + 1, 7 + 2 * i, *(n + 1 for n in cell)))
+                 for i, cell in enumerate([[0, 1, 2, 3], [1, 2, 3, 4]])]  # fmt: skip
+        (tmp_path / name).write_text("\n".join(["$ two", *rows, "ENDDATA", ""]))
+    body = read_body(tmp_path / name, 3)
     assert len(body.cells) == 2
     assert {name: group.cells.tolist() for name, group in body.groups.items()} == groups
 
