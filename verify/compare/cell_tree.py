@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from verify.compiled import COMPILED, njit
 
 LEAF = 4  # cells per leaf
+_AT_ONCE, _BESIDE = 1 << 15, 8  # points: that numpy takes, and of which it tries one first
 # Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
 _SPREAD = {
     2: (
@@ -357,38 +358,65 @@ def _holding_in_numpy(
     points: Floats, directions: Floats, sided: bool, wanted: NDArray[np.int8],
     searched: SearchedCells, sides: NDArray[np.int8], tolerance: float, found: Ints,
 ) -> None:  # fmt: skip
-    """Do as `_containing` for all points at once, level by level of the tree."""
-    lower, upper, cells, corners, normals, centres = searched
-    leaves, at_once = len(lower) // 2, 1 << 15
-    low, high = corners.min(axis=1) - tolerance, corners.max(axis=1) + tolerance
+    """Do as `_containing` for all points at once, first for some: others share their cells."""
+    _, _, _, corners, normals, centres = searched
     offsets = np.einsum("mka,mka->mk", normals, np.roll(corners, -1, axis=1))
-    for first in range(0, len(points), at_once):
-        x = points[first : first + at_once]
-        row, node = np.arange(len(x)), np.ones(len(x), dtype=np.int64)
-        while True:
-            near = (x[row] >= lower[node] - tolerance) & (x[row] <= upper[node] + tolerance)
-            row, node = row[near.all(axis=1)], node[near.all(axis=1)]
-            if not len(node) or node[0] >= leaves:
-                break
-            row, node = row.repeat(2), (2 * node[:, None] + (0, 1)).ravel()
-        if not len(node):
-            continue
-        cell = cells.reshape(leaves, -1)[node - leaves]
-        row, cell = row.repeat(cell.shape[1]), cell.ravel()
-        row, cell = row[cell >= 0], cell[cell >= 0]
-        near = ((x[row] >= low[cell]) & (x[row] <= high[cell])).all(axis=1)
-        row, cell = row[near], cell[near]
-        depth = (np.einsum("nka,na->nk", normals[cell], x[row]) - offsets[cell]).min(axis=1)
-        there = depth >= -tolerance
-        there &= (wanted[first + row] * sides[cell] >= 0).all(axis=1)
-        row, cell, depth = row[there], cell[there], depth[there]
-        inside = depth > tolerance
-        on_side = inside
-        if sided:
-            towards = (directions[first + row] * (centres[cell] - x[row])).sum(axis=1)
-            on_side = inside | (towards > 0.0)
-        order = np.lexsort((depth, on_side, inside))
-        found[first + row[order]] = cell[order]  # the last of each point stays
+
+    def fitting(rows: Ints, held: Ints) -> tuple[Floats, NDArray[np.bool_]]:
+        """Give depths (n,) of points in cells, and whether the cells are on their sides."""
+        along = np.einsum("nka,na->nk", normals[held], points[rows])
+        agreed: NDArray[np.bool_] = (wanted[rows] * sides[held] >= 0).all(axis=1)
+        return (along - offsets[held]).min(axis=1), agreed
+
+    every = np.arange(len(points))
+    for rows in (every[::_BESIDE], every):
+        if rows is every:
+            before = found[every // _BESIDE * _BESIDE]
+            rows = every[before >= 0]
+            depth, agreed = fitting(rows, before[rows])
+            same = rows[agreed & (depth > tolerance)]
+            found[same] = before[same]
+            rows = every[found < 0]
+        for begin in range(0, len(rows), _AT_ONCE):
+            row, cell = _boxes_around(points, rows[begin : begin + _AT_ONCE], searched, tolerance)
+            depth, there = fitting(row, cell)
+            there &= depth >= -tolerance
+            row, cell, depth = row[there], cell[there], depth[there]
+            inside = depth > tolerance
+            on_side = inside
+            if sided:
+                towards = (directions[row] * (centres[cell] - points[row])).sum(axis=1)
+                on_side = inside | (towards > 0.0)
+            order = np.lexsort((depth, on_side, inside))
+            found[row[order]] = cell[order]  # the last of each point stays
+
+
+def _boxes_around(
+    points: Floats, row: Ints, searched: SearchedCells, tolerance: float
+) -> tuple[Ints, Ints]:
+    """Give all pairs (n,) of a point of `row` and a cell whose bounding box it lies in."""
+    lower, upper, cells, corners, _, _ = searched
+    leaves = len(lower) // 2
+
+    def within(low: Floats, high: Floats, box: Ints) -> NDArray[np.bool_]:
+        near = np.ones(len(row), dtype=bool)
+        for a in range(points.shape[1]):  # column by column: five times as fast
+            x = points[row, a]
+            near &= (x >= low[box, a] - tolerance) & (x <= high[box, a] + tolerance)
+        return near
+
+    node = np.ones(len(row), dtype=np.int64)
+    while True:
+        near = within(lower, upper, node)
+        row, node = row[near], node[near]
+        if not len(node) or node[0] >= leaves:
+            break
+        row, node = row.repeat(2), (2 * node[:, None] + (0, 1)).ravel()
+    cell = cells.reshape(leaves, -1)[node - leaves]
+    row, cell = row.repeat(cell.shape[1]), cell.ravel()
+    row, cell = row[cell >= 0], cell[cell >= 0]
+    near = within(corners.min(axis=1), corners.max(axis=1), cell)
+    return row[near], cell[near]
 
 
 @njit(cache=True)
