@@ -109,8 +109,8 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         value, most, where = worst[name]
         bounds = [f"at most {number(most, 2)}"] if number(most, 2) != number(value, 2) else []
         bounds += [where] if len(cases) > 1 else []
-        said = f" ({', '.join(bounds)})" if bounds else ""
-        parts.append(f"{solver_title(name)} {number(value, 2)}{said}")
+        inside = f" ({', '.join(bounds)})" if bounds else ""
+        parts.append(f"{solver_title(name)} {number(value, 2)}{inside}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
     return Answer(
         "Energy",
