@@ -19,10 +19,11 @@ from tool_path_scenes import (
     path_text,
 )
 
+from reference.exact import exact_of
 from verify.compare.blade import advance
 from verify.errors import InputError
 from verify.geometry.swept_shares import CutSimplices, SweptShares
-from verify.scene import load_scene
+from verify.scene import Scene, load_scene
 from verify.solvers import conforming_motion, find_solver, motion_of_scene
 from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.body import MotionState
@@ -334,8 +335,6 @@ CASES = Path(__file__).parents[2] / "cases/cutting"
 
 def l2_and_cut_work(solver, case, level, **parameters):
     """Relative L2 error at the end by the nodal rule, and work of the cut over G per advance."""
-    from reference.exact import exact_of
-
     scene = load_scene(CASES / f"{case}.toml")
     found = find_solver(solver).solve(scene, level, 0, **parameters)
     exact = exact_of(scene).at(float(found.times[-1]))
@@ -400,6 +399,44 @@ def test_three_meshes_of_the_strip(solver, case, most, parameters):
         pytest.importorskip("dolfinx_solver")
     swept = halved(solver, case, (0, 1, 2), most, **parameters)
     assert swept < 0.5 * l2_and_cut_work(solver, case, 2, opening="late", **parameters)[0]
+
+
+PHI = {  # solver and mass, to the speeds over c up to which the cut takes G to within a twentieth
+    ("conforming", "consistent"): (0.1, 0.3, 0.6),
+    ("xfem", "sidewise"): (0.1, 0.3),
+    ("xfem", "consistent"): (0.1, 0.3, 0.6),
+}
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(("solver", "mass"), PHI)
+def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass):
+    """Prints the table of docs/theory/dynamics.md; pytest -m heavy -s -k share_of_the_released.
+
+    Over 9 and 17 elements of advance, of which the first 30 % are left to what comes from the start:
+    the exact field lets nodes go that the mesh has held as one.
+    """
+    if solver == "conforming":
+        pytest.importorskip("dolfinx_solver")
+    own = {"mass": mass} if solver == "xfem" else {}
+    scene = load_scene(CASES / "blade_strip_06.toml")
+    content = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    content |= {"acceptance": [], "known_findings": []}
+    for speed in (0.1, 0.3, 0.6, 0.8):
+        duration, found = 0.2 / speed, []
+        content["exact"]["parameters"]["speed"] = content["cuts"][0]["speed"] = speed
+        content["cuts"][0] |= {"points": [[-0.36, 0.0, -0.001], [0.2, 0.0, -0.001]]}
+        content["cuts"][0]["starts_at"] = -0.36 / speed
+        for level, across in enumerate((9, 17)):
+            content["analysis"] |= {"duration": duration, "time_step": 0.1 / across, "outputs": 10}
+            moving = Scene.model_validate(content)
+            done = find_solver(solver).solve(moving, level, 0, **own)
+            work = done.ledger["cut_work"]
+            area = 0.7 * 0.2 * 0.005
+            found.append((work[-1] - work[-8]) / area / exact_of(moving).energy_release_rate)
+        print(f"{solver:10} {mass:10} {speed:.1f} c  " + "  ".join(f"{phi:.3f}" for phi in found))
+        if speed in PHI[solver, mass]:
+            assert abs(found[-1] - 1.0) <= 0.05, found
 
 
 @pytest.mark.heavy
