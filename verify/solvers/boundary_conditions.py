@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
+from verify.geometry.simplices import measures
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, faces_of, is_uniform
 from verify.scene.parts import (
     HeldFacets,
@@ -116,7 +117,7 @@ class Boundary:
             normals = np.cross(edges[:, 0], edges[:, 1])
         else:
             normals = np.cross(edges[:, 0], np.cross(edges[:, 0], outward))
-        normals *= np.sign(np.einsum("qc,qc->q", normals, outward))[:, None]
+        normals *= np.where(np.einsum("qc,qc->q", normals, outward) < 0.0, -1.0, 1.0)[:, None]
         unit: _Floats = normals / np.linalg.norm(normals, axis=1)[:, None]
         return unit
 
@@ -272,17 +273,16 @@ def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Fl
     load, key = scene.loads[i], f"loads[{i}]"
     assert isinstance(load, CutFaces)
     body = subdivide(phantom)
-    facets, outward = _faces(body)
-    corners = body.points[facets]
+    faces = _faces(body)
+    area, corners = measures(faces.places), faces.places
     place = next(k for k, cut in enumerate(scene.cuts) if cut.name == load.cut)
     found = faces_of(scene.cuts, corners.mean(axis=1))
-    mine = found.cut == place
-    if not mine.any() and scene.analysis.kind == "static":
+    mine = np.flatnonzero(found.cut == place)
+    if not len(mine) and scene.analysis.kind == "static":
         raise UnsupportedSceneError(f"{key}: cut '{load.cut}' as realised has no faces to bear it")
-    corners, nodes, normals = corners[mine], facets[mine], found.normal[mine]
-    length = np.linalg.norm(outward[mine], axis=1)
-    outward = outward[mine] / np.where(length > 0.0, length, 1.0)[:, None]
-    area, d = length / (scene.dimension - 1), scene.dimension
+    mine = mine[area[mine] > 0.0]
+    corners, nodes, normals = corners[mine], faces.corners[mine], found.normal[mine]
+    outward, area, d = faces.outward_normals(mine), area[mine], scene.dimension
     forces = np.zeros(body.points.shape)
     for shares, weight in zip(*simplex_rule(d - 1, _DEGREE), strict=True):
         points = np.einsum("i,kij->kj", shares, corners)
@@ -295,29 +295,13 @@ def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Fl
     return np.asarray(body.interpolation.T @ forces)
 
 
-def _faces(body: Subdivision) -> tuple[_Ints, _Floats]:
-    """Nodes (k, d) of the facets that lie on another one, and their normals out of the material.
-
-    The normals are as long as the facets are large, times d − 1.
-    """
-    count = body.cells.shape[1]
-    rest = [[j for j in range(count) if j != k] for k in range(count)]
-    nodes = body.cells[:, rest].reshape(-1, count - 1)
-    beyond = body.points[body.cells.ravel()]
+def _faces(body: Subdivision) -> Boundary:
+    """Facets that lie on another one."""
+    facets = np.indices(body.cells.shape).reshape(2, -1).T
+    alone = facets[_times(Boundary(body.points, body.cells, facets).corners) == 1]
     _, place = np.unique(body.points, axis=0, return_inverse=True)
-    alone = _times(nodes) == 1
-    nodes, beyond = nodes[alone], beyond[alone]
-    twin = _times(place.ravel()[nodes]) == 2
-    nodes, beyond = nodes[twin], beyond[twin]
-    corners = body.points[nodes]
-    edges = corners[:, 1:] - corners[:, :1]
-    if count == 3:
-        normals = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
-    else:
-        normals = np.cross(edges[:, 0], edges[:, 1])
-    inward = np.sum(normals * (beyond - corners[:, 0]), axis=1) > 0.0
-    normals[inward] *= -1.0
-    return nodes, normals
+    corners = Boundary(body.points, body.cells, alone).corners
+    return Boundary(body.points, body.cells, alone[_times(place.ravel()[corners]) == 2])
 
 
 def _times(rows: _Ints) -> _Ints:

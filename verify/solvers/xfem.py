@@ -34,7 +34,7 @@ from verify.system import System
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.linear_solvers import PLAIN, Kernels
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
@@ -55,13 +55,42 @@ _CHOICES: Mapping[str, Collection[str]] = {
 
 
 @dataclass(frozen=True)
-class Cutting:
-    """How XFEM cuts a body and what it makes of it: parameters of the solver."""
+class _Parameters:
+    """The parameters of a solve, as `XfemSolver` describes them, with their defaults.
 
-    tip: str
-    slivers: str
-    mass: str
-    kernels: Kernels
+    Raises
+    ------
+    InputError
+        If one has a value that it cannot have.
+    """
+
+    tip: str = "inside"
+    slivers: str = "keep"
+    load_steps: int = 0
+    scheme: str = "newmark"
+    mass: str = "sidewise"
+    step_factor: float = 0.9
+    spectral_radius: float = 0.8
+    kernels: str = "fast"
+    opening: str | None = None
+
+    def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in _CHOICES if getattr(self, name) is not None}
+        check_choices(XfemSolver.name, _CHOICES, given)
+        check_steps(self.load_steps, self.step_factor)
+        self.integration()  # it checks its own
+
+    def integration(self) -> Integration:
+        """Return those of the time integration."""
+        return Integration(self.scheme, self.step_factor, self.spectral_radius)
+
+    def notes(self) -> dict[str, str]:
+        """Say them, for the report."""
+        return {
+            "method": "P1 XFEM, element-wise cut",
+            "tip": self.tip,
+            "slivers": self.slivers,
+        }
 
 
 class XfemOpening:
@@ -74,19 +103,19 @@ class XfemOpening:
     openings : Openings
     exact : object or None
         The exact solution that supports may be taken from.
-    cutting : Cutting
+    given : _Parameters
     """
 
     removal = False
     phase = "enrichment"
 
     def __init__(
-        self, scene: Scene, mesh: SimplexMesh, openings: Openings, exact: Any, cutting: Cutting
+        self, scene: Scene, mesh: SimplexMesh, openings: Openings, exact: Any, given: _Parameters
     ) -> None:
         self.scene, self.openings, self.exact = scene, openings, exact
-        self.cutting, self.mass = cutting, cutting.mass
+        self.given, self.mass = given, given.mass
         self.rule = OPENINGS[openings.rule]
-        self._to_cut = to_cut(mesh, openings.cuts, cutting.tip)
+        self._to_cut = to_cut(mesh, openings.cuts, given.tip)
         self._opened: Opened
         self._slivers: list[Regularisation] = []
         self._penalised: list[Regularisation] = []
@@ -103,16 +132,16 @@ class XfemOpening:
         phantom = cut_mesh(mesh, cuts, rule, self._opened.until(time, passed))
         phantom, self._slivers = treated(
             phantom,
-            self.cutting.slivers,
+            self.given.slivers,
             lambda body: motion_of_supports(self.scene, body, self.exact).fixed,
         )
         return phantom
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
-        cutting = self.cutting
-        kinematics, penalise = self.scene.analysis.kinematics, cutting.slivers == "penalise"
-        force, ghost = elasticity_of(self.scene, phantom, kinematics, penalise, cutting.kernels)
+        kinematics, penalise = self.scene.analysis.kinematics, self.given.slivers == "penalise"
+        kernels = _KERNELS[self.given.kernels]
+        force, ghost = elasticity_of(self.scene, phantom, kinematics, penalise, kernels)
         self._penalised = penalised(ghost)
         return force, mass_of(self.scene, phantom, self.mass, ghost)
 
@@ -147,49 +176,6 @@ class XfemOpening:
     def regularisations(self) -> list[Regularisation]:
         """Return what was done to ends of cuts and to slivers."""
         return [*self._to_cut.done, *self._slivers, *self._penalised]
-
-
-@dataclass(frozen=True)
-class _Parameters:
-    """The parameters of a solve, as `XfemSolver` describes them, with their defaults.
-
-    Raises
-    ------
-    InputError
-        If one has a value that it cannot have.
-    """
-
-    tip: str = "inside"
-    slivers: str = "keep"
-    load_steps: int = 0
-    scheme: str = "newmark"
-    mass: str = "sidewise"
-    step_factor: float = 0.9
-    spectral_radius: float = 0.8
-    kernels: str = "fast"
-    opening: str | None = None
-
-    def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in _CHOICES if getattr(self, name) is not None}
-        check_choices(XfemSolver.name, _CHOICES, given)
-        check_steps(self.load_steps, self.step_factor)
-        self.integration()  # it checks its own
-
-    def cutting(self) -> Cutting:
-        """Return those of a body that is cut on its way."""
-        return Cutting(self.tip, self.slivers, self.mass, _KERNELS[self.kernels])
-
-    def integration(self) -> Integration:
-        """Return those of the time integration."""
-        return Integration(self.scheme, self.step_factor, self.spectral_radius)
-
-    def notes(self) -> dict[str, str]:
-        """Say them, for the report."""
-        return {
-            "method": "P1 XFEM, element-wise cut",
-            "tip": self.tip,
-            "slivers": self.slivers,
-        }
 
 
 class XfemSolver:
@@ -323,7 +309,7 @@ def _run(
     if scene.analysis.kind == "dynamic":
         timeline = timeline_of(scene, kinks=False)
         openings = openings_of(scene, size, timeline, given.opening or scene.analysis.opening)
-        opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
+        opening = XfemOpening(scene, mesh, openings, exact, given)
         motion = CutMotion(scene, timeline, opening, given.integration(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)
     with record.timed("enrichment"):
