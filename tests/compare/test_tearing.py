@@ -51,6 +51,20 @@ def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
     np.testing.assert_allclose(front.point, tip, atol=1e-9)
 
 
+@pytest.mark.parametrize(("lag", "low"), [(0.02, 0.039), (0.1, 0.209), (0.2, 0.480)])
+def test_a_tip_behind_the_blade_reads_less(lag, low):
+    """By the least-squares fit of √(r − s) to √r and r^(3/2); what is beyond it is below 0.01."""
+    scene = _strip(0.3, 0.0)
+    exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
+
+    class Behind(ExactMotion):
+        def at(self, time):
+            return super().at(time - lag * 0.03 / 0.3)
+
+    found = blade_intensity(scene, Behind(exact, 0.1), body_of(scene), scene.quantities[0])
+    assert 1.0 - found / exact.stress_intensity[2] == pytest.approx(low, abs=0.01)
+
+
 def test_modes_1_and_2_are_not_measured_at_a_tip_that_advances():
     """Their fields are not those of a tip at rest; after it has stopped they are."""
     path = {"kind": "tool_path", "points": [[-0.5, 0.2], [0.5, 0.4]], "times": [-1.0, 1.0]}

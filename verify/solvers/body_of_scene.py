@@ -31,7 +31,7 @@ from verify.scene import (
     read_mesh,
 )
 from verify.solution import Regularisation
-from verify.solvers.runs import Timeline, grid_of
+from verify.solvers.runs import grid_of, timeline_of
 from verify.xfem.arrays import XfemError
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
@@ -319,8 +319,9 @@ class Openings:
         return Opened(times, passed, shares if shares.used else None, self.close)
 
 
-def openings_of(scene: Scene, size: float, timeline: Timeline, rule: str) -> Openings:
+def openings_of(scene: Scene, size: float, rule: str) -> Openings:
     """Return when the cuts of a moving scene open on a mesh of a size, in m, by a rule."""
+    timeline = timeline_of(scene, kinks=False)
     order, cuts = np.argsort(timeline.opens, kind="stable"), cuts_of(scene, size)
     return Openings(
         [scene.cuts[k] for k in order],

@@ -32,7 +32,7 @@ from verify.solvers.body_of_scene import (
 )
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
-from verify.solvers.runs import OPENINGS, Record, check_steps, repeated, timeline_of
+from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import Law, solution_on, solve_equilibrium, springs_left_out
 from verify.solvers.xfem_system import EXPLICIT, SCHEMES, elasticity_of, system_of
@@ -334,17 +334,14 @@ class MethodSolver:
         forces: list[InternalForce] = []
 
         def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
-            material, kinematics = (
-                material_of(scene, body.resisting.mesh),
-                scene.analysis.kinematics,
-            )
-            forces.append(self._law(body.resisting, material, kinematics, kernels=FAST))
+            material = material_of(scene, body.resisting.mesh)
+            law = self._law(body.resisting, material, scene.analysis.kinematics, kernels=FAST)
+            forces.append(law)
             return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
-        timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline, rule)
+        openings = openings_of(scene, size, rule)
         opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-        motion = CutMotion(scene, timeline, opening, integration, exact_of(scene), record)
+        motion = CutMotion(scene, opening, integration, exact_of(scene), record)
         phantom, fields = motion.run(trial)
         record.regularisations.append(springs_left_out(forces[-1]))
         self._say(record, opening.final)

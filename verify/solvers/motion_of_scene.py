@@ -15,8 +15,15 @@ from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import Openings, density_of, material_of
-from verify.solvers.runs import LedgerRows, Record, Timeline, march, notes_of_steps, work_of_blades
-from verify.solvers.xfem_system import body_in_motion, initial_state, integrator_of, largest_step
+from verify.solvers.runs import (
+    LedgerRows,
+    Record,
+    march,
+    notes_of_steps,
+    timeline_of,
+    work_of_blades,
+)
+from verify.solvers.xfem_system import SCHEMES, body_in_motion, initial_state, largest_step
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, Integrator, MotionState
@@ -194,7 +201,6 @@ class CutMotion:
     Parameters
     ----------
     scene : Scene
-    timeline : Timeline
     opening : OpeningBody
     integration : Integration
     exact : object or None
@@ -206,13 +212,12 @@ class CutMotion:
     def __init__(
         self,
         scene: Scene,
-        timeline: Timeline,
         opening: OpeningBody,
         integration: Integration,
         exact: Any,
         record: Record,
     ) -> None:
-        self.scene, self.timeline, self.opening = scene, timeline, opening
+        self.scene, self.opening, self.timeline = scene, opening, timeline_of(scene, kinks=False)
         self.integration, self.exact, self.record = integration, exact, record
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
@@ -224,7 +229,7 @@ class CutMotion:
         self._by_cut = np.zeros(len(opening.openings.asked))  # energy that each has taken, J
         self._spread = 0.0  # as of `Release`, the most
         self._solves = 0
-        start = -np.inf if closed_before else timeline.close
+        start = -np.inf if closed_before else self.timeline.close
         body = self._made(start, passed=True)
         at_once = opening.fading(body.force.phantom) is None
         self._entered = start if at_once else -np.inf  # events until then are taken up
@@ -372,9 +377,10 @@ class CutMotion:
         self._solves += sum(one.solves for one in newton)
 
     def _integrator(self, size: float) -> Integrator:
-        scheme = self.integration.scheme
+        scheme, radius = self.integration.scheme, self.integration.spectral_radius
+        more = {"spectral_radius": radius} if scheme == "generalised_alpha" else {}
         try:
-            return integrator_of(self.body, size, scheme, self.integration.spectral_radius)
+            return SCHEMES[scheme](self.body, size, **more)
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{scheme}': {error}") from None
 

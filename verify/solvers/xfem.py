@@ -27,7 +27,7 @@ from verify.solvers.body_of_scene import (
 from verify.solvers.boundary_conditions import motion_of_supports, supports_of
 from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
-from verify.solvers.runs import OPENINGS, Record, check_steps, repeated, timeline_of
+from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem_answer import joined, penalised, solution_on, solve_equilibrium, treated
 from verify.solvers.xfem_system import MASSES, SCHEMES, elasticity_of, mass_of, system_of
 from verify.system import System
@@ -307,10 +307,9 @@ def _run(
     """Cut, load, solve."""
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
-        timeline = timeline_of(scene, kinks=False)
-        openings = openings_of(scene, size, timeline, given.opening or scene.analysis.opening)
+        openings = openings_of(scene, size, given.opening or scene.analysis.opening)
         opening = XfemOpening(scene, mesh, openings, exact, given)
-        motion = CutMotion(scene, timeline, opening, given.integration(), exact, record)
+        motion = CutMotion(scene, opening, given.integration(), exact, record)
         return solution_on(scene, record, *motion.run(trial), size)
     with record.timed("enrichment"):
         phantom, record.regularisations = _cut(scene, mesh, size, exact, given)

@@ -117,7 +117,7 @@ def system_of(
     return System(stiffness, matrix, supports.fixed.ravel())
 
 
-SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
+SCHEMES: dict[str, Callable[..., Integrator]] = {  # of a body and a step, s
     "newmark": Trapezoidal,
     "implicit_euler": ImplicitEuler,
     "energy_momentum": EnergyMomentum,
@@ -137,26 +137,6 @@ MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
 }
 _REACH = 1.0  # strain up to which the step of a turning body is a bound
 EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
-
-
-def integrator_of(
-    body: DynamicBody, step_size: float, scheme: str, spectral_radius: float
-) -> Integrator:
-    """Make the integrator of a scheme.
-
-    Parameters
-    ----------
-    body : DynamicBody
-    step_size : float
-        In s.
-    scheme : str
-        One of `SCHEMES`.
-    spectral_radius : float
-        Of generalised-α, at infinite frequency; the others have none.
-    """
-    if scheme == "generalised_alpha":
-        return GeneralisedAlpha(body, step_size, spectral_radius=spectral_radius)
-    return SCHEMES[scheme](body, step_size)
 
 
 def largest_step(
