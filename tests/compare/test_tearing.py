@@ -53,7 +53,7 @@ def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
 
 @pytest.mark.parametrize(("lag", "low"), [(0.02, 0.039), (0.1, 0.209), (0.2, 0.480)])
 def test_a_tip_behind_the_blade_reads_less(lag, low):
-    """By the least-squares fit of √(r − s) to √r and r^(3/2); what is beyond it is below 0.01."""
+    """By the least-squares fit of √(r − s) to √r and r^(3/2); the strip is no half-plane: a tenth."""
     scene = _strip(0.3, 0.0)
     exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
 
@@ -62,7 +62,7 @@ def test_a_tip_behind_the_blade_reads_less(lag, low):
             return super().at(time - lag * 0.03 / 0.3)
 
     found = blade_intensity(scene, Behind(exact, 0.1), body_of(scene), scene.quantities[0])
-    assert 1.0 - found / exact.stress_intensity[2] == pytest.approx(low, abs=0.01)
+    assert 1.0 - found / exact.stress_intensity[2] == pytest.approx(low, rel=0.1)
 
 
 def test_modes_1_and_2_are_not_measured_at_a_tip_that_advances():
