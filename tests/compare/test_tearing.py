@@ -53,7 +53,7 @@ def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
 
 @pytest.mark.parametrize(("lag", "low"), [(0.02, 0.039), (0.1, 0.209), (0.2, 0.480)])
 def test_a_tip_behind_the_blade_reads_less(lag, low):
-    """By the least-squares fit of √(r − s) to √r and r^(3/2); the strip is no half-plane: a tenth."""
+    """By the least-squares fit of √(r − s) to √r, r^(3/2); the strip is no half-plane: a tenth."""
     scene = _strip(0.3, 0.0)
     exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
 
