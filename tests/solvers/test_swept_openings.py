@@ -402,15 +402,16 @@ def test_three_meshes_of_the_strip(solver, case, most, parameters):
 
 
 PHI = {  # solver and mass, to the speeds over c up to which the cut takes G to within a twentieth
-    ("conforming", "consistent"): (0.1, 0.3, 0.6),
-    ("xfem", "sidewise"): (0.1, 0.3),
-    ("xfem", "consistent"): (0.1, 0.3, 0.6),
+    ("conforming", "consistent"): 0.6,
+    ("xfem", "sidewise"): 0.3,
+    ("xfem", "consistent"): 0.8,
 }
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize("speed", [0.1, 0.3, 0.6, 0.8])
 @pytest.mark.parametrize(("solver", "mass"), PHI)
-def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass):
+def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass, speed):
     """Prints the table of docs/theory/dynamics.md: pytest -m heavy -s -k share_of_the_released.
 
     Over whole elements, as the work of each comes and goes with its nodes. The first third is left
@@ -422,22 +423,24 @@ def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass):
     scene = load_scene(CASES / "blade_strip_06.toml")
     content = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content |= {"acceptance": [], "known_findings": []}
-    content["cuts"][0]["points"] = [[-0.36, 0.0, -0.001], [0.2, 0.0, -0.001]]
-    for speed in (0.1, 0.3, 0.6, 0.8):
-        found = []
-        content["exact"]["parameters"]["speed"] = content["cuts"][0]["speed"] = speed
-        content["cuts"][0]["starts_at"] = -0.36 / speed
-        for level, elements in enumerate((9, 17)):  # in an advance of 0.2 m
-            times = {"duration": 0.2 / speed, "time_step": 0.1 / elements, "outputs": elements}
-            content["analysis"] |= times
-            moving = Scene.model_validate(content)
-            work = find_solver(solver).solve(moving, level, 0, **own).ledger["cut_work"]
-            counted = 2 * elements // 3
-            released = exact_of(moving).energy_release_rate * 0.005 * 0.2 * counted / elements
-            found.append((work[-1] - work[-1 - counted]) / released)
-        print(f"{solver:10} {mass:10} {speed:.1f} c  " + "  ".join(f"{phi:.3f}" for phi in found))
-        if speed in PHI[solver, mass]:
-            assert abs(found[-1] - 1.0) <= 0.05, found
+    content["exact"]["parameters"]["speed"] = speed
+    content["cuts"][0] |= {
+        "points": [[-0.36, 0.0, -0.001], [0.2, 0.0, -0.001]],
+        "speed": speed,
+        "starts_at": -0.36 / speed,
+    }
+    found = []
+    for level, elements in enumerate((9, 17)):  # in an advance of 0.2 m
+        times = {"duration": 0.2 / speed, "time_step": 0.1 / elements, "outputs": elements}
+        content["analysis"] |= times
+        moving = Scene.model_validate(content)
+        work = find_solver(solver).solve(moving, level, 0, **own).ledger["cut_work"]
+        counted = 2 * elements // 3
+        released = exact_of(moving).energy_release_rate * 0.005 * 0.2 * counted / elements
+        found.append((work[-1] - work[-1 - counted]) / released)
+    print(f"{solver:10} {mass:10} {speed:.1f} c  " + "  ".join(f"{phi:.3f}" for phi in found))
+    if speed <= PHI[solver, mass]:
+        assert abs(found[-1] - 1.0) <= 0.05, found
 
 
 @pytest.mark.heavy
