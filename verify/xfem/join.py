@@ -22,8 +22,8 @@ all nodes of the cell on its other side. The side of a dof node is that of its p
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from verify.compiled import njit
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
 from verify.xfem.mesh import SimplexMesh, connected, facets_of, neighbours_across
