@@ -252,22 +252,13 @@ def conforming_reference(
     # functionals of a Galerkin solution converge with twice the order of its field
     doubled = 2 * (entries["energy_norm"]["order"] or 0.0)
     second = [Measured(s, body, law, scene) for _, s in sorted((others or {}).items())]
-    metrics: dict[str, Any] = {}
-    quantities: dict[str, tuple[float, float]] = {}
-    missing: dict[str, str] = {}
-    for asked in scene.quantities:
-        values, why = _on_finest(asked, measured)
-        if len(values) < 3:
-            missing[asked.name] = why
-            continue
-        coarse = len(measured) - len(values)  # levels that do not have it
-        at_tip = _order_at_the_tip(scene, asked, steps, sizes)
-        functional = doubled if at_tip is None else at_tip
-        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:], functional, falls)
-        quantities[asked.name] = known.value, known.half_width
-        entry = _entry([*[None] * coarse, *values], known)
-        metrics[asked.name] = entry | _second_opinion(scene, asked, second, known)
-    metrics |= entries
+    found, missing = _known_quantities(scene, measured, steps, sizes, doubled, falls)
+    metrics = {
+        asked.name: _entry(*known) | _second_opinion(scene, asked, second, known[1])
+        for asked in scene.quantities
+        if (known := found.get(asked.name))
+    } | entries
+    quantities = {name: (known.value, known.half_width) for name, (_, known) in found.items()}
     source = f"conforming P{solutions[-1].order}, {len(solutions)} levels, GCI"
     record = ReferenceRecord(
         kind="conforming",
@@ -282,6 +273,25 @@ def conforming_reference(
         missing=missing or None,
     )
     return Reference(motions[-1], source, norms, quantities, record, rules)
+
+
+def _known_quantities(
+    scene: Scene, measured: Sequence[Measured], steps: Sequence[History], sizes: list[float],
+    doubled: float, falls: float,
+) -> tuple[dict[str, tuple[list[float | None], Extrapolation]], dict[str, str]]:  # fmt: skip
+    """Values by level and what they are worth, by quantity; and why others are not known."""
+    found, missing = {}, {}
+    for asked in scene.quantities:
+        values, why = _on_finest(asked, measured)
+        if len(values) < 3:
+            missing[asked.name] = why
+            continue
+        coarse = len(measured) - len(values)  # levels that do not have it
+        at_tip = _order_at_the_tip(scene, asked, steps, sizes)
+        functional = doubled if at_tip is None else at_tip
+        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:], functional, falls)
+        found[asked.name] = [*[None] * coarse, *values], known
+    return found, missing
 
 
 def _coarser(scene: Scene, solutions: Sequence[Solution]) -> str:
