@@ -17,14 +17,16 @@ from verify.xfem.arrays import NotConvergedError, SingularStiffnessError
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
+from verify.xfem.element import isotropic
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.linear_solvers import BlockJacobiCG, SparseLU
-from verify.xfem.loads_and_supports import Supports
+from verify.xfem.linear_solvers import PLAIN, BlockJacobiCG, SparseLU
+from verify.xfem.loads_and_supports import Supports, body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
+from verify.xfem.statics import solve_static
 
 LU = partial(SparseLU, definite=True)
 
@@ -255,3 +257,21 @@ def test_what_it_takes_depends_on_the_size_the_shape_and_the_step(divisions, ste
         same.advance(other)
     size = np.abs(other.displacement).max()
     assert state.displacement == pytest.approx(other.displacement, abs=1e-7 * size)
+
+
+@pytest.mark.parametrize(
+    ("divisions", "height", "way", "other"),
+    [((12, 12, 12), 1.0, "iterative", FAST), ((32, 32, 1), 1 / 32, "direct", PLAIN)],
+)
+def test_statics_iterate_for_a_cube_and_factorise_a_plate(divisions, height, way, other):
+    """More iterations than a compact body of as many nodes needs are not spent on a plate."""
+    mesh = box_mesh(divisions, (0.0, 0.0, 0.0), (1.0, 1.0, height))
+    phantom = cut_mesh(mesh, [Plane([0.5, 0.5, 0.5 * height], [1.0, 0.4, 0.3])])
+    ends = (mesh.points[:, 0] == 0.0) | (mesh.points[:, 0] == 1.0)
+    held = Supports.none(phantom).prescribe(phantom, ends)
+    load, law = body_force(phantom, [0.0, 0.3, -1.0]), isotropic(1e3, 0.3, "solid")
+    found = solve_static(phantom, law, held, load, kernels=FAST)
+    again = solve_static(phantom, law, held, load, solver="direct", kernels=other)
+    assert found.solver == way
+    difference = np.abs(found.displacement - again.displacement).max()
+    assert difference < 1e-9 * np.abs(again.displacement).max()
