@@ -54,6 +54,25 @@ def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:
     assert notice.text.startswith("linear kinematics against finite rotation: ")
 
 
+def test_a_beam_that_bends_far_says_what_hookes_law_costs() -> None:
+    """Hooke's law at finite rotation is the cheaper one, whichever of the two is asked."""
+    one = scene(adequacy={"material": True}, analysis={"kinematics": "finite_rotation"})
+    other = other_scene(one, "material")
+    assert (other.material.model, other.analysis.kinematics) == ("neo_hookean", "corotational")
+    assert other_scene(other, "material").material.model == "hooke"
+    reference = find_solver("reference")
+    own, beside = ({k: reference.solve(s, k, 0) for k in range(3)} for s in (one, other))
+    judged = find_solver("conforming").solve(one, 0, 0)
+    solutions = {"conforming": {0: judged}, "reference": own}
+    result = assess_accuracy(one, [_record(judged)], solutions)
+    notice = adequacy_notice(one, "material", beside, result)
+    shares = [abs(strain_energy(u[2], law_of(s))) for u, s in ((own, one), (beside, other))]
+    said = re.search(r"([\d.]+) % \(± [^)]*\) in strain_energy", notice.text)
+    assert notice.text.startswith("Hooke's law against neo-Hookean material: ")
+    assert said is not None, notice.text
+    assert float(said[1]) == pytest.approx(100 * abs(shares[0] / shares[1] - 1), rel=0.06)
+
+
 def _record(solution):
     return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
 

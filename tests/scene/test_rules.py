@@ -32,6 +32,7 @@ SQUARE = {
     "points": [[0.2, 0.2, 0.5], [0.8, 0.2, 0.5], [0.8, 0.8, 0.5], [0.2, 0.8, 0.5]],
 }
 MOVES = {"kind": "dynamic", "duration": 1.0}
+TURNS = {"kinematics": "finite_rotation"}
 HEAVY = {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0}
 HEAVY3 = {"young": 1.0, "poisson": 0.3, "density": 1.0}
 MEMBRANE = {
@@ -114,6 +115,15 @@ BROKEN = [
      "loads[0].traction: 1 values; expected 2"),
     ({"cuts": [DISC]}, "cuts[0]: a disc cut in a 2D scene"),
     ({"d": 3, **MEMBRANE}, "material.thickness: a membrane needs it"),
+    ({"d": 3, **MEMBRANE, "material": {**THIN, "model": "neo_hookean"}, "analysis": TURNS},
+     "material.model: a membrane is of Hooke's law; expected 'hooke'"),
+    ({"material": {**HEAVY, "plane": "stress", "model": "neo_hookean"}, "analysis": TURNS},
+     "material.model: plane stress is of Hooke's law; expected 'hooke', or plane = 'strain'"),
+    ({"material": {**HEAVY, "model": "stable_neo_hookean"}},
+     "material.model: 'stable_neo_hookean' belongs to analysis.kinematics = 'finite_rotation'"),
+    ({"material": {**HEAVY, "model": "neo_hookean"},
+      "analysis": {**MOVES, **TURNS, "damping": [0.0, 1e-3]}},
+     "analysis.damping: damping by the stiffness is of Hooke's law; expected zero"),
     ({"material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "thickness": 0.1}},
      "material.thickness: belongs to membranes (cells = 'surface')"),
     ({"d": 3, **MEMBRANE, "material": THIN},
@@ -240,6 +250,8 @@ BROKEN = [
       "reason": "so"}]},
      "known_findings[0]: no check 'rate of energy_norm' is made of 'xfem'; the case makes none"),
     ({"adequacy": {"motion": True}}, "adequacy.motion: belongs to a dynamic analysis"),
+    ({"adequacy": {"material": True}},
+     "adequacy.material: neo-Hookean material is of solids and plane strain at finite rotation"),
     ({"d": 3, **MEMBRANE, "material": THIN, "analysis": {"kinematics": "corotational"},
       "adequacy": {"kinematics": True}},
      "adequacy.kinematics: a membrane has no linear kinematics"),

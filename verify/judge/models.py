@@ -166,7 +166,7 @@ _WORDS = {"linear": "linear kinematics", "corotational": "finite rotation"}
 
 
 def other_scene(scene: Scene, model: str) -> Scene:
-    """Return a scene with the other kinematics, or (``"motion"``) at rest under its last loads.
+    """Return a scene with the other kinematics or material, or at rest under its last loads.
 
     Its reference is coarser.
 
@@ -177,6 +177,9 @@ def other_scene(scene: Scene, model: str) -> Scene:
     """
     if model == "motion":
         return _coarser(at_rest(scene))
+    if model == "material":
+        other = "neo_hookean" if scene.material.model == "hooke" else "hooke"
+        return _coarser(changed(scene, other, {"material": {"model": other}}))
     return _coarser(with_kinematics(scene, _OTHER[scene.analysis.kinematics]))
 
 
@@ -229,6 +232,8 @@ def _models(scene: Scene, model: str) -> tuple[str, str, bool]:
     """Words for the cheaper and the richer model, and whether the scene asks for the cheaper."""
     if model == "motion":
         return "the static answer", "the end of the motion", False
+    if model == "material":
+        return "Hooke's law", "neo-Hookean material", scene.material.model == "hooke"
     return _WORDS["linear"], _WORDS["corotational"], scene.analysis.kinematics == "linear"
 
 

@@ -381,6 +381,9 @@ RULES: Rules = (
     ("adequacy.motion", lambda s: s.adequacy.motion and _is_static(s), _IN_TIME),
     ("adequacy.kinematics", lambda s: s.adequacy.kinematics and _is_membrane(s),
      "a membrane has no linear kinematics"),
+    ("adequacy.material", lambda s: s.adequacy.material and (
+        s.analysis.kinematics == "linear" or s.material.plane == "stress" or _is_membrane(s)),
+     "neo-Hookean material is of solids and plane strain at finite rotation"),
     ("adequacy", lambda s: s.adequacy.models and s.played_only, "{}"),
     ("", part_without_facets, "{}"),
     ("quantities[*].time",

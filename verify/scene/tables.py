@@ -185,6 +185,11 @@ class Adequacy(Strict):
     kinematics: bool = Field(
         default=False, description="linear kinematics against finite rotation, whichever is asked"
     )
+    material: bool = Field(
+        default=False,
+        description="Hooke's law at finite rotation against neo-Hookean material, whichever is "
+        "asked",
+    )
     motion: bool = Field(
         default=False,
         description="dynamic: the static answer under the last loads against the motion's end",
@@ -193,7 +198,7 @@ class Adequacy(Strict):
     @property
     def models(self) -> list[str]:
         """Names of what is measured."""
-        return [name for name in ("kinematics", "motion") if getattr(self, name)]
+        return [name for name in ("kinematics", "material", "motion") if getattr(self, name)]
 
 
 class Pull(Strict):
