@@ -23,14 +23,17 @@ import numpy as np
 
 from verify.accelerated import FAST
 from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.compare.body import Body
+from verify.compare.body_rule import area_rule
 from verify.compare.cell_tree import build_cell_tree, find_cells
 from verify.compare.locate import (
     SolutionField,
+    difference_squares,
     evaluate_linear,
     evaluate_quadratic,
     squares,
-    strain_squares,
 )
+from verify.compare.mass import kinetic
 from verify.compare.overlap import OverlapSearch
 from verify.compare.sides import distance_to_segments
 from verify.compare.simplices import simplices
@@ -153,8 +156,12 @@ def _comparison() -> None:
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
         squares(points)
-        strain_squares(np.zeros((1, mesh.space, mesh.space)))
+        still, gradients = np.zeros((1, *mesh.points.shape)), np.zeros((1, mesh.space, mesh.space))
+        difference_squares(gradients, gradients)
+        kinetic(Solution(mesh.points, mesh.cells, still, velocity=still), 1.0)
         distance_to_segments(points, np.stack([points, points], axis=1))
+    nowhere = np.zeros((0, 2))
+    area_rule(Body((np.eye(3, 2),), {}, [], nowhere, nowhere), 1.0)
     sheet = _flat_membrane()
     still = np.zeros((1, *sheet.points.shape))
     SolutionField(Solution(sheet.points, sheet.cells, still)).cells_at(sheet.points)

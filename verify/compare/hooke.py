@@ -19,13 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body_rule import Rule
-from verify.compare.locate import (
-    Field,
-    SolutionField,
-    difference_squares,
-    squares,
-    strain_squares,
-)
+from verify.compare.locate import Field, SolutionField, difference_squares, squares
 from verify.compare.mass import separated_parts
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
 from verify.errors import InputError
@@ -64,7 +58,7 @@ class Hooke:
 
     def energy_density(self, gradient: Array) -> Array:
         """½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
-        trace2, square = strain_squares(gradient)
+        _, _, trace2, square, _ = difference_squares(gradient, gradient)
         return np.asarray(0.5 * self.lame * trace2 + self.shear * square)
 
     def power_density(self, gradient: Array, rate: Array) -> Array:

@@ -136,33 +136,15 @@ def _squares(values, found):
             found[i] += values[i, c] ** 2
 
 
-def strain_squares(gradient: Floats) -> tuple[Floats, Floats]:
-    """tr² ε (n,) and ε : ε (n,) of the strain ε of displacement gradients (n, d, d)."""
-    if not COMPILED:
-        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
-        return np.trace(strain, axis1=1, axis2=2) ** 2, squares(strain)
-    trace2, square = np.empty(len(gradient)), np.empty(len(gradient))
-    _strain_squares(np.ascontiguousarray(gradient), axes_of(gradient.shape[1]), trace2, square)
-    return trace2, square
-
-
-@njit(cache=True)
-def _strain_squares(gradient, axes, trace2, square):
-    for i in range(len(gradient)):
-        trace = sheared = 0.0
-        for a in axes:
-            trace += gradient[i, a, a]
-            sheared += 2.0 * gradient[i, a, a] ** 2
-            for b in range(a):
-                sheared += (gradient[i, a, b] + gradient[i, b, a]) ** 2
-        trace2[i], square[i] = trace**2, 0.5 * sheared
-
-
 def difference_squares(found: Floats, expected: Floats) -> Floats:
     """Squares (5, n) of the strains of what gradients (n, d, d) differ by, and of those `expected`.
 
     tr² ε and ε : ε of either; the last row is the sum of the squares of all entries of `expected`.
     """
+    if not COMPILED:
+        strains = [0.5 * (one + one.swapaxes(1, 2)) for one in (found - expected, expected)]
+        pairs = [(np.trace(one, axis1=1, axis2=2) ** 2, squares(one)) for one in strains]
+        return np.array([*pairs[0], *pairs[1], squares(expected)])
     rows = np.empty((5, len(found)))
     found, expected = np.ascontiguousarray(found), np.ascontiguousarray(expected)
     _difference_squares(found, expected, axes_of(found.shape[1]), rows)

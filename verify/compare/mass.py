@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.cell_tree import axes_of
 from verify.compare.locate import ROUND_OFF
-from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule, simplices
+from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
 from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.handed_over import CONSISTENT
@@ -182,23 +182,7 @@ def shape_functions(place: Array, k: int, order: int) -> Array:
     return np.column_stack([place * (2 * place - 1), *edges])
 
 
-@dataclass(frozen=True)
-class Lumping:
-    """By how much energies may be others than those of the field, over the output times.
-
-    Parameters
-    ----------
-    kinetic : (t,) array
-        J (2D: per metre).
-    moment : (t, d) array
-        Of ∫ρu, at which gravity pulls, kg m.
-    """
-
-    kinetic: Array
-    moment: Array
-
-
-def lumping_of(solution: Solution, density: float | Array) -> Lumping:
+def _lumping(solution: Solution, density: float | Array) -> tuple[Array, Array]:
     """Bound what a mass that is lumped at nodes changes, where it is not said whether it is.
 
     Cells along a cut may be pieces of larger ones, at whose nodes their mass may be lumped: as
@@ -211,10 +195,17 @@ def lumping_of(solution: Solution, density: float | Array) -> Lumping:
         With velocities.
     density : float or (m,) array
         kg/m³, of each cell.
+
+    Returns
+    -------
+    kinetic : (t,) array
+        Of the kinetic energy, J (2D: per metre).
+    moment : (t, d) array
+        Of ∫ρu, at which gravity pulls, kg m.
     """
     assert solution.velocity is not None
     k, order, nodes = solution.cell_dimension, solution.order, solution.cells
-    shape = simplices(solution.points, nodes)
+    shape = cells_of(solution)
     mass = density * shape.volume
     own, beside = _sizes(nodes[:, : k + 1], shape.corners)
     cut = _along_cuts(solution)
@@ -233,7 +224,7 @@ def lumping_of(solution: Solution, density: float | Array) -> Lumping:
         )
         kinetic.append(mass @ (np.abs(change) * larger**2 + steepest * away))
         moment.append((mass * away) @ np.linalg.norm(gradients[0], axis=2))
-    return Lumping(np.array(kinetic), np.array(moment))
+    return np.array(kinetic), np.array(moment)
 
 
 def nodal_weights(solution: Solution, density: float | Array) -> Array:
@@ -247,7 +238,7 @@ def nodal_weights(solution: Solution, density: float | Array) -> Array:
 def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
     """Masses ∫ρ N_i N_j (n, n) in kg of a solution's nodes."""
     nodes, count = solution.cells, len(solution.points)
-    mass = density * simplices(solution.points, nodes).volume
+    mass = density * cells_of(solution).volume
     local = mass[:, None, None] * _consistent(solution.cell_dimension, solution.order)
     return assembled(local, nodes, count)
 
@@ -514,12 +505,10 @@ def inertia_of(
             width = off * energy + _round_off(solution, matrix)
             return Inertia(energy, width, own, moment, matrix, "the declared mass", off)
         wrong = f"the declared mass is not taken: {wrong}"
-    lumping = lumping_of(solution, density)
+    width, moment = _lumping(solution, density)
     note = f"that of the field, give or take its lumping ({wrong})"
     lumped = csr_array(diags_array(weights))
-    return Inertia(
-        whole.energy, lumping.kinetic, weights, lumping.moment, consistent, note, lumped=lumped
-    )
+    return Inertia(whole.energy, width, weights, moment, consistent, note, lumped=lumped)
 
 
 def _velocities(solution: Solution) -> Array:
