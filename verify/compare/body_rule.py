@@ -244,6 +244,19 @@ def _x(curve, y):
     return a + d * c * np.sqrt(max((1 - height) * (1 + height), 0.0))
 
 
+@njit(inline="always")
+def _below(values, x, or_equal):
+    """Count the sorted values below one; `np.searchsorted` takes much longer to compile."""
+    low, high = 0, len(values)
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < x or (or_equal and values[middle] == x):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @njit(cache=True)
 def _strips(curves, ys, columns, thinnest):
     """Give the strips of the body between two curves in slabs, one a row.
@@ -269,8 +282,8 @@ def _strips(curves, ys, columns, thinnest):
         for k in range(count - 1):
             inside ^= curves[here[k], 2] != 0.0
             if inside and at[k + 1] - at[k] > thinnest:
-                first = np.searchsorted(columns, at[k] + thinnest, "right")
-                last = max(first, np.searchsorted(columns, at[k + 1] - thinnest))
+                first = _below(columns, at[k] + thinnest, True)
+                last = max(first, _below(columns, at[k + 1] - thinnest, False))
                 if filled == len(found):
                     found = np.concatenate((found, np.empty_like(found)))
                 found[filled] = slab, here[k], here[k + 1], first, last
