@@ -174,9 +174,9 @@ def inner_warning(scene: Scene) -> str:
         if 1 in group.parts:
             nodes = group.parts[1][:, 0]
             away = cKDTree(boundary.reshape(-1, scene.dimension)).query(nodes)[0]
-            if inside := np.count_nonzero(away):
+            if count := np.count_nonzero(away):
                 said.append(
-                    f"{key}: {inside} of {len(nodes)} nodes of '{where}' are inside the body, and "
+                    f"{key}: {count} of {len(nodes)} nodes of '{where}' are inside the body, and "
                     "left out"
                 )
         elif boundary.shape[1] in group.parts:
