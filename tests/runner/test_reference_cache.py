@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from verify.errors import InputError
+from verify.provenance import versions
 from verify.result import Status
 from verify.runner import references
 from verify.runner.directory import Job, RunDirectory
@@ -59,6 +60,8 @@ def test_what_was_kept_is_taken_with_its_origin(scene, kept, tmp_path):
     record = kept.take(scene, job)
     assert record.status is Status.SOLVED
     assert "from the reference cache, solved 20" in record.notes["cache"]
+    if dolfinx := versions().get("dolfinx"):
+        assert f"with DOLFINx {dolfinx}" in record.notes["cache"]
     assert len(read_solution(job.folder / "solution").points) == 25
 
 
