@@ -167,7 +167,7 @@ def conform(
     Examples
     --------
       verify conform xfem
-      verify conform xfem --set tip=partial
+      verify conform xfem --set tip=inside
       verify conform my_module:MySolver --json
 
     exit codes:

@@ -158,6 +158,8 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
             "tip = 'partial' in a solid; it is offered for triangles, other tip rules are for both"
         )
     nodes = with_tip_nodes(mesh, cuts)
+    if not len(nodes.moved):  # no cut ends inside
+        return ToCut(mesh, cuts, "inside", [])
     kind, largest = "end of a cut made a node", float(nodes.moved.max(initial=0.0))
     said = Regularisation(kind, len(nodes.moved), largest, "m")
     return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said])

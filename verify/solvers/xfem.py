@@ -4,8 +4,8 @@ And how its body is cut on the way.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class _Parameters:
         If one has a value that it cannot have.
     """
 
-    tip: str = "inside"
+    tip: str | None = None
     slivers: str = "keep"
     load_steps: int = 0
     scheme: str = "newmark"
@@ -80,6 +80,13 @@ class _Parameters:
         check_steps(self.load_steps, self.step_factor)
         self.integration()  # it checks its own
 
+    def on(self, scene: Scene, mesh: SimplexMesh) -> Self:
+        """Return them with the default tip rule of a scene and its mesh, unless one was asked."""
+        # a last facet that bends to its node would bear a load that is not in balance with others
+        loaded = any(load.kind == "cut_faces" for load in scene.loads)
+        default = "inside" if mesh.dim == 3 or loaded else "partial"
+        return self if self.tip else replace(self, tip=default)
+
     def integration(self) -> Integration:
         """Return those of the time integration."""
         return Integration(self.scheme, self.step_factor, self.spectral_radius)
@@ -88,7 +95,7 @@ class _Parameters:
         """Say them, for the report."""
         return {
             "method": "P1 XFEM, element-wise cut",
-            "tip": self.tip,
+            "tip": str(self.tip),
             "slivers": self.slivers,
         }
 
@@ -187,7 +194,9 @@ class XfemSolver:
     ---------------------
     tip : {"inside", "through", "nearest", "partial"}
         What happens to an element in which a cut ends: see `verify.xfem.pieces.split_cells`; the
-        last, for triangles, divides it so that the end is a node (`verify.methods.tip_nodes`).
+        last, for triangles and their default, divides it so that the end is a node
+        (`verify.methods.tip_nodes`). The default of tetrahedra, and where faces of a cut bear a
+        load, is "inside".
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
         `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind
@@ -267,7 +276,7 @@ class XfemSolver:
         given, exact = _Parameters(**parameters), exact_of(scene)
         with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
-            phantom, _ = _cut(scene, mesh, size, exact, given)
+            phantom, _ = _cut(scene, mesh, size, exact, given.on(scene, mesh))
             resisting = elasticity_of(scene, phantom, "linear", given.slivers == "penalise")
             return system_of(scene, phantom, *resisting, exact, given.mass)
 
@@ -305,6 +314,7 @@ def _run(
     trial: bool,
 ) -> Solution:
     """Cut, load, solve."""
+    given = given.on(scene, mesh)
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":
         openings = openings_of(scene, size, given.opening or scene.analysis.opening)

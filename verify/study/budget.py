@@ -6,7 +6,7 @@ derivative by its place, the only field that can come from there), so that an an
 cut with other ends. How far these are off is a number of elements that depends on where the end
 falls among the nodes alone. Measured on a Griffith crack (docs/guide/studies.md), for an end that
 is realised on an edge of which the hindmost node lies `behind` it: two thirds of `behind`, and a
-third of an element more.
+third of an element more. An end that is made a node costs that third alone.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,12 @@ class CutEnd:
 
 
 def cut_ends(
-    body: Body, facets: Array, points: Array, cells: NDArray[np.int64], size: float
+    body: Body,
+    facets: Array,
+    points: Array,
+    cells: NDArray[np.int64],
+    size: float,
+    at_nodes: bool = False,
 ) -> list[CutEnd]:
     """Find the ends of cuts inside a plane body, as realised.
 
@@ -78,6 +83,8 @@ def cut_ends(
         Background mesh that was cut, m.
     size : float
         Its element size, m.
+    at_nodes : bool
+        Whether the solver has made the ends nodes: the cut then opens up to them.
 
     Returns
     -------
@@ -98,7 +105,8 @@ def cut_ends(
             continue
         end, outwards = free[off.argmin()], _outwards(body, tip)
         moved = float((end - tip) @ outwards) / size
-        nodes = float((_closed(points, edges, end, size) - tip).dot(outwards).min()) / size
+        closed = end[None] if at_nodes else _closed(points, edges, end, size)
+        nodes = float((closed - tip).dot(outwards).min()) / size
         acts = moved - _BEHIND * (moved - min(nodes, moved)) - _STIFF
         found.append(CutEnd((float(tip[0]), float(tip[1])), moved, nodes, acts, _SPREAD))
     return found
@@ -260,8 +268,11 @@ def _ends(chain: Chain, level: int) -> list[CutEnd]:
     if not isinstance(chain.body, Body) or not len(chain.body.tips):
         return []
     mesh, _ = background_mesh(chain.scene, level)
-    facets = chain.asked[chain.scene.analysis.kinematics].solution(JUDGED, level).cut_facets
-    return cut_ends(chain.body, facets, mesh.points, mesh.cells, chain.size)
+    solution = chain.asked[chain.scene.analysis.kinematics].solution(JUDGED, level)
+    at_nodes = solution.notes["tip"] == "partial"
+    return cut_ends(
+        chain.body, solution.cut_facets, mesh.points, mesh.cells, chain.size, at_nodes
+    )
 
 
 def _contention(chain: Chain) -> str:

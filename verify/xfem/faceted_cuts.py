@@ -28,37 +28,25 @@ _FLAT = 1e-12  # area over squared edge below which a triangle has none
 
 
 @njit(cache=True)
-def nearest_on_facet(x, corners, weights):
-    """Write the weights (k,) of the point of a facet nearest to x; k = 1 is a point of the rim.
-
-    Of a triangle abc: by the signs of (x − a)·ab, … and of the areas that the foot of x spans with
-    the edges (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
-
-    Parameters
-    ----------
-    x : (s,) float array
-    corners : (k, s) float array
-    weights : (k,) float array
-    """
-    for k in range(len(weights)):
-        weights[k] = 0.0
-    if corners.shape[0] == 1:
+def _nearest_on_segment(x, corners, weights):
+    """Add to the weights (2,), zero before; see `nearest_on_facet`."""
+    p, q = 0.0, 0.0
+    for i in range(len(x)):
+        along = corners[1, i] - corners[0, i]
+        p += (x[i] - corners[0, i]) * along
+        q += along * along
+    if p <= 0.0:
         weights[0] = 1.0
-        return
-    if corners.shape[0] == 2:
-        p, q = 0.0, 0.0
-        for i in range(len(x)):
-            along = corners[1, i] - corners[0, i]
-            p += (x[i] - corners[0, i]) * along
-            q += along * along
-        if p <= 0.0:
-            weights[0] = 1.0
-        elif p >= q:
-            weights[1] = 1.0
-        else:
-            weights[1] = p / q
-            weights[0] = 1.0 - weights[1]
-        return
+    elif p >= q:
+        weights[1] = 1.0
+    else:
+        weights[1] = p / q
+        weights[0] = 1.0 - weights[1]
+
+
+@njit(cache=True)
+def _nearest_on_triangle(x, corners, weights):
+    """Add to the weights (3,), zero before; see `nearest_on_facet`."""
     ab, ac, ab2, ac2, abac = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         first, second = corners[1, i] - corners[0, i], corners[2, i] - corners[0, i]
@@ -98,6 +86,29 @@ def nearest_on_facet(x, corners, weights):
     weights[1] = on_b / total
     weights[2] = on_c / total
     weights[0] = 1.0 - weights[1] - weights[2]
+
+
+@njit(cache=True)
+def nearest_on_facet(x, corners, weights):
+    """Write the weights (k,) of the point of a facet nearest to x; k = 1 is a point of the rim.
+
+    Of a triangle abc: by the signs of (x − a)·ab, … and of the areas that the foot of x spans with
+    the edges (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+
+    Parameters
+    ----------
+    x : (s,) float array
+    corners : (k, s) float array
+    weights : (k,) float array
+    """
+    for k in range(len(weights)):
+        weights[k] = 0.0
+    if len(corners) == 1:
+        weights[0] = 1.0
+    elif len(corners) == 2:
+        _nearest_on_segment(x, corners, weights)
+    else:
+        _nearest_on_triangle(x, corners, weights)
 
 
 @njit(cache=True)
