@@ -74,7 +74,7 @@ def test_an_end_inside_an_element_is_reported_with_how_far_it_moved(tmp_path):
     # on an edge, and 2 mm past it, in elements 5 mm wide, along the middle of a row of elements
     on_edge, past = scene(tmp_path), scene(tmp_path, ("[0.01, 0.05]", "[0.012, 0.05]"))
     for one, left in ((on_edge, 0.0), (past, 0.002)):
-        body, found = body_of(one), XfemSolver().solve(one, 0)
+        body, found = body_of(one), XfemSolver().solve(one, 0, tip="inside")
         cut = realised_cut(found, body, cut_rules(body, found.size, 1)[0]).record
         assert cut.missing == pytest.approx(left, abs=5e-5)  # between points
         assert max(cut.surplus, cut.lateral) < 1e-12

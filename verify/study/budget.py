@@ -270,9 +270,7 @@ def _ends(chain: Chain, level: int) -> list[CutEnd]:
     mesh, _ = background_mesh(chain.scene, level)
     solution = chain.asked[chain.scene.analysis.kinematics].solution(JUDGED, level)
     at_nodes = solution.notes["tip"] == "partial"
-    return cut_ends(
-        chain.body, solution.cut_facets, mesh.points, mesh.cells, chain.size, at_nodes
-    )
+    return cut_ends(chain.body, solution.cut_facets, mesh.points, mesh.cells, chain.size, at_nodes)
 
 
 def _contention(chain: Chain) -> str:
