@@ -132,7 +132,7 @@ def test_a_factor_that_no_solution_can_have_is_refused_beforehand(changes, asked
 def test_what_only_fine_levels_have_is_known_from_those():
     case = griffith(mesh={"pattern": "structured", "cells": [[n, n] for n in (2, 16, 32, 64)]})
     body, law = body_of(case), hooke(case.material)
-    levels = {k: find_solver("xfem").solve(case, k, repetitions=0) for k in range(4)}
+    levels = {k: find_solver("xfem").solve(case, k, 0, tip="inside") for k in range(4)}
     reference = conforming_reference(case, levels, body, law, Rules(body, 0.5, 1))
     values = reference.record.metrics["K_I at the end"]["values"]
     assert values[0] is None
@@ -169,7 +169,7 @@ def test_a_factor_without_room_names_what_is_next_to_the_tip(end, more, nearest)
         reference={},
         quantities=[{**ASKED[2], "cut": "a"}],
     )
-    solution = find_solver("xfem").solve(case, 0, repetitions=0)
+    solution = find_solver("xfem").solve(case, 0, 0, tip="inside")  # large elements at the end
     with pytest.raises(UnsupportedSceneError, match="does not fit") as refused:
         solution_intensity(case, solution, case.quantities[0])
     assert str(refused.value).endswith(nearest)
