@@ -91,6 +91,20 @@ def test_frozen_stiffness_has_no_negative_mode_and_equals_its_product(force):
     assert np.abs(product.ravel() - 2.0 * K @ u.ravel()).max() < 1e-13 * np.abs(product).max()
 
 
+def test_the_stiffness_of_the_tension_of_a_membrane_equals_its_product():
+    """Where it is slack too: there neither has any."""
+    force = _bodies()[-1]
+    u = _disturbed(force)
+    at, pattern = force.configuration(u), block_pattern(force.phantom.cells, len(u))
+    blocks = np.zeros((len(pattern.columns), 3, 3))
+    force.add_stiffness(at, pattern, blocks, kind="tension", least=0.0)
+    product = np.zeros_like(u)
+    force.add_tension_product(at, u, 2.0, product)
+    expected = 2.0 * pattern.matrix(blocks) @ u.ravel()
+    assert np.abs(expected).max() > 0.0
+    assert np.abs(product.ravel() - expected).max() < 1e-13 * np.abs(expected).max()
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_at_rest_both_stiffnesses_are_the_linear_one_in_both_kinematics(dim):
     v = cut_body(dim)
