@@ -118,6 +118,8 @@ BY_TEST = {
     "verify conform virtual_node": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
     "verify conform snapping": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
     "verify study": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
+    "verify run cutting/hanging_block_quick": "tests/cli/test_docs.py"
+        "::test_a_command_of_minutes_succeeds",
     "verify run dynamics/freed_half": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
 }  # fmt: skip
 # written by `make results` beside what came of it

@@ -77,7 +77,7 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     os.kill(parent(solving), signal.SIGKILL)
     _, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
-    records = verify.result()
+    records = verify.records()
     assert {key: r["status"] for key, r in records.items()} == {
         ("HangingOnce", 0): "solved",
         ("HangingOnce", 1): "solved",

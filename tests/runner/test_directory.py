@@ -148,7 +148,7 @@ def test_a_stopped_run_leaves_no_process_and_is_resumed(verify, how):
         assert f"interrupted by {how.name}; the same command resumes it" in err
     run = json.loads((verify.folder / "out/run.json").read_text())
     assert run["finished"] is None
-    assert set(verify.result()) == {("HangingOnLevelOne", 0)}
+    assert set(verify.records()) == {("HangingOnLevelOne", 0)}
 
     rendered = verify("report", "out")
     assert rendered.returncode == 0, rendered.stderr
@@ -158,7 +158,7 @@ def test_a_stopped_run_leaves_no_process_and_is_resumed(verify, how):
     done = verify(*command, COUNT_SOLVES=str(solves))
     assert count(solves) == 2  # level 1 only
     assert "level 0: reused" in done.stderr
-    assert {r["status"] for r in verify.result().values()} == {"solved"}
+    assert {r["status"] for r in verify.records().values()} == {"solved"}
     assert json.loads((verify.folder / "out/run.json").read_text())["finished"]
 
 

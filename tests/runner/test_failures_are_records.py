@@ -21,7 +21,7 @@ ENDINGS = {
 def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(verify):
     solvers = [f"--solver=fake_solvers:{name}" for name in ("Instant", *ENDINGS)]
     done = verify("run", "square.toml", "--out", "out", "-j", "2", "--no-conform", *solvers)
-    records = verify.result()
+    records = verify.records()
     for name, (status, reason) in ENDINGS.items():
         assert (records[name, 0]["status"], records[name, 0]["reason"]) == (status, reason)
     assert records["Instant", 0]["status"] == records["Instant", 1]["status"] == "solved"
@@ -39,7 +39,7 @@ def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify
     command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "6")
     verify(*command, "--out", "out", HANG_MARK=str(mark))
     assert time.monotonic() - start < 60
-    record = verify.result()["Hanging", 0]
+    record = verify.records()["Hanging", 0]
     assert (record["status"], record["reason"]) == ("timeout", "killed after 6 s")
     assert 6.0 <= record["wall"] < 30
     assert not alive_in_group(int(mark.read_text()))
@@ -49,7 +49,7 @@ def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
     done = verify(
         "run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out"
     )
-    record = verify.result()["Hungry", 0]
+    record = verify.records()["Hungry", 0]
     assert (verify.folder / "out" / record["notes"]["log"]).is_file()
     assert record["notes"]["log"] in done.stderr
     assert record["status"] == "memory"
@@ -62,7 +62,7 @@ def test_memory_time_threads_and_repetitions_are_recorded(verify):
     verify(
         "run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out"
     )
-    record = verify.result()["Instant", 1]
+    record = verify.records()["Instant", 1]
     assert record["timings"] == {"solve": [1e-3] * 4}
     assert 0 < record["wall"] < 60
     assert 20e6 < record["peak_memory"] < 1e9  # an interpreter with numpy
@@ -71,7 +71,7 @@ def test_memory_time_threads_and_repetitions_are_recorded(verify):
 
 def test_timings_of_solves_that_ran_side_by_side_are_marked(verify):
     verify("run", "square.toml", "--solver=fake_solvers:Instant", "-j", "2", "--out", "out")
-    assert verify.result()["Instant", 0]["notes"]["timing"].startswith("contended")
+    assert verify.records()["Instant", 0]["notes"]["timing"].startswith("contended")
 
 
 @pytest.mark.parametrize(

@@ -202,7 +202,7 @@ def test_what_is_set_for_a_solver_holds_for_its_variants_unless_they_say_another
     rows = ["--solver", TOO_FAR, "--solver", f"{GUEST} way=across"]
     done = verify("run", "square.toml", *rows, "--set", f"{GUEST}.strain=0.3", "--out", "out")
     assert done.returncode == 0, done.stderr
-    found = {name: record["parameters"] for (name, _), record in verify.result().items()}
+    found = {name: record["parameters"] for (name, _), record in verify.records().items()}
     assert found == {
         "Straining strain=0.2": {"strain": 0.2},
         "Straining way=across": {"strain": 0.3, "way": "across"},
@@ -253,7 +253,7 @@ def test_parameters_in_a_name_are_values_and_those_of_the_solver():
 def test_a_guest_that_cannot_be_changed_has_variants(verify):
     rows = ["--solver", f"{FROZEN} strain=0.2", "--solver", FROZEN]
     verify("run", "square.toml", *rows, "--out", "out")
-    found = {name for (name, _), record in verify.result().items() if record["status"] == "solved"}
+    found = {name for (name, _), record in verify.records().items() if record["status"] == "solved"}
     assert found == {"Frozen strain=0.2", "Frozen"}
 
 

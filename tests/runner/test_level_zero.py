@@ -79,7 +79,7 @@ def test_a_case_that_all_refuse_ends_without_a_reference(verify):
     done = verify("run", "hanging.toml", "--solver=fake_solvers:Refusing", "--out", "out")
     assert done.returncode == 4
     assert "[1/" in done.stderr
-    assert set(verify.result()) == {("Refusing", 0)}
+    assert set(verify.records()) == {("Refusing", 0)}
     result = read_json(verify.folder / "out/cases/hanging/result.json")
     assert [solve["status"] for solve in result["solves"]] == ["refused"]
     assert result["verdicts"] == []
@@ -88,7 +88,7 @@ def test_a_case_that_all_refuse_ends_without_a_reference(verify):
 def test_levels_that_follow_are_those_that_it_says_and_not_those_of_the_case(verify):
     """The case has two meshes; the guest has one level."""
     verify("run", "square.toml", "--solver=guests:Guest", "--out", "out")
-    (record,) = verify.result().values()
+    (record,) = verify.records().values()
     assert (record["level"], record["status"]) == (0, "solved")
 
 

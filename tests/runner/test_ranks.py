@@ -70,7 +70,7 @@ def test_two_ranks_give_the_answer_of_one_and_say_so(verify, monkeypatch):
                   "--out", "out")  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert asked == [2, 2, 2]
-    assert verify.result()["reference", 1]["notes"]["ranks"] == "2"
+    assert verify.records()["reference", 1]["notes"]["ranks"] == "2"
     one = find_solver("reference").solve(load_scene(verify.folder / "box.toml"), 1, 0)
     two = read_solution(verify.folder / "out/cases/box/reference-1/solution")
     assert two.ledger["strain"] == pytest.approx(one.ledger["strain"], rel=1e-10)

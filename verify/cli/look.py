@@ -154,9 +154,12 @@ def _description(scene: "Scene") -> str:
 
 def _size(scene: "Scene") -> list[str]:
     from verify.runner.cost import body_text
-    from verify.runner.mesh_faults import body_notes
 
     try:
+        if scene.geometry.kind != "file":
+            return [body_text(scene)]
+        from verify.runner.mesh_faults import body_notes  # loads what looks for neighbours
+
         return [body_text(scene), *body_notes(scene)]
     except (InputError, OSError) as error:  # a case is described without its mesh file, too
         return [str(error)]

@@ -98,7 +98,7 @@ on what `faceted_cuts` defines, and is easier read first):
 `join`, `phantom`
     which pieces share dof nodes (by contact across faces), and on which side of the cuts pieces and
     dof nodes lie; the result: standard finite elements with weights
-`polar`, `element`, `loads_and_supports`
+`polar`, `element`, `hyperelastic`, `loads_and_supports`
     nearest rotations; material, force and tangents of an element, linear elasticity being R = I;
     load vectors, prescribed displacements
 `block_pattern`, `mass`, `linear_solvers`, `internal_force`
