@@ -36,6 +36,20 @@ def test_an_interval_is_written_with_the_digits_that_tell_its_ends_apart(value, 
     assert with_interval(value, value - half, value + half) == written
 
 
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [
+        (0.9996, "1.00"),
+        (0.997, "0.997"),
+        (-0.09996, "−0.100"),
+        (99999.6, "1.00×10⁵"),
+        (1e4, "10000"),
+    ],
+)
+def test_a_number_that_is_rounded_up_to_a_power_of_ten_has_no_digit_more(value, written):
+    assert number(value, 3) == written
+
+
 def checked_error(value, half):
     return VerdictRecord(
         "error", "xfem", "energy_norm", Verdict.PASS, value, max(0.0, value - half), value + half,

@@ -158,7 +158,9 @@ def _decimal(value: float, digits: int) -> tuple[str, int | None]:
     """Split `value` into its written mantissa and, if it needs one, a power of ten."""
     if value == 0:
         return "0", None
-    exponent = math.floor(math.log10(abs(value)))
+    exponent = int(
+        f"{value:.{digits - 1}e}".partition("e")[2]
+    )  # of what is written: 0.9996 is 1.00
     if -3 <= exponent < 5:
         text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
         return text.replace("-", "−"), None

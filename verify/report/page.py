@@ -215,7 +215,7 @@ def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
         return Cell("", "; ".join(filter(None, (said, unsure))), verdict=verdict)
     solves = entry.result.solves if entry.result else entry.unjudged
     ends = Counter(str(s.status) for s in solves if solver_title(s.solver) == name)
-    words = ["compared, not judged" if name == str(Status.SOLVED) else name for name in ends]
+    words = ["compared only" if name == str(Status.SOLVED) else name for name in ends]
     return Cell(", ".join(words) if words else "–")
 
 

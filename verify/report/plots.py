@@ -203,7 +203,8 @@ def log_ticks(low: float, high: float) -> list[float]:
         found = [10.0**d for d in decades if d % step == 0]
         return found if len(found) >= 2 else [10.0 ** decades[0], 10.0 ** decades[-1]]
     tried = [m * 10.0**d for d in range(first, last + 1) for m in (1, 2, 5)]
-    for ticks in (tried, MaxNLocator(3).tick_values(low, high)):
+    round_ones = MaxNLocator(3, steps=[1, 2, 5, 10]).tick_values(low, high)
+    for ticks in (tried, round_ones):
         inside = [float(v) for v in ticks if start <= v <= end]
         if len(inside) >= 2:
             return inside
