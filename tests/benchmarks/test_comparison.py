@@ -25,7 +25,7 @@ def test_a_crack_with_factors_in_nearly_incompressible_tissue_is_compared_faster
     case = scene(
         [CRACK],
         material={"young": 1.0, "poisson": 0.45, "plane": "strain"},
-        mesh={"cells": [[8, 8], [16, 16]]},
+        mesh={"cells": [[12, 12], [18, 18]]},
         reference={"size": 1 / 8},
         supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
         loads=[{"kind": "traction", "where": "top", "traction": [0.0, 1.0]}],
