@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 import verify.xfem as xfem
 from verify.xfem.block_pattern import body_pattern
+from verify.xfem.statics import NotInEquilibriumError
 
 LAWS = ("neo_hookean", "stable_neo_hookean")
 E, NU = 1.0e3, 0.4
@@ -112,3 +113,14 @@ def test_what_is_no_solid_at_finite_rotation_has_no_such_law():
         xfem.InternalForce(body, law, "linear")
     with pytest.raises(xfem.XfemError, match="law"):
         xfem.InternalForce(body, replace(law, law="mooney"))
+
+
+def test_a_body_that_its_supports_turn_inside_out_is_an_error_that_names_a_piece():
+    body = bar(2)
+    x = body.node_points
+    fixed = np.zeros(x.shape, dtype=bool)
+    fixed[(x[:, 0] < 1e-9) | (x[:, 0] > 2.0 - 1e-9)] = True
+    through = np.where(x[:, :1] > 1.0, [[-3.0, 0.0]], 0.0)  # one end passes through the other
+    force = xfem.InternalForce(body, material("neo_hookean", 2))
+    with pytest.raises(NotInEquilibriumError, match="inside out, the first number"):
+        xfem.static_equilibrium(force, fixed, lambda share: share * through)

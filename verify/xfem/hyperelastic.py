@@ -75,7 +75,7 @@ def add_hyperelastic_force(elements, stable, F, force):
     return energy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")  # what is pressed to nothing has moduli that are no numbers
 def hyperelastic_moduli(elements, stable, F):
     """Second derivative of the potential by F (p, d, d): (p, d, d, d, d) per volume."""
     _, parent, _, _, _, lam, mu, axes, _, _ = elements
