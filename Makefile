@@ -55,11 +55,12 @@ heavy: setup ## run the heavy studies (minutes to hours)
 bench: setup ## run the claims about time, print medians with their spread, write docs/results/speed.md
 	@VERIFY_SPEED=1 $(PYTEST) -m "timing and not heavy" -p no:xdist -rs --benchmark-columns=median,iqr,rounds
 
-check: setup ## ruff, format, types, layers
+check: setup ## ruff, format, types, layers, words
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/words
 
 lock: ## resolve the lock files again from pyproject.toml (needs uv; UPGRADE=1 takes new versions)
 	@.ci/lock $(if $(UPGRADE),--upgrade)
