@@ -8,7 +8,13 @@ import pytest
 from scipy.sparse import csr_array
 
 from verify.errors import InputError
-from verify.solution import Regularisation, Solution, read_solution, write_solution
+from verify.solution import (
+    ContactPressure,
+    Regularisation,
+    Solution,
+    read_solution,
+    write_solution,
+)
 
 # a corner list of the unit simplex, and its mid-edge nodes in VTK's order
 EDGES = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]}
@@ -70,6 +76,22 @@ def test_a_membrane_is_triangles_in_space_and_read_as_such(tmp_path, order):
     assert read.cell_type == flat.cell_type
     for name in ("points", "cells", "displacement", "cut_facets"):
         np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+
+
+def test_a_pressure_of_contact_is_read_as_it_was_written(tmp_path):
+    plain = simplex(2, 1, times=2)
+    contact = ContactPressure(
+        np.array([[0.1, 1 / 3], [0.2, 0.5], [0.3, 0.5]]),
+        np.array([0.1, 1 / 7, 0.2]),
+        np.array([[0.0, 1e5, 2.0], [1 / 3, 0.0, 0.0]]),
+    )
+    write_solution(replace(plain, contact=contact), tmp_path / "pressed")
+    read = read_solution(tmp_path / "pressed").contact
+    for name in ("points", "weights", "pressure"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(contact, name))
+    bad = replace(contact, pressure=contact.pressure[:1])
+    with pytest.raises(InputError, match=r"contact.pressure of shape \(1, 3\); expected \(2, 3\)"):
+        replace(plain, contact=bad)
 
 
 @pytest.mark.parametrize("kind", ["consistent", "by node", "matrix"])

@@ -33,7 +33,7 @@ from verify.read_mesh import read_with_meshio
 from verify.result import Regularisation
 
 __all__ = [
-    "SCHEMA_VERSION", "Regularisation", "Solution", "handed_over", "read_solution",
+    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "handed_over", "read_solution",
     "write_solution",
 ]  # fmt: skip
 
@@ -50,9 +50,29 @@ _CELL_TYPES = {
 _MANDATORY = ("schema", "files", "dimension", "order")
 _OPTIONAL = (
     "cell_dimension", "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings",
-    "iterations", "regularisations", "notes", "mass",
+    "iterations", "regularisations", "notes", "mass", "contact",
 )  # fmt: skip
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
+
+
+@dataclass(frozen=True)
+class ContactPressure:
+    """Pressure with which the faces of cuts press on each other, at points of the realised cuts.
+
+    Attributes
+    ----------
+    points : (q, d) float array
+        On the realised cut, in the undeformed body, m; of a rule of integration, or nodes.
+    weights : (q,) float array
+        Length (in space area) of the cut that each stands for, m or m²; their sum is that of the
+        cuts whose faces may touch.
+    pressure : (t, q) float array
+        At each output time, Pa: positive where faces press, zero where they are apart.
+    """
+
+    points: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    pressure: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,6 +109,8 @@ class Solution:
         Mass with which the solver moved, in kg (per metre of thickness in 2D): ∫ρ N_i N_j of the
         field, one mass per node, or a symmetric matrix on the nodes; with all cuts open. Gravity
         pulls at its row sums. Without it the kinetic energy is known within what lumping may do.
+    contact : ContactPressure, optional
+        Of a solver that knows contact, where the scene asks for it.
     ledger : dict of str to (t,) float array
         Energies by name (``"strain"``, ``"kinetic"``, …) at each output time, in joules (per
         metre of thickness in 2D), as the solver itself adds them up.
@@ -128,6 +150,7 @@ class Solution:
     regularisations: list[Regularisation] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)
     mass: Any = None
+    contact: ContactPressure | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no solution, so that a wrong solver fails where it hands over, not later.
@@ -157,6 +180,11 @@ class Solution:
         if self.cell_sides is not None:
             check_field("cell_sides", self.cell_sides, (len(self.cells),))
         check_mass(self.mass, n)
+        if self.contact is not None:
+            check_field("contact.points", self.contact.points, (None, d))
+            count = len(self.contact.points)
+            check_field("contact.weights", self.contact.weights, (count,))
+            check_field("contact.pressure", self.contact.pressure, (t, count))
         for name, column in self.ledger.items():
             check_field(f"ledger '{name}'", np.asarray(column), (t,))
         check_accounts(
@@ -248,6 +276,8 @@ def write_solution(solution: Solution, path: Path) -> None:
         "notes": solution.notes,
         "mass": plain_mass(solution.mass),
     }
+    if (contact := solution.contact) is not None:
+        record["contact"] = {name: value.tolist() for name, value in vars(contact).items()}
     write_whole(path.with_suffix(".json"), json.dumps(record, indent=1))
 
 
@@ -309,12 +339,23 @@ def read_solution(path: Path) -> Solution:
             regularisations=[Regularisation(**e) for e in record.get("regularisations", [])],
             notes={n: str(v) for n, v in record.get("notes", {}).items()},
             mass=restored_mass(record.get("mass"), len(first.points)),
+            contact=_read_contact(record.get("contact"), d),
         )
     except InputError as error:
         raise error if error.where else InputError(error.what, str(source)) from None
     except Exception as error:
         text = f"not a readable solution ({type(error).__name__}: {error})"
         raise InputError(text, str(source)) from None
+
+
+def _read_contact(entry: Any, dimension: int) -> ContactPressure | None:
+    if entry is None:
+        return None
+    points, weights, pressure = (
+        np.asarray(entry[name], dtype=float) for name in ("points", "weights", "pressure")
+    )
+    count = len(weights)
+    return ContactPressure(points.reshape(count, dimension), weights, pressure.reshape(-1, count))
 
 
 def _check_record(record: Any, where: str) -> None:

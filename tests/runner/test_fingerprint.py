@@ -9,6 +9,7 @@ import scenes
 
 from verify.runner import fingerprint
 from verify.runner.fingerprint import ROOT, Sources, code_of_comparison, code_of_solver, modules_in
+from verify.scene import scene_hash
 
 SOLVING = "verify.runner.solve"
 ROOTS = [
@@ -147,6 +148,14 @@ def test_what_a_case_expects_of_a_cut_is_no_physics():
     given = [cut, {**cut, "expected": "edge"}, {**cut, "points": [[-0.1, 0.5], [0.5, 0.53]]}]
     plain, expecting, other = (fingerprint.physics_digest(scenes.scene([one])) for one in given)
     assert plain == expecting != other
+
+
+def test_contact_is_physics_and_an_overlap_that_is_meant_is_words():
+    cut = {"kind": "polyline", "points": [[0.2, 0.5], [0.8, 0.5]]}
+    told = [scenes.scene([cut], contact={"expected": e}) for e in ("none", "overlap", "closed")]
+    for digest in (fingerprint.physics_digest, scene_hash):
+        none, overlap, closed = (digest(scene) for scene in told)
+        assert none == overlap != closed
 
 
 def test_a_reference_that_opened_late_by_default_is_that_of_another_scene():

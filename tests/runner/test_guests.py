@@ -109,6 +109,15 @@ def test_a_refusal_of_any_length_is_a_sentence(scene, tmp_path):
     assert len(outcome["reason"]) <= 400
 
 
+def test_who_does_not_declare_contact_is_not_asked_for_it(scene, tmp_path):
+    """Whatever it answers itself: it would let the faces overlap and be judged for it."""
+    content = scene_content(scene)
+    content["scene"]["contact"] = {"expected": "closed"}
+    job = {"scene": content, "solver": "fake_solvers:Instant", "level": 0}
+    reason = "contact of the faces of a cut ('static') is not offered by instant"
+    assert solve_job({**job, "repetitions": 1, "parameters": {}}, tmp_path)["reason"] == reason
+
+
 @pytest.mark.parametrize("name", ASKED)
 def test_nonsense_when_it_is_asked_has_its_reason(scene, name, tmp_path):
     outcome = solved(scene, name, tmp_path)

@@ -95,6 +95,15 @@ BROKEN = [
     ({"d": 3, "supports": held3(rotation={"angle": 1.0, "centre": [0.0, 0.0, 0.0], "axis": [0.0,
       0.0, 0.0]})},
      "supports[0].rotation.axis: is zero"),
+    ({"contact": {"expected": "closed"}},
+     "contact.expected: 'closed' is of the faces of a cut; there is none"),
+    ({"contact": {"expected": "closed"}, "d": 3, **MEMBRANE, "material": THIN, "cuts": [SQUARE],
+      "analysis": TURNS},
+     "contact.expected: the cuts of a membrane have no faces that press on each other; expected "
+     "'none' or 'overlap'"),
+    ({"contact": {"expected": "closed"}, "cuts": [PATH2], "analysis": MOVES, "material": HEAVY},
+     "contact.expected: faces behind a blade on its way have no contact; expected 'none' or "
+     "'overlap'"),
     ({"loads": [{"kind": "cut_faces", "cut": "cat", "pressure": 1.0}], "cuts": [LINE]},
      "loads[0].cut: no cut 'cat'; did you mean 'cut'?"),
     ({"d": 3, **MEMBRANE, "material": THIN, "cuts": [SQUARE], "loads": [{"kind": "cut_faces",

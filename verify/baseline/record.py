@@ -232,9 +232,6 @@ def speed_entry(measured: MeasuredSpeed, cpu: str, origin: dict[str, Any]) -> Sp
     return Speed(ratio=measured.ratio, spread=measured.spread, kernel=KERNEL, cpu=cpu, **origin)
 
 
-_WORDS = {"title", "requirement", "tags", "acceptance", "known_findings", "contact"}
-
-
 @dataclass(frozen=True)
 class FinishedRun:
     """Results of a run by case, and where it comes from (commit, dirty, date, cpu)."""
@@ -297,8 +294,9 @@ def physics_of(result: CaseResult) -> str:
         scene = Scene.model_validate(given)
     except ValidationError:
         raise InputError("its scene is not of this version; run it again", result.case) from None
+    words = {*scene.words, "acceptance", "known_findings"} - {"adequacy"}
     content: list[Any] = [
-        scene.model_dump(mode="json", by_alias=True, exclude=_WORDS, exclude_defaults=True)
+        scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     ]
     if result.scene.get("geometry", {}).get("kind") == "file":
         content.append(result.scene_hash)

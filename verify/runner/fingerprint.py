@@ -68,10 +68,7 @@ def physics_digest(scene: Scene) -> str:
     Defaults are left out, so that a key that a later version adds does not make another scene
     of it; a default whose meaning changes needs another version of the schema.
     """
-    words: dict[str, Any] = dict.fromkeys(
-        ("title", "requirement", "tags", "acceptance", "known_findings", "contact", "adequacy"),
-        True,
-    )
+    words: dict[str, Any] = dict.fromkeys((*scene.words, "acceptance", "known_findings"), True)
     words["cuts"] = {"__all__": {"expected", "toughness"}}  # what no solve depends on
     physics = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     content: list[Any] = [scene.schema_, physics]

@@ -94,13 +94,13 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
-    from verify.solvers.interface import checked_levels, checked_refusal, solver_in
+    from verify.solvers.interface import checked_levels, refusal_of, solver_in
 
     if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
         sys.path.append(os.getcwd())
     scene = restore_scene(job["scene"])
     solver = find_solver(solver_in(job["solver"]))
-    if refusal := checked_refusal(solver.refuses(scene)):
+    if refusal := refusal_of(solver, scene):
         raise UnsupportedSceneError(refusal)
     if store and job.get("tell_levels"):
         _without_links(folder)

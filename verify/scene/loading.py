@@ -260,8 +260,9 @@ def scene_hash(scene: Scene) -> str:
 
     Defaults are left out, so that a key that a later version adds does not change it.
     """
-    words = {"title", "requirement", "tags", "contact", "adequacy"}
-    content = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
+    content = scene.model_dump(
+        mode="json", by_alias=True, exclude=scene.words, exclude_defaults=True
+    )
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     if isinstance(scene.geometry, MeshFile):
         digest.update(mesh_path(scene).read_bytes())

@@ -171,12 +171,18 @@ class Row:
 
 
 class Contact(Strict):
-    """Contact of faces. No solver here has a contact model: faces that close overlap."""
+    """Contact of the faces of cuts: unilateral, without friction, of small sliding."""
 
-    expected: Literal["none", "overlap"] = Field(
+    expected: Literal["none", "overlap", "closed"] = Field(
         default="none",
-        description="none: an overlap of faces of cuts is warned of; overlap: the case means it",
+        description="none: an overlap of faces of cuts is warned of; overlap: the case means it; "
+        "closed: faces press on each other and do not overlap",
     )
+
+    @property
+    def closed(self) -> bool:
+        """Whether faces of cuts press on each other: part of the physics, unlike the others."""
+        return self.expected == "closed"
 
 
 class Adequacy(Strict):
@@ -299,6 +305,12 @@ class SceneTables(Strict):
     def file(self) -> Path | None:
         """The case file, if it came from one."""
         return self._file
+
+    @property
+    def words(self) -> set[str]:
+        """Names of the tables that no answer depends on, but for the acceptance."""
+        told = {"title", "requirement", "tags", "adequacy"}
+        return told if self.contact.closed else {*told, "contact"}
 
     @property
     def checks(self) -> list[Acceptance | BladeCheck]:

@@ -20,7 +20,7 @@ from verify.scene.acceptance import FractureQuantity
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, TiedMotion, natural_step
-from verify.solvers.interface import check_choices
+from verify.solvers.interface import check_choices, refused_contact
 from verify.solvers.runs import OPENINGS, Record, across_interfaces, at_rest, repeated
 from verify.system import System
 
@@ -83,7 +83,7 @@ class ConformingSolver:
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""
-        return _refusal(scene)
+        return _refusal(scene) or refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""
@@ -112,7 +112,7 @@ class ConformingSolver:
 
         size = structure(scene, level)[1]
         return _solve(
-            scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions,
+            self, scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions,
             marching,
         )  # fmt: skip
 
@@ -125,7 +125,7 @@ class ConformingSolver:
         **_of_the_solve: Any,
     ) -> System:
         """Return stiffness, consistent mass and supports of `scene`; all cuts are open."""
-        if reason := _refusal(scene):
+        if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
         space = conforming_space(peer_mesh(scene, level, mesh), degree, None)
         return System(*linear_system(scene, space, exact_of(scene)))
@@ -149,7 +149,7 @@ class ReferenceSolver:
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""
-        return _refusal(scene)
+        return _refusal(scene) or refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of levels of the reference."""
@@ -178,12 +178,13 @@ class ReferenceSolver:
 
         degree = scene.reference.degree
         return _solve(
-            scene, lambda level: reference_mesh(scene, level), level, degree, min(repetitions, 1),
+            self, scene, lambda level: reference_mesh(scene, level), level, degree, min(repetitions, 1),
             marching, wants_pressure(scene, degree),
         )  # fmt: skip
 
 
 def _solve(
+    solver: ConformingSolver | ReferenceSolver,
     scene: Scene,
     make_mesh: Callable[[int], tuple[ConformingMesh, float]],
     level: int,
@@ -192,7 +193,7 @@ def _solve(
     marching: Callable[[int, float], Marching],
     pressure: bool = False,
 ) -> Solution:
-    if reason := _refusal(scene):
+    if reason := solver.refuses(scene):
         raise UnsupportedSceneError(reason)
     exact, comm = exact_of(scene), _comm()
 

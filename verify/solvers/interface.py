@@ -52,7 +52,8 @@ class Solver(Protocol):
 
     It may offer ``system(scene, level, **parameters) -> verify.system.System`` too: stiffness, mass
     and held unknowns of the body at rest with all cuts open, for the parameters of `solve`. Studies
-    take condition numbers and critical explicit steps from it.
+    take condition numbers and critical explicit steps from it. A collection ``contact`` says where
+    it knows contact of the faces of cuts, see `refused_contact`; without it no such scene comes.
     """
 
     name: str
@@ -81,17 +82,33 @@ class Solver(Protocol):
         ...
 
 
-def checked_refusal(answer: Any) -> str | None:
-    """Return what `Solver.refuses` answered.
+def refusal_of(solver: Solver, scene: Scene) -> str | None:
+    """Return why a solver cannot do a scene: what it answers itself, or that it has no contact.
 
     Raises
     ------
     InputError
         If it is neither a sentence nor None.
     """
+    answer: Any = solver.refuses(scene)
     if answer is not None and not isinstance(answer, str):
         raise InputError(f"refuses() gave {shown(answer)}; expected a sentence, or None")
-    return one_line(answer, _LONGEST) if answer else None
+    return one_line(answer, _LONGEST) if answer else refused_contact(solver, scene)
+
+
+def refused_contact(solver: Solver, scene: Scene) -> str | None:
+    """Say which contact of the faces of cuts a solver lacks that a scene asks for, or None.
+
+    A solver offers contact by its attribute ``contact``: the analyses that have it, "static" and
+    "dynamic", and "finite_rotation" where they have it in these kinematics too.
+    """
+    if not scene.contact.closed:
+        return None
+    asked = [scene.analysis.kind, scene.analysis.kinematics]
+    lacking = {*asked} - {*getattr(solver, "contact", ()), "linear"}
+    where = " and ".join(f"'{word}'" for word in asked if word in lacking)
+    name = getattr(solver, "name", type(solver).__name__)
+    return f"contact of the faces of a cut ({where}) is not offered by {name}" if where else None
 
 
 def checked_levels(answer: Any) -> int:

@@ -30,7 +30,7 @@ from verify.solvers.body_of_scene import (
     material_of,
     openings_of,
 )
-from verify.solvers.interface import check_choices
+from verify.solvers.interface import check_choices, refused_contact
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem import XfemSolver
@@ -241,7 +241,7 @@ class MethodSolver:
             return reason
         if scene.material.thickness is not None and self.name not in _SHEETS:
             return f"membranes in space are not offered by {self.name}"
-        return None
+        return refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""

@@ -25,7 +25,7 @@ from verify.solvers.body_of_scene import (
     to_cut,
 )
 from verify.solvers.boundary_conditions import motion_of_supports, supports_of
-from verify.solvers.interface import check_choices
+from verify.solvers.interface import check_choices, refused_contact
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem_answer import joined, penalised, solution_on, solve_equilibrium, treated
@@ -233,7 +233,7 @@ class XfemSolver:
             return "the geometry 'skin' is played (verify play), not solved"
         if isinstance(scene.geometry, Box) and scene.mesh.pattern == "unstructured":
             return "boxes are meshed in a structured way only; give a mesh file for another mesh"
-        return None
+        return refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""

@@ -20,7 +20,7 @@ from verify.runner.tasks import Failure, Task
 from verify.scene import Scene, ValueCheck, restore_scene, scene_content
 from verify.solution import handed_over
 from verify.solvers import Solver, check_parameters, find_solver
-from verify.solvers.interface import checked_refusal, one_name, parameters_in, solver_in
+from verify.solvers.interface import one_name, parameters_in, refusal_of, solver_in
 from verify.study.study import Finding, Making, Study, held
 
 AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
@@ -133,7 +133,7 @@ def measurements(
     solver, level = variant.found(), scene.mesh.count - 1
     rows: list[Row]
     try:
-        if refusal := checked_refusal(solver.refuses(scene)):
+        if refusal := refusal_of(solver, scene):
             raise UnsupportedSceneError(refusal)
         rows = list(_solved(solver, variant, scene, level))
     except Exception as problem:  # a guest may raise anything

@@ -7,7 +7,7 @@ import numpy as np
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Analysis, Scene
 from verify.solvers import Solver
-from verify.solvers.interface import checked_refusal
+from verify.solvers.interface import refusal_of
 
 _STEPS = 300  # 1 % beyond the critical step a mode grows by e^(0.28 · 300)
 _BLOWN_UP = 1e3  # sizes of the body that something moves
@@ -41,7 +41,7 @@ def step_by_running(
     """
     if scene.material.density is None:
         raise InputError("the scene states no density")
-    if refusal := checked_refusal(solver.refuses(_motion(scene, guess))):
+    if refusal := refusal_of(solver, _motion(scene, guess)):
         raise InputError(f"it refuses the motion: {refusal}")
 
     def stable(step: float) -> bool:
