@@ -112,7 +112,8 @@ def test_a_refusal_of_any_length_is_a_sentence(scene, tmp_path):
 def test_who_does_not_declare_contact_is_not_asked_for_it(scene, tmp_path):
     """Whatever it answers itself: it would let the faces overlap and be judged for it."""
     content = scene_content(scene)
-    content["scene"]["contact"] = {"expected": "closed"}
+    cut = {"kind": "polyline", "points": [[0.2, 0.5], [0.8, 0.5]]}
+    content["scene"] |= {"contact": {"expected": "closed"}, "cuts": [cut]}
     job = {"scene": content, "solver": "fake_solvers:Instant", "level": 0}
     reason = "contact of the faces of a cut ('static') is not offered by instant"
     assert solve_job({**job, "repetitions": 1, "parameters": {}}, tmp_path)["reason"] == reason

@@ -112,8 +112,8 @@ class ConformingSolver:
 
         size = structure(scene, level)[1]
         return _solve(
-            self, scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions,
-            marching,
+            self, scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree,
+            repetitions, marching,
         )  # fmt: skip
 
     def system(
@@ -178,8 +178,8 @@ class ReferenceSolver:
 
         degree = scene.reference.degree
         return _solve(
-            self, scene, lambda level: reference_mesh(scene, level), level, degree, min(repetitions, 1),
-            marching, wants_pressure(scene, degree),
+            self, scene, lambda level: reference_mesh(scene, level), level, degree,
+            min(repetitions, 1), marching, wants_pressure(scene, degree),
         )  # fmt: skip
 
 
