@@ -33,8 +33,8 @@ from verify.read_mesh import read_with_meshio
 from verify.result import Regularisation
 
 __all__ = [
-    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "handed_over", "read_solution",
-    "write_solution",
+    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "handed_over",
+    "read_solution", "write_solution",
 ]  # fmt: skip
 
 SCHEMA_VERSION = 1
