@@ -25,7 +25,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     "linear": (Linear, "uniform strain, uncut: matrix, shift"),
     "patch": (
         Patch,
-        "uniform strain on each side of a straight cut: point, slope or angle, strain, shift",
+        "uniform strain on each side of a straight cut, of each material.model: point, slope or "
+        "angle, strain, shift",
     ),
     "bending": (
         Bending,
@@ -64,8 +65,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
     "solid_patch": (
         Patch,
-        "3D: uniform strain on each side of a plane cut: point, normal, axis, strain and shift "
-        "(rows above, below)",
+        "3D: uniform strain on each side of a plane cut, of each material.model: point, normal, "
+        "axis, strain and shift (rows above, below)",
     ),
     "solid_smooth": (
         Sinusoidal,
@@ -106,7 +107,7 @@ _IN_SPACE = (
     "blade_strip", "released_bar",
 )  # fmt: skip
 _IN_BOTH = ("linear", "released_bar")
-_AT_ANY_STRAIN = ("rolled_halves", "straight_front")
+_AT_ANY_STRAIN = ("patch", "rolled_halves", "solid_patch", "straight_front")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 

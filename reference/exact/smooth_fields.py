@@ -9,7 +9,7 @@ of the jump, which shears, is a rotation of the second material.
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from scipy.optimize import root
+from scipy.optimize import brentq, root
 
 from reference.exact.solution import (
     Above,
@@ -54,19 +54,56 @@ class Linear(ExactSolution):
 class Patch(TwoSidedSolution):
     """F1, uniform strain on each side: u_α = ε_α s_α, u_t = −η Σ ε_α t, plus shift.
 
-    Free of traction at the cut. ``strain`` per side: ε, or in space a row (ε1, ε2).
+    Free of traction at the cut. ``strain`` per side: ε, or in space a row (ε1, ε2). Of neo-Hookean
+    material, μ λ_t + H′(J) J/λ_t = 0 gives the stretch λ_t across in place of 1 − η Σ ε_α.
     """
 
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
         super().__init__(law, parameters)
         along = parameters.take("strain", (2,) if law.dimension == 2 else (2, 2)).reshape(2, -1)
-        self._strain = np.column_stack([along, -law.eta * along.sum(axis=1)])
+        across = -law.eta * along.sum(axis=1)
+        if law.model != "hooke":
+            if (along <= -1.0).any():
+                raise InputError(
+                    "parameters: strain; expected more than -1 in neo-Hookean material"
+                )
+            across = np.array([_free_stretch(law, a) for a in np.prod(1.0 + along, axis=1)]) - 1.0
+        self._strain = np.column_stack([along, across])
+
+    def strain_energy(self, body: Array | Scene) -> float:
+        """See `ExactSolution`; refused of neo-Hookean material, whose energy is no work by halves."""
+        if self.law.model != "hooke":
+            raise InputError("the strain energy at finite rotation is integrated over the body")
+        return super().strain_energy(body)
+
+    def stress(self, points: Array, near: Array | None = None) -> Array:
+        """See `ExactSolution`; refused of neo-Hookean material, whose stress is of its energy."""
+        if self.law.model != "hooke":
+            raise InputError("tractions of neo-Hookean halves are not offered; expected supports")
+        return super().stress(points, near)
 
     def _local_displacement(self, s: Array, above: Above) -> Array:
         return side(self._strain, above) * s
 
     def _local_gradient(self, s: Array, above: Above) -> Array:
         return side(self._strain, above)[:, :, None] * np.eye(self.dimension)
+
+
+def _free_stretch(law: Hooke, along: float) -> float:
+    """Stretch across a neo-Hookean body whose stretches along have the product `along`."""
+    lame, shear = law.lame, law.shear
+    if law.model == "stable_neo_hookean":
+        return float((lame + 2 * shear) * along / (shear + (lame + shear) * along**2))
+
+    def across(log: float) -> float:  # of the stretch; it ascends for λ ≥ 0
+        return float(shear * np.expm1(2 * log) + lame * (np.log(along) + log))
+
+    reach = 1.0 + abs(np.log(along))
+    if not across(-reach) < 0.0 < across(reach):
+        raise InputError(
+            f"no neo-Hookean patch that is stretched by {along:g} along the cut is found"
+        )
+    return float(np.exp(brentq(across, -reach, reach, xtol=1e-15, rtol=1e-15)))
 
 
 class Bending(TwoSidedSolution):

@@ -109,6 +109,37 @@ def test_mode_iii_is_exact_at_any_strain_and_the_other_modes_are_refused(model):
         exact_solution("straight_front", given | {"intensity": [1.0, 0, 0]}, tissue(model))
 
 
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_stretched_halves_leave_the_faces_of_the_cut_free(model, d):
+    strain = [0.6, -0.3] if d == 2 else [[0.6, 0.2], [-0.3, 0.1]]
+    given = {"point": d * [0.0], "strain": strain, **({"angle": 30.0} if d == 2 else {})}
+    given |= {} if d == 2 else {"normal": [1, 2, 3], "axis": [2, -1, 0]}
+    material = tissue(model, plane="strain" if d == 2 else None)
+    one = exact_solution("patch" if d == 2 else "solid_patch", given, material)
+    normal = np.array([-0.5, 0.75**0.5]) if d == 2 else np.array([1, 2, 3]) / 14**0.5
+    gradient = one.gradient(np.array([normal, -normal]))
+    stress = law_of(scene_of(model, d)).piola(gradient)
+    assert np.abs(stress @ normal).max() < 1e-14
+    along = [1.6, 0.7] if d == 2 else [1.6 * 1.2, 0.7 * 1.1]
+    across = np.einsum("i,nij,j->n", normal, gradient, normal) + 1.0
+    assert np.linalg.det(np.eye(d) + gradient) == pytest.approx(along * across, rel=1e-13)
+    # what is drawn out in length contracts across, but by less than to its old volume
+    assert (1.0 / along[0] < across[0] < 1.0) and (1.0 < across[1] < 1.0 / along[1])
+    with pytest.raises(InputError, match="integrated over the body"):
+        one.strain_energy(np.zeros((2, d)))
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_simple_shear_has_the_stress_of_its_formula(model):
+    """F = I + γ e₁ ⊗ e₂, J = 1: P = μ γ (e₁ ⊗ e₂ + e₂ ⊗ e₁), whatever γ."""
+    shear = np.zeros((1, 3, 3))
+    shear[0, 0, 1] = 0.8
+    law = law_of(scene_of(model, 3))
+    expected = law.shear * (shear + shear.transpose(0, 2, 1))
+    assert law.piola(shear) == pytest.approx(expected, abs=1e-15)
+
+
 def test_other_exact_fields_are_of_hookes_law():
     with pytest.raises(InputError, match="Hooke's law"):
         exact_solution("penny", {}, tissue("neo_hookean"))

@@ -61,13 +61,22 @@ class Hooke:
         _, _, trace2, square, _ = difference_squares(gradient, gradient)
         return np.asarray(0.5 * self.lame * trace2 + self.shear * square)
 
+    def piola(self, gradient: Array) -> Array:
+        """First Piola-Kirchhoff stress, of which the energy density has the power; as gradients.
+
+        In Pa, of a membrane N/m.
+        """
+        return self._stress(gradient)
+
     def power_density(self, gradient: Array, rate: Array) -> Array:
         """Power (n,) in W/m³ of the stress of displacement gradients on velocity gradients."""
-        strain = 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
-        trace = np.einsum("nii->n", strain) * np.einsum("nii->n", rate)
-        density: Array = self.lame * trace
-        density += 2.0 * self.shear * np.einsum("nij,nij->n", strain, rate)
-        return density
+        return np.einsum("nij,nij->n", self.piola(gradient), rate)
+
+    def _stress(self, slope: Array) -> Array:
+        """λ tr(ε) I + 2μ ε (n, k, k) of ε = sym slope."""
+        stress = np.reshape(self.shear, (-1, 1, 1)) * (slope + np.swapaxes(slope, 1, 2))
+        trace = self.lame * np.einsum("nii->n", slope)
+        return np.asarray(stress + trace[:, None, None] * np.eye(slope.shape[1]))
 
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Energy density (n,) of the difference of a gradient from an `expected` one."""
@@ -91,11 +100,11 @@ class Corotated(Hooke):
         """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
         return self._density(_principal_stretches(gradient) - 1.0)
 
-    def power_density(self, gradient: Array, rate: Array) -> Array:
-        """R (2μ(U − I) + λ tr(U − I) I) : rate (n,), W/m³."""
-        turned = np.swapaxes(_rotations(gradient), 1, 2)
-        unit = np.eye(gradient.shape[1])
-        return super().power_density(turned @ (unit + gradient) - unit, turned @ rate)
+    def piola(self, gradient: Array) -> Array:
+        """R (2μ(U − I) + λ tr(U − I) I), as gradients."""
+        turn, unit = self._turn(gradient), np.eye(*gradient.shape[1:])
+        strain = np.swapaxes(turn, 1, 2) @ (unit + gradient) - np.eye(gradient.shape[2])
+        return np.asarray(turn @ self._stress(strain))
 
     def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
         """Return `error_density`, `energy_density`, and squares, as of linear elasticity."""
@@ -114,8 +123,12 @@ class Corotated(Hooke):
         It is the linear one in the frame that turns with the expected field: it does not
         change if both fields are turned, and is the exact one to second order.
         """
-        turned = np.swapaxes(_rotations(expected), 1, 2) @ difference
-        return super().energy_density(turned)
+        turned = np.swapaxes(self._turn(expected), 1, 2) @ difference
+        return Hooke.energy_density(self, turned)
+
+    def _turn(self, gradient: Array) -> Array:
+        """Rotations R of displacement gradients, shaped alike."""
+        return _rotations(gradient)
 
 
 @dataclass(frozen=True)
@@ -132,17 +145,10 @@ class MembraneLaw(Corotated):
         strain = along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
         return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
 
-    def power_density(self, gradient: Array, rate: Array) -> Array:
-        """R (2μ(U − I) + λ tr(U − I) I) : rate (n,), W/m², R (n, 3, 2)."""
-        unit = np.eye(3)[:, :2]
-        left, _, right = np.linalg.svd(unit + gradient, full_matrices=False)
-        turned = np.swapaxes(left @ right, 1, 2)
-        return Hooke.power_density(self, turned @ (unit + gradient) - np.eye(2), turned @ rate)
-
-    def error_density(self, difference: Array, expected: Array) -> Array:
-        """Energy density (n,) of sym(Rᵀ δ), R (n, 3, 2) the turn of the tangent plane."""
-        left, _, right = np.linalg.svd(np.eye(3)[:, :2] + expected, full_matrices=False)
-        return Hooke.energy_density(self, np.swapaxes(left @ right, 1, 2) @ difference)
+    def _turn(self, gradient: Array) -> Array:
+        """Turns R (n, 3, 2) of the tangent plane."""
+        left, _, right = np.linalg.svd(np.eye(3)[:, :2] + gradient, full_matrices=False)
+        return np.asarray(left @ right)
 
 
 @dataclass(frozen=True)
@@ -170,18 +176,17 @@ class NeoHookean(Corotated):
             density = shape + self.shear * (away - log) + 0.5 * self.lame * log**2
         return np.where(away > -1.0, density, np.inf)
 
-    def power_density(self, gradient: Array, rate: Array) -> Array:
-        """P : rate (n,), W/m³."""
-        return np.einsum("nij,nij->n", self.piola(gradient), rate)
-
     def piola(self, gradient: Array) -> Array:
-        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa."""
-        unit = np.eye(gradient.shape[1])
+        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa; see `energy_density`."""
         J = 1.0 + _volume_change(gradient)
-        slope = _slope_by_volume(J, self.lame, self.shear, self.stable)
-        cofactors = J[:, None, None] * np.swapaxes(np.linalg.inv(unit + gradient), 1, 2)
-        stress = np.reshape(self.shear, (-1, 1, 1)) * (unit + gradient)
-        return np.asarray(stress + slope[:, None, None] * cofactors)
+        if self.stable:
+            slope = (self.lame + self.shear) * (J - 1.0) - self.shear
+        else:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                slope = (self.lame * np.log(J) - self.shear) / J
+        F = np.eye(gradient.shape[1]) + gradient
+        stress = np.reshape(self.shear, (-1, 1, 1)) * F
+        return np.asarray(stress + slope[:, None, None] * _cofactors(F))
 
 
 Law = Hooke | Corotated | MembraneLaw | NeoHookean
@@ -255,12 +260,12 @@ def _volume_change(gradient: Array) -> Array:
     return change if gradient.shape[1] == 2 else change + np.linalg.det(gradient)
 
 
-def _slope_by_volume(J: Array, lame: float | Array, shear: float | Array, stable: bool) -> Array:
-    """H′(J) (n,), Pa; not a number where the law is not defined."""
-    if stable:
-        return np.asarray((lame + shear) * (J - 1.0) - shear)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray((lame * np.log(J) - shear) / J)
+def _cofactors(F: Array) -> Array:
+    """Cofactors of F (n, d, d)."""
+    if F.shape[1] == 2:
+        return np.asarray(F[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]])
+    a, b, c = (F[:, k] for k in range(3))
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
 def _less_one(excess: Array) -> Array:
@@ -308,21 +313,10 @@ def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]
         strain = np.swapaxes(frames, 1, 2) @ strain @ frames
     shear = moduli.young / (2.0 * (1.0 + moduli.poisson))
     lame = 2.0 * shear * moduli.poisson / (1.0 - 2.0 * moduli.poisson)
-    if scene.material.model != "hooke":
-        return strain, _biot_stress(strain, lame, shear, scene.material.model)
-    trace = np.einsum("nii->n", strain)
-    stress = 2.0 * shear[:, None, None] * strain
-    stress += (lame * trace)[:, None, None] * np.eye(3)
-    return strain, stress
-
-
-def _biot_stress(strain: Array, lame: Array, shear: Array, model: str) -> Array:
-    """RᵀP = μ U + H′(J) cof U (n, 3, 3), Pa, of neo-Hookean material and Biot strains U − I."""
-    stretch, J = np.eye(3) + strain, 1.0 + _volume_change(strain)
-    slope = _slope_by_volume(J, lame, shear, model == "stable_neo_hookean")
-    a, b, c = (stretch[:, k] for k in range(3))
-    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    return np.asarray(shear[:, None, None] * stretch + slope[:, None, None] * cofactors)
+    law, model = Hooke(lame, shear), scene.material.model
+    if model != "hooke":
+        law = NeoHookean(lame, shear, stable=model == "stable_neo_hookean")
+    return strain, law.piola(strain)  # of a pure stretch that of Biot
 
 
 def _biot_strain(gradient: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from verify.compare.hooke import NeoHookean, law_of
+from verify.compare.hooke import law_of
 from verify.errors import InputError
 from verify.geometry.simplices import distance_to_pieces, measures, unit_normals
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
@@ -464,16 +464,7 @@ class _Fit:
         """First Piola-Kirchhoff stress (n, d, d), Pa, of the energy of the scene."""
         if self._scene.analysis.kinematics == "linear" or not self._scene.material.is_uniform:
             return np.asarray(field.stress(points, near))
-        law, d = law_of(self._scene), self._scene.dimension
-        if isinstance(law, NeoHookean):
-            return law.piola(field.gradient(points, near))
-        left, stretch, right = np.linalg.svd(field.gradient(points, near) + np.eye(d))
-        turned = np.sign(np.linalg.det(left @ right))
-        stretch[:, -1] *= turned
-        left[:, :, -1] *= turned[:, None]
-        strain = stretch - 1.0
-        principal = 2 * law.shear * strain + law.lame * strain.sum(axis=1)[:, None]
-        return np.asarray(np.einsum("nik,nk,nkj->nij", left, principal, right))
+        return law_of(self._scene).piola(field.gradient(points, near))
 
 
 def _place(point: Array) -> str:
