@@ -71,7 +71,7 @@ class Patch(TwoSidedSolution):
         self._strain = np.column_stack([along, across])
 
     def strain_energy(self, body: Array | Scene) -> float:
-        """See `ExactSolution`; refused of neo-Hookean material, whose energy is no work by halves."""
+        """See `ExactSolution`; refused of neo-Hookean material: it is no half of a work."""
         if self.law.model != "hooke":
             raise InputError("the strain energy at finite rotation is integrated over the body")
         return super().strain_energy(body)

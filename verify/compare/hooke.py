@@ -146,7 +146,7 @@ class MembraneLaw(Corotated):
         return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
 
     def _turn(self, gradient: Array) -> Array:
-        """Turns R (n, 3, 2) of the tangent plane."""
+        """Rotations R (n, 3, 2) of the tangent plane."""
         left, _, right = np.linalg.svd(np.eye(3)[:, :2] + gradient, full_matrices=False)
         return np.asarray(left @ right)
 
@@ -177,7 +177,7 @@ class NeoHookean(Corotated):
         return np.where(away > -1.0, density, np.inf)
 
     def piola(self, gradient: Array) -> Array:
-        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa; see `energy_density`."""
+        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa."""
         J = 1.0 + _volume_change(gradient)
         if self.stable:
             slope = (self.lame + self.shear) * (J - 1.0) - self.shear
