@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from reference.exact.circular_cuts import ArcCrack, CircularCut, Penny
-from reference.exact.moving_cracks import BladeStrip, ReleasedBar
+from reference.exact.moving_cracks import BladeStrip, Impact, ReleasedBar
 from reference.exact.smooth_fields import (
     Airy,
     Bending,
@@ -16,7 +16,13 @@ from reference.exact.smooth_fields import (
     Sinusoidal,
 )
 from reference.exact.solution import ExactSolution, Hooke, Parameters, hooke
-from reference.exact.straight_cracks import CrackTip, Griffith, StraightFrontField
+from reference.exact.straight_cracks import (
+    ClosedCrack,
+    CrackTip,
+    Griffith,
+    PartlyClosedCrack,
+    StraightFrontField,
+)
 from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.scene.strict import nearest
@@ -53,6 +59,16 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         Griffith,
         "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy), pressure on "
         "its faces",
+    ),
+    "closed_crack": (
+        ClosedCrack,
+        "contact: crack whose faces press on each other in an infinite plate: centre, a, angle, "
+        "remote stress (sxx, syy, sxy)",
+    ),
+    "partly_closed_crack": (
+        PartlyClosedCrack,
+        "contact: crack of half-length a in a remote field that grows along it by slope, closed "
+        "beyond -a/3: centre, a, angle, slope",
     ),
     "arc_crack": (
         ArcCrack,
@@ -92,6 +108,10 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "3D, moving: mode III crack that advances through a strip gripped at ±grip: half_width, "
         "grip, speed, tip at the time 0, angle of its way in the x-y plane",
     ),
+    "impact": (
+        Impact,
+        "contact, moving: halves of a bar along x that meet: half_length, at, speed of each, gap",
+    ),
     "released_bar": (
         ReleasedBar,
         "moving: a strained bar between held ends, let go across at the time 0: strain, ends along "
@@ -104,9 +124,9 @@ _LAYERS = (
 )
 _IN_SPACE = (
     "linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "straight_front",
-    "blade_strip", "released_bar",
+    "blade_strip", "impact", "released_bar",
 )  # fmt: skip
-_IN_BOTH = ("linear", "released_bar")
+_IN_BOTH = ("linear", "impact", "released_bar")
 _AT_ANY_STRAIN = ("patch", "rolled_halves", "solid_patch", "straight_front")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 

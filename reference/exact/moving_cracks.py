@@ -207,6 +207,76 @@ class ReleasedBar(ExactSolution):
         return side, side * (x - self._at), length
 
 
+class Impact(ExactSolution):
+    """Two equal halves of a bar that move towards each other and touch: d'Alembert's waves.
+
+    With y the distance from the place where they meet and τ the time since, the halves move by
+    −(v/c) min(y, m) towards it, m = L − |cτ − L|: together for 2L/c, under the pressure ρcv, then
+    apart with velocities exchanged. c = √((λ+2μ)/ρ), as of `ReleasedBar`.
+
+    Parameters ``half_length`` L (m), ``at``, where they meet along x (m), ``speed`` v of each
+    (m/s) and the ``gap`` between them at the time 0 (m, default 0). The material needs a density.
+    """
+
+    moves = True
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        super().__init__(law)
+        self._length = parameters.positive("half_length")
+        self._at = float(parameters.take("at", ()))
+        self._v = parameters.positive("speed")
+        self._gap = float(parameters.take("gap", (), default=0.0))
+        if law.density is None or self._gap < 0.0:
+            raise InputError("an impact needs the density of the material, and a gap of 0 or more")
+        self._speed = float(np.sqrt((law.lame + 2 * law.shear) / law.density))
+
+    @property
+    def cut_plane(self) -> Plane:
+        """Where the halves meet."""
+        axis = np.eye(self.dimension)[0]
+        return self._at * axis, axis
+
+    def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
+        """Whether no front of a wave is within a distance of points; see `ExactField`."""
+        _, far = self._local(points, None)
+        return np.asarray(np.abs(far - self._front()[0]) > reach)
+
+    def strain_energy(self, body: Array | Scene) -> float:
+        """Refuse: the tractions on the surface do not say it."""
+        raise InputError("the strain energy of a moving field is no work on the surface")
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, d), m; see `ExactSolution`."""
+        side, far = self._local(points, near)
+        way = -self._v / self._speed * np.minimum(far, self._front()[0])
+        return (side * way)[:, None] * np.eye(self.dimension)[0]
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
+        along = np.eye(self.dimension)[0]
+        pressed = self._local(points, near)[1] < self._front()[0]
+        strain = -self._v / self._speed * pressed
+        return strain[:, None, None] * np.outer(along, along)
+
+    def velocity(self, points: Array, near: Array | None = None) -> Array:
+        """Velocity (n, d), m/s; see `ExactSolution`."""
+        side, far = self._local(points, near)
+        front, direction = self._front()
+        rate = -self._v * direction * (far > front)
+        return (side * rate)[:, None] * np.eye(self.dimension)[0]
+
+    def _front(self) -> tuple[float, float]:
+        """Distance m of the front of the wave from the meeting place, m, and its direction."""
+        run = self._speed * (self.time - 0.5 * self._gap / self._v)
+        return self._length - abs(run - self._length), 1.0 if run < self._length else -1.0
+
+    def _local(self, points: Array, near: Array | None) -> tuple[Array, Array]:
+        """Side (n,) of the meeting place, 1 or −1, and distance from it, m."""
+        x = np.asarray(points, dtype=float)[:, 0]
+        side = np.where((x if near is None else np.asarray(near)[:, 0]) >= self._at, 1.0, -1.0)
+        return side, side * (x - self._at)
+
+
 def wave(distance: ArrayLike, length: ArrayLike, run: float) -> tuple[Array, Array, Array]:
     """Displacement (m), slope and rate per strain of a bar whose free end is loaded suddenly.
 

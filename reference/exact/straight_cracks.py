@@ -218,11 +218,7 @@ class Griffith(ComplexCrack):
 
     def _potentials(self, z: Complex, sheet: Array) -> Potentials:
         a, s, gamma = self._a, self._s, self._gamma
-        # z ∓ a by parts, which keeps a negative zero of the imaginary part
-        left, right = z.copy(), z.copy()
-        left.real -= a
-        right.real += a
-        root = sheet * np.sqrt(left) * np.sqrt(right)
+        root = _root(z, sheet, a)
         bar = root.conj()
         return Potentials(
             0.5 * s * root + gamma * z,
@@ -231,6 +227,79 @@ class Griffith(ComplexCrack):
             0.5 * s * bar - gamma * z.conj(),
             0.5 * s * z.conj() / bar - gamma,
         )
+
+
+def _root(z: Complex, sheet: Array, a: float) -> Complex:
+    """√(z−a) √(z+a), cut along the crack."""
+    # z ∓ a by parts, which keeps a negative zero of the imaginary part
+    left, right = z.copy(), z.copy()
+    left.real -= a
+    right.real += a
+    return np.asarray(sheet * np.sqrt(left) * np.sqrt(right))
+
+
+class ClosedCrack(Griffith):
+    """A crack whose faces press on each other without friction, in an infinite plate.
+
+    The uniform field of the remote stress σ, but for its shear along the crack, of which mode II
+    of `Griffith` leaves the faces free: K_I = 0, K_II = τ√(πa), and the pressure is −σ_nn.
+    Parameters ``centre``, ``a``, ``angle`` and the remote ``stress`` of `Griffith`.
+    """
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        super().__init__(law, parameters)
+        self._across, self._s = self._s.real, 1j * self._s.imag
+        if self._across > 0.0 or self._pressure:
+            raise InputError(
+                f"parameters: {self._across:g} Pa across the crack; expected compression, and no "
+                "pressure on the faces but their own"
+            )
+
+    def _potentials(self, z: Complex, sheet: Array) -> Potentials:
+        f, half = super()._potentials(z, sheet), 0.5 * self._across
+        phi, omega = f.phi + half * z, f.omega + half * z.conj()
+        return Potentials(phi, f.phi_1 + half, f.phi_2, omega, f.omega_1 + half)
+
+
+class PartlyClosedCrack(ComplexCrack):
+    """A crack −a < x < a in a remote field σ' x, closed without friction on −a < x < −a/3.
+
+    Westergaard's Z = σ' (ξ − c/2) √((ξ+c)/(ξ−c)) with c = 2a/3 and ξ = z − a/3, and φ' = ω' = Z/2:
+    there is no shear on the line of the crack, on which σ_yy = Re Z. The stress goes as σ_xx = σ_yy
+    = σ' x, σ_xy = −σ' y far away. K_I(a) = σ' c √(πc); at −a/3, where the faces begin to press on
+    each other, it is zero, and at −a the field is smooth (H. M. Westergaard, J. Appl. Mech. 6,
+    1939; the place of −a/3 by K_I = 0 there).
+
+    Parameters ``centre`` of the crack (m, default the origin), half-length ``a`` (m), ``angle``
+    (degrees, default 0) and the ``slope`` σ' > 0 (Pa/m).
+    """
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        centre = parameters.take("centre", (2,), default=(0.0, 0.0))
+        super().__init__(law, centre, float(parameters.take("angle", (), default=0.0)))
+        a, self._slope = parameters.positive("a"), parameters.positive("slope")
+        self._origin = self._origin + a / 3 * self._axes[0]
+        self._c = 2 * a / 3
+
+    @property
+    def singular_points(self) -> Array:
+        """The tip of the open end (1, 2)."""
+        return (self._origin + self._c * self._axes[0])[None]
+
+    @property
+    def stress_intensity(self) -> tuple[float, float]:
+        """K_I and K_II at the open end, Pa·√m."""
+        return float(self._slope * self._c * np.sqrt(np.pi * self._c)), 0.0
+
+    def _on_crack(self, x: Array) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(x) < self._c)
+
+    def _potentials(self, z: Complex, sheet: Array) -> Potentials:
+        c, s, root = self._c, self._slope, _root(z, sheet, self._c)
+        flat = z * z + 0.5 * c * z - 0.5 * c**2  # Z R / σ'
+        phi, phi_1 = 0.25 * s * (z + c) * root, 0.5 * s * flat / root
+        phi_2 = 0.5 * s * ((2 * z + 0.5 * c) / root - flat * z / (root * root * root))
+        return Potentials(phi, phi_1, phi_2, phi.conj(), phi_1.conj())
 
 
 class StraightFrontField(ExactSolution):

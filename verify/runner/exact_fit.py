@@ -312,6 +312,9 @@ class _Fit:
             for load in loads:
                 factor = factor_at(load.history, time)
                 given += factor * load.on_faces(points, outward, normals, time)
+            if self._scene.contact.closed:  # and whatever pressure the faces have on each other
+                press = np.sum((given - true) * outward, axis=1).clip(min=0.0)
+                given -= press[:, None] * outward
             local = np.abs(stress).max(axis=(1, 2), initial=0.0)
             close = np.where(to_end < 0.1 * self._size, _SAME_AT_ENDS * local, 0.0)
             bound = _SAME * max(level, np.abs(given).max(initial=0.0)) + close
@@ -325,6 +328,19 @@ class _Fit:
                     "the field jumps, and end where that ends"
                 )
                 return
+        if not self._scene.contact.closed or not len(points):
+            return
+        beside = 1e-6 * self._size * normals
+        above, below = (field.displacement(points, points + s * beside) for s in (1.0, -1.0))
+        gap = np.sum((above - below) * normals, axis=1) / max(np.abs(above).max(), 1e-300)
+        apart = (gap > _SAME) & (press > bound)
+        if (apart | (gap < -_SAME)).any():
+            k = int(np.argmax(np.where(apart, np.inf, -gap)))
+            yield (
+                f"is no contact on cut '{name}' at {_place(points[k])}: its faces "
+                + (f"are apart under {press[k]:.3g} Pa" if apart[k] else "overlap")
+                + "; expected pressure where they touch, and no overlap"
+            )
 
     def _jumps(self) -> Iterator[str]:
         """Differences of displacement across the body that no gradient and no cut explains."""
