@@ -118,8 +118,8 @@ def test_right_answers_pass_and_wrong_ones_fail_the_checks_that_the_case_makes(t
     right = main(["import", CASE, str(tmp_path / "right"), "--solver", "right", *out, "--json"])
     captured = capsys.readouterr()
     said = json.loads(captured.out)
-    assert (right, {v["verdict"] for v in said["verdicts"]}) == (0, {"PASS"})
-    assert {v["solver"] for v in said["verdicts"]} == {"right"}
+    assert (right, {v["verdict"] for v in said["cases"][0]["verdicts"]}) == (0, {"PASS"})
+    assert {v["solver"] for v in said["cases"][0]["verdicts"]} == {"right"}
     # judged once, with the answers
     assert "not judged" not in captured.err
     assert captured.err.count(f"{CASE}: ") == 1
@@ -135,6 +135,27 @@ def test_right_answers_pass_and_wrong_ones_fail_the_checks_that_the_case_makes(t
     energy = by_solver["wrong", "strain_energy"].observed
     assert energy == pytest.approx(1.01**2 * 3.434065934e-3, rel=1e-9)
     assert (tmp_path / "run/report.html").is_file()
+
+
+def test_one_import_judges_several_cases_and_a_case_without_a_folder_is_refused(tmp_path, capsys):
+    # f1_patch and f1_3d; the second has no folder
+    for level in (0, 1):
+        answer(tmp_path / "mine" / CASE, level)
+    command = ["import", "statics/f1_*", str(tmp_path / "mine"), "--solver", "mine"]
+    code = main([*command, "--out", str(tmp_path / "run"), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    cases = {case["case"]: case for case in said["cases"]}
+    assert {v["verdict"] for v in cases[CASE]["verdicts"]} == {"PASS"}
+    (other,) = cases.keys() - {CASE}
+    assert {solve["status"] for solve in cases[other]["solves"]} == {"refused"}
+    assert {solve["reason"] for solve in cases[other]["solves"]} == {
+        f"no answers: no folder '{other}'"
+    }
+    assert code == 0
+    (tmp_path / "none").mkdir()
+    command[2] = str(tmp_path / "none")
+    assert main([*command, "--out", str(tmp_path / "other")]) == 2
+    assert "holds no answer; expected statics/f1_" in capsys.readouterr().err
 
 
 def test_an_answer_that_is_missing_refused_or_damaged_is_a_record_of_its_own(tmp_path):

@@ -49,7 +49,9 @@ def verdicts(python, environment, case, answers, out):
     )
     assert done.stdout, done.stderr
     answer = json.loads(done.stdout)
-    return {one["metric"]: one["verdict"] for one in answer["verdicts"]}, answer["report"]
+    return {one["metric"]: one["verdict"] for one in answer["cases"][0]["verdicts"]}, answer[
+        "report"
+    ]
 
 
 def test_a_folder_of_answers_is_judged_where_only_numpy_and_scipy_are(tmp_path, root):

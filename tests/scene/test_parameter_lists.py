@@ -115,3 +115,9 @@ def test_a_check_names_another_row(tmp_path, row, message):
     check = f'[[acceptance]]\ncheck = "ratio"\nmetric = "displacement_l2"\n{row}\nwithin = 0.1\n'
     with pytest.raises(InputError, match=message):
         load_scenes(family(tmp_path, FAMILY + check))
+
+
+def test_the_name_of_a_folder_stands_for_its_cases_that_are_not_heavy():
+    names = [scene.name for scene in select_cases(["controls"])]
+    assert names
+    assert names == [scene.name for scene in select_cases(["controls/*"])]

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from verify.cli.signatures import Arg, Case, Out, Strict, Timeout, count, positive
+from verify.cli.signatures import Arg, Cases, Jobs, Out, Strict, Timeout, count, positive
 from verify.cli.streams import command_line, print_json
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    case: Case,
+    case: Cases,
     *,
     out: Out,
     levels: Annotated[
@@ -50,27 +50,33 @@ def export(
     """  # fmt: skip
     from verify.exchange import export_case
     from verify.foreign.records import write_template
-    from verify.scene import load_scene
+    from verify.runner import select_cases
 
-    scene = load_scene(case)
-    files = export_case(scene, out, levels or None, conforming or template is not None)
+    scenes = select_cases([case], weight="heavy")
+    files = []
+    for scene in scenes:
+        place = out / scene.name if len(scenes) > 1 else out
+        files += export_case(scene, place, levels or None, conforming or template is not None)
     if template:
         files += write_template(out)
     if as_json:
-        print_json({"case": scene.name, "files": [str(file) for file in files]})
+        print_json({"case": case, "files": [str(file) for file in files]})
         return 0
     for file in files:
         print(file)
+    folders = f"{out}/<case>" if len(scenes) > 1 else out
     print(
-        f"answer in {out}/level-<k>/solution.json and .vtu, then: "
+        f"answer in {folders}/level-<k>/solution.json and .vtu, then: "
         f"verify import {case} {out} --solver NAME --out RUN"
     )
     return 0
 
 
 def import_(
-    case: Case,
-    answers: Annotated[Path, Arg("directory with level-<k>/solution.json", "DIR")],
+    case: Cases,
+    answers: Annotated[
+        Path, Arg("directory with level-<k>/solution.json; of several cases in <case>/", "DIR")
+    ],
     *,
     solver: Annotated[str, Arg("what the program is called in the report", "NAME")],
     out: Annotated[
@@ -101,6 +107,7 @@ def import_(
     repetitions: Annotated[
         int, Arg("timed repetitions of the solves beside it", "N", read=count)
     ] = 1,
+    jobs: Jobs = 1,
     strict: Strict = False,
     as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False,
 ) -> int:
@@ -115,35 +122,25 @@ def import_(
     """
     from verify.cli.progress import progress_on
     from verify.cli.ranking import rank_run
-    from verify.cli.run_text import verdict_lines
-    from verify.exchange import read_answers
+    from verify.cli.run import say_results
+    from verify.exchange import answers_of
     from verify.exchange.comparison import compare_answers
     from verify.report.rendering import render
-    from verify.runner import Options, exit_code
+    from verify.runner import Options, select_cases
     from verify.runner.checking import check_solver_name
     from verify.runner.fingerprint import cache_folder
-    from verify.scene import load_scene
 
     for name in beside:
         check_solver_name(name, "--beside")
-    scene = load_scene(case)
-    found = read_answers(scene, answers)
-    options = Options(tuple(beside), repetitions, timeout=timeout, cache=cache_folder())
+    scenes = select_cases([case], weight="heavy")
+    found = answers_of(scenes, answers)
+    options = Options(tuple(beside), repetitions, jobs=jobs, timeout=timeout, cache=cache_folder())
     with progress_on(sys.stderr) as progress:
-        result = compare_answers(
-            scene, found, solver, out, options, progress, judged_as, command_line()
+        results = compare_answers(
+            scenes, found, solver, out, options, progress, judged_as, command_line()
         )
-    rank_run(out, [result], {}, False, timeout, print)
-    page, code = render(out), exit_code([result], strict)
-    if as_json:
-        verdicts = [asdict(record) for record in result.verdicts]
-        answer = {"exit": code, "report": str(page), "case": result.case, "verdicts": verdicts}
-        print_json({**answer, "notices": [asdict(notice) for notice in result.notices]})
-        return code
-    for line in verdict_lines([result]):
-        print(line)
-    print(f"report: {page}")
-    return code
+    rank_run(out, results, {}, False, timeout, print)
+    return say_results(results, str(render(out)), strict, as_json)
 
 
 def conform(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from verify.cli.signatures import (
     Arg,
+    Jobs,
     Repetitions,
     Strict,
     Timeout,
@@ -45,7 +46,7 @@ class RunOptions:
     out: Annotated[Path, Arg("run directory", "DIR")] = Path("verify-results")
     quick: Annotated[bool, Arg("only cases tagged quick", exclusive=True)] = False
     heavy: Annotated[bool, Arg("also cases tagged heavy", exclusive=True)] = False
-    jobs: Annotated[int, Arg("processes at the same time", "N", ("-j", "--jobs"), count)] = 1
+    jobs: Jobs = 1
     timeout: Timeout = 600.0
     memory: Annotated[
         float | None,
@@ -156,8 +157,8 @@ def run(
         if find_spec("numba") is None:  # this process does without, its solvers do not
             raise ModuleNotFoundError("No module named 'numba'", name="numba")
         start_server()  # it loads while this process does
-    from verify.cli.run_text import costs_of, run_line, suites_line, verdict_lines
-    from verify.runner import exit_code, select_cases
+    from verify.cli.run_text import costs_of, run_line, suites_line
+    from verify.runner import select_cases
     from verify.runner.run import NOTHING_RAN
 
     names, parameters = _solvers_of(asked)
@@ -177,19 +178,32 @@ def run(
     if isinstance(done, int):
         return done
     summary, report = done
-    code = exit_code(summary.results, asked.strict)
-    if asked.as_json:
-        answer = [_answer(result) for result in summary.results]
+    return say_results(summary.results, report, asked.strict, asked.as_json, summary.reused)
+
+
+def say_results(
+    results: "Sequence[CaseResult]",
+    report: str | None,
+    strict: bool,
+    as_json: bool,
+    reused: int = 0,
+) -> int:
+    """Print what came out of judged cases; return the exit code."""
+    from verify.cli.run_text import verdict_lines
+    from verify.report.answers import answers
+    from verify.runner import exit_code
+
+    code = exit_code(results, strict)
+    if as_json:
+        answer = [_answer(result) for result in results]
         print_json({"exit": code, "report": report, "cases": answer})
         return code
-    for line in verdict_lines(summary.results):
+    for line in verdict_lines(results):
         print_line(line)
-    from verify.report.answers import answers
-
-    for one in answers(summary.results):
+    for one in answers(results):
         print_line(f"{one.question}: {one.sentence}")
-    if summary.reused:
-        print(f"{summary.reused} finished solves of before were reused")
+    if reused:
+        print(f"{reused} finished solves of before were reused")
     if report:
         print(f"report: {report}")
     return code

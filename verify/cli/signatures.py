@@ -83,10 +83,12 @@ def positive(text: str) -> float:
 
 # what several commands have, in the same words
 Case = Annotated[str, Arg("name of a case, or a case file", "CASE")]
+Cases = Annotated[str, Arg("name of a case, of a folder of cases, or a case file", "CASE")]
 Run = Annotated[Path, Arg("directory of a finished run", "RUN")]
 Out = Annotated[Path, Arg("directory to write into", "DIR")]
 AsJson = Annotated[bool, Arg("print JSON", flags=("--json",))]
 Matching = Annotated[str | None, Arg("only matching cases", "EXPR", ("-k",))]
+Jobs = Annotated[int, Arg("processes at the same time", "N", ("-j", "--jobs"), count)]
 Strict = Annotated[bool, Arg("undecided verdicts, refusals, warnings: exit code 5")]
 Timeout = Annotated[float, Arg("wall seconds after which a solve is killed", "S", read=positive)]
 Repetitions = Annotated[int, Arg("timed repetitions of each solve", "N", read=count)]

@@ -5,7 +5,7 @@
 `export_fields` writes the solutions of a run for ParaView.
 """
 
-from verify.exchange.export import Answers, ProgramSolver, export_case, read_answers
+from verify.exchange.export import Answers, ProgramSolver, answers_of, export_case, read_answers
 from verify.exchange.paraview import export_fields
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
 
@@ -15,6 +15,7 @@ __all__ = [
     "Load",
     "Problem",
     "ProgramSolver",
+    "answers_of",
     "export_case",
     "export_fields",
     "problem_of",

@@ -1,24 +1,21 @@
 """Answers of another program, compared and judged like those of the own solvers.
 
-The run directory is an ordinary one: the solvers that the answers are compared with, and the
-reference, are run by `verify.runner`; then the answers are put beside them as solves of a solver
-of their own, and the comparison of the runner judges all of them together.
+The run directory is an ordinary one: the answers are put into it as solves of a solver of their
+own, and `verify.runner` runs what they are compared with and judges all of them together.
 """
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
 from verify.exchange.export import Answers
-from verify.files import read_json, write_json
-from verify.provenance import provenance
+from verify.files import read_json
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases
 from verify.runner.checking import check_scene
-from verify.runner.child import watch
-from verify.runner.comparing import Comparison
 from verify.runner.directory import (
     Job,
     RunDirectory,
@@ -29,7 +26,7 @@ from verify.runner.directory import (
     write_run,
 )
 from verify.runner.fingerprint import digest_of, file_digest
-from verify.scene import Scene, scene_content
+from verify.scene import Scene
 from verify.solution import Solution, write_solution
 from verify.solvers import solver_names
 
@@ -37,98 +34,82 @@ _NAME = re.compile(r"[A-Za-z][\w.+-]*")
 
 
 def compare_answers(
-    scene: Scene,
-    answers: Answers,
+    scenes: Sequence[Scene],
+    answers: Mapping[str, Answers],
     name: str,
     out: Path,
     options: Options,
     progress: Progress,
     judged_as: str | None = None,
     command: str = "",
-) -> CaseResult:
-    """Compare the `answers` of the program `name` to `scene` and judge them.
+) -> list[CaseResult]:
+    """Compare the `answers` of the program `name` to `scenes` and judge them.
 
     Parameters
     ----------
-    scene : Scene
-    answers : Answers
+    scenes : sequence of Scene
+    answers : mapping of str to Answers
+        By the name of the scene.
     name : str
         What the program is called in the report.
     out : Path
-        Run directory, new, or of an earlier import of the same case: then the reference is
+        Run directory, new, or of an earlier import of the same cases: then the reference is
         reused, and other programs stay beside this one.
     options : Options
         Limits of the solves; its ``solvers`` run beside the answers, with those that the checks
         compare with and the reference.
     progress : Progress
     judged_as : str, optional
-        The checks that the case makes of this solver by its name are made of `name` too.
+        The checks that the cases make of this solver by its name are made of `name` too.
     command : str
         The command line, for the record.
 
     Raises
     ------
     InputError
-        If the name is taken or not a name, or the case or `out` is bad.
+        If the name is taken or not a name, or a case or `out` is bad.
     RunStoppedError
         If a signal came while the solvers beside it ran.
     """
     if not _NAME.fullmatch(name) or name in solver_names():
         own = ", ".join(solver_names())
         raise InputError(f"'{name}' cannot name a program; expected a word other than {own}")
-    check_scene(scene)
-    names = list(dict.fromkeys([*_imported_before(out), name]))
-    judged = _judged_scene(scene, judged_as, names)
-    options = replace(options, solvers=_beside(judged, options, names), parameters={})
-    if options.solvers:
-        run_cases([_with_acceptance(scene, [])], out, options, _Solving(progress), command)
-    identity = {"cases": [scene.name], "options_of_result": options.of_result()}
+    for scene in scenes:
+        check_scene(scene)
+    names = tuple(dict.fromkeys([*_imported_before(out), name]))
+    judged = _judged_scenes(scenes, judged_as, names)
+    options = replace(options, parameters={}, imported=names)
+    cases = [scene.name for scene in scenes]
+    identity = {"cases": cases, "options_of_result": options.of_result()}
     with claimed(out, identity) as directory:
-        origin = provenance()
-        record = {
-            **identity,
-            "command": command,
-            "started": origin["date"],
-            "finished": None,
-            "options": options.record(),
-            "provenance": origin,
-            "imported": names,
-        }
-        write_run(directory, record)
-        _store(scene, answers, name, directory)
-        result = _assess(judged, directory, options, origin)
-        progress.judged(result)
-        write_run(directory, {**record, "finished": provenance()["date"]})
-    return result
-
-
-class _Solving:
-    """Progress of the solves alone: the case is judged later, with the answers."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.planned, self.started, self.solved = (
-            progress.planned,
-            progress.started,
-            progress.solved,
-        )
-
-    def judged(self, result: CaseResult) -> None: ...
+        write_run(directory, {**identity, "command": command, "options": options.record()})
+        for scene in scenes:
+            _store(scene, answers[scene.name], name, directory)
+    return run_cases(judged, out, options, progress, command).results
 
 
 def _imported_before(out: Path) -> list[str]:
     file = out / "run.json"
-    return list(read_json(file).get("imported", [])) if file.is_file() else []
+    options = read_json(file).get("options", {}) if file.is_file() else {}
+    return list(options.get("imported", []))
 
 
-def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scene:
+def _judged_scenes(
+    scenes: Sequence[Scene], judged_as: str | None, names: Sequence[str]
+) -> list[Scene]:
     """Make the checks that name the solver `judged_as` of each of `names` instead."""
     if judged_as is None:
-        return scene
-    made = {check.solver for check in scene.acceptance if check.solver is not None}
+        return list(scenes)
+    made = {check.solver for scene in scenes for check in scene.acceptance} - {None}
     if judged_as not in made:
-        own = ", ".join(sorted(made)) or "none by its name"
-        raise InputError(f"{scene.name} makes no check of '{judged_as}'; it does of {own}")
-    checks = [
+        own = ", ".join(sorted(filter(None, made))) or "none by its name"
+        where = ", ".join(scene.name for scene in scenes)
+        raise InputError(f"{where} makes no check of '{judged_as}'; it does of {own}")
+    return [_with_acceptance(scene, _renamed(scene, judged_as, names)) for scene in scenes]
+
+
+def _renamed(scene: Scene, judged_as: str, names: Sequence[str]) -> list[Any]:
+    return [
         one
         for check in scene.acceptance
         for one in (
@@ -137,7 +118,6 @@ def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scen
             else [check]
         )
     ]
-    return _with_acceptance(scene, checks)
 
 
 def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
@@ -146,14 +126,6 @@ def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
     changed = changed.model_copy(update={"known_findings": known})
     changed._name, changed._file, changed._row = scene.name, scene.file, scene.row
     return changed
-
-
-def _beside(judged: Scene, options: Options, names: list[str]) -> tuple[str, ...]:
-    """Names of the solvers that have to run beside the answers."""
-    compared = [check.compared for check in judged.acceptance if check.compared]
-    reference = [] if judged.judged_by_exact else ["reference"]
-    wanted = [*options.solvers, *compared, *reference]
-    return tuple(dict.fromkeys(solver for solver in wanted if solver not in names))
 
 
 def _store(scene: Scene, answers: Answers, name: str, directory: RunDirectory) -> None:
@@ -181,22 +153,3 @@ def _record(job: Job, solution: Solution) -> SolveRecord:
         regularisations=list(solution.regularisations),
         notes={**solution.notes, "imported": "from files; its timings are what it says itself"},
     )
-
-
-def _assess(
-    scene: Scene,
-    directory: RunDirectory,
-    options: Options,
-    origin: dict[str, Any],
-) -> CaseResult:
-    """Have the comparison of the runner judge every solve that lies in the case's folder."""
-    folder = directory.case_folder(scene.name)
-    write_json(scene_content(scene), folder / "scene.json")
-    solves = sorted(path.parent for path in folder.glob("*/record.json"))
-    (folder / "result.json").unlink(missing_ok=True)
-    key = digest_of([scene_content(scene), [file_digest(s / "record.json") for s in solves]])
-    memory = options.memory or 0.8 * origin["memory"]
-    comparison = Comparison(
-        scene, key, (), solves, {}, folder, directory.root, origin, options.timeout, memory
-    )
-    return watch(comparison)

@@ -310,6 +310,30 @@ def read_answers(scene: Scene, folder: Path) -> Answers:
     return answers
 
 
+def answers_of(scenes: Sequence[Scene], folder: Path) -> dict[str, Answers]:
+    """Read the answers to each of several scenes below ``folder/<scene>``; to one, in `folder`.
+
+    A scene that has no folder is one that the program does not take.
+
+    Raises
+    ------
+    InputError
+        As `read_answers`; or if no scene has a folder.
+    """
+    if len(scenes) == 1:
+        return {scenes[0].name: read_answers(scenes[0], folder)}
+    found = {}
+    for scene in scenes:
+        place = folder / scene.name
+        blank = Status.REFUSED, f"no answers: no folder '{scene.name}'"
+        without = Answers(missing=dict.fromkeys(range(scene.mesh.count), blank))
+        found[scene.name] = read_answers(scene, place) if place.is_dir() else without
+    if not any((folder / name).is_dir() for name in found):
+        text = f"holds no answer; expected {scenes[0].name}/level-0/solution.json …"
+        raise InputError(text, str(folder))
+    return found
+
+
 def _check_same_case(scene: Scene, folder: Path) -> None:
     """Refuse answers to another version of the case, where the export says which it was."""
     file = folder / "case.json"

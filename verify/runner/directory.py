@@ -52,6 +52,11 @@ class RunDirectory:
         """Folder of one solve."""
         return self.case_folder(case) / f"{folder_name(solver)}-{level}"
 
+    def solves(self, case: str, solver: str) -> list[Path]:
+        """Folders of the solves of a solver that have a record, by level."""
+        levels = (self.solve_folder(case, solver, level) for level in range(MOST_LEVELS))
+        return [folder for folder in levels if (folder / "record.json").is_file()]
+
 
 def folder_name(solver: str) -> str:
     """Return the name of a solver as part of the name of a file."""

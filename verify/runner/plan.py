@@ -60,6 +60,8 @@ class CasePlan:
         Seconds within which the levels of the reference that are solved shall end.
     coarser : int
         How many times as large as the case asks the elements of its reference are, to that end.
+    imported : list of Path
+        Folders of answers of other programs, compared with the solves.
     """
 
     scene: Scene
@@ -76,6 +78,7 @@ class CasePlan:
     bundle: ReferenceBundle | None = None
     within: float | None = None
     coarser: int = 1
+    imported: list[Path] = field(default_factory=list)
 
     @property
     def count(self) -> int:
@@ -131,9 +134,12 @@ def solvers_of(scene: Scene, options: Options) -> list[str]:
 
 def _named(scene: Scene, options: Options) -> list[str]:
     """Names of the solvers that the command line or else the checks ask for."""
+    compared = [check.compared for check in scene.acceptance if check.compared]
+    if options.imported:
+        beside = dict.fromkeys([*options.solvers, *compared])
+        return [name for name in beside if name not in options.imported]
     checks = [check.solver for check in scene.acceptance if check.solver is not None]
-    checks += [check.compared for check in scene.acceptance if check.compared]
-    return list(dict.fromkeys(options.solvers or ("xfem", "conforming", *checks)))
+    return list(dict.fromkeys(options.solvers or ("xfem", "conforming", *checks, *compared)))
 
 
 def check_judged(scenes: Sequence[Scene], options: Options) -> None:
@@ -181,6 +187,9 @@ def plan_case(
 
     within = None if kept else options.within
     plan = CasePlan(scene, solvers, job_of, bundle=kept, within=within, coarser=coarser)
+    plan.imported = [
+        folder for name in options.imported for folder in directory.solves(scene.name, name)
+    ]
     for name in plan.solvers:
         job = job_of(name, 0)
         if (error := found[name].error) and not (kept and name == REFERENCE):
@@ -195,7 +204,8 @@ def plan_case(
         folder = directory.case_folder(scene.name)
         plan.models, plan.other_scenes = model_jobs(scene, folder)
     others = [job for job in plan.jobs if job.solver != REFERENCE]
-    if others and not plan.refused and REFERENCE not in _named(scene, options):
+    needed = plan.refused or plan.imported or REFERENCE in _named(scene, options)
+    if others and not needed:
         plan.held = [*(job for job in plan.jobs if job.solver == REFERENCE), *plan.models]
     return plan
 

@@ -25,9 +25,9 @@ def select_cases(
     Parameters
     ----------
     names : sequence of str
-        Names of cases, patterns (``statics/*``) or paths of case files; none: all cases. A row of
-        a case with a parameter is ``slivers/plane[epsilon=0.01]``; with it comes the row that it
-        is compared with.
+        Names of cases, of their folders (``statics``), patterns (``statics/f*``) or paths of case
+        files; none: all cases. A row of a case with a parameter is
+        ``slivers/plane[epsilon=0.01]``; with it comes the row that it is compared with.
     expression : str, optional
         Words with and, or, not and parentheses; a word is looked for in name, title and tags.
     weight : {"quick", "normal", "heavy"}
@@ -132,8 +132,9 @@ def _sources(names: Sequence[str]) -> dict[str, bool]:
     sources: dict[str, bool] = {}
     for name in names:
         pattern = any(mark in name for mark in "*?[") and not name.endswith(".toml")
-        if pattern and row_asked(name) is None:
-            found = [case for case in known if fnmatchcase(case, name)]
+        folder = [case for case in known if case.startswith(f"{name.rstrip('/')}/")]
+        if folder or (pattern and row_asked(name) is None):
+            found = folder or [case for case in known if fnmatchcase(case, name)]
             if not found:
                 raise InputError(f"no case matches '{name}'; `verify list` shows them all")
             for case in found:
@@ -185,6 +186,9 @@ class Options:
         from the case alone, and without its finest levels, by one from those that are solved.
     judged : bool
         Whether the references that judge are solved with the rest; without them only `solvers` run.
+    imported : tuple of str
+        Programs whose answers lie in the run directory: they are compared with the solves. Then
+        only `solvers` run, those that checks compare with, and the reference.
     """
 
     solvers: tuple[str, ...] = ()
@@ -200,6 +204,7 @@ class Options:
     judge_only: tuple[str, ...] = ()
     within: float | None = None
     judged: bool = True
+    imported: tuple[str, ...] = ()
 
     def of_result(self) -> dict[str, Any]:
         """Return those that change what is computed; a resumed run must have the same."""
@@ -213,5 +218,5 @@ class Options:
     def record(self) -> dict[str, Any]:
         """Return all of them as plain values."""
         paths = {name: str(v) if (v := getattr(self, name)) else None for name in _PATHS}
-        names = {"solvers": list(self.solvers), "judge_only": list(self.judge_only)}
+        names = {name: list(getattr(self, name)) for name in ("solvers", "judge_only", "imported")}
         return {**asdict(self), **paths, **names}

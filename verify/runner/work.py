@@ -370,7 +370,9 @@ class Work:
         if lost := self._lost(jobs):
             self._wait(lost)
             return
-        records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
+        folders = [*(job.folder for job in own), *plan.imported]
+        compared = [*folders, *(job.folder for job in plan.models)]
+        records = [digest_of(read_json(one / "record.json")) for one in compared]
         judge_only = self.options.judge_only
         key = digest_of([records, scene_content(plan.scene), judge_only, code_of_comparison()])
         if (result := stored_result(folder, key)) is not None:
@@ -381,7 +383,7 @@ class Work:
             plan.scene,
             key,
             judge_only,
-            [job.folder for job in own],
+            folders,
             {
                 model: [j.folder for j in plan.models if j.model == model]
                 for model in plan.other_scenes
