@@ -155,3 +155,33 @@ def test_energy_and_momenta_of_a_body_that_flies_and_turns_are_those_of_a_rigid_
     assert found.linear[0] == pytest.approx(2.0 * flight)
     assert found.spin[0] == pytest.approx(own)
     assert found.angular[0] == pytest.approx(own + about[-len(own) :])
+
+
+@pytest.mark.parametrize("sided", [False, True], ids=["nearest", "on a side"])
+def test_the_nearest_triangle_is_the_one_that_points_sampled_on_all_triangles_say(sided):
+    corners = RNG.random((40, 1, 3)) + 0.2 * RNG.standard_normal((40, 3, 3))
+    sides = RNG.integers(-1, 2, (40, 1)).astype(np.int8) if sided else cell_tree.no_sides(corners)
+    x = 3 * RNG.random((200, 3)) - 1
+    wanted = RNG.integers(-1, 2, (200, 1)).astype(np.int8) if sided else cell_tree.no_sides(x)
+    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    across = np.cross(edges[:, 0], edges[:, 1])
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    normals = np.cross(across[:, None], edges)
+    normals /= np.linalg.norm(normals, axis=2)[..., None]
+    # `normals[k]` is that of the edge opposite to the corner k, inwards
+    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
+    found, distance = cell_tree.nearest_triangles(
+        x, np.zeros((0, 3)), wanted, tree.over(corners, normals), across, sides, 1e-12
+    )
+    n = 60
+    i, j = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    shares = np.column_stack([i, j, n - i - j])[i + j <= n] / n
+    sampled = np.einsum("sk,mka->msa", shares, corners)
+    away = np.linalg.norm(x[:, None, None] - sampled[None], axis=3).min(axis=2)
+    away[(wanted[:, None] * sides[None] < 0).any(axis=2)] = np.inf
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    assert np.all(distance <= away.min(axis=1) + 1e-12)
+    # between samples on the triangle that is found the distance is up to their spacing less
+    own = away[np.arange(200), found]
+    assert np.all(own - distance <= longest[found] / n)
+    assert np.all(own - distance >= -1e-12)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from verify.compiled import COMPILED, njit
 
@@ -392,17 +393,17 @@ def _holding_in_numpy(
 
 
 def _boxes_around(
-    points: Floats, row: Ints, searched: SearchedCells, tolerance: float
+    points: Floats, row: Ints, searched: SearchedCells, tolerance: float | Floats
 ) -> tuple[Ints, Ints]:
-    """Give all pairs (n,) of a point of `row` and a cell whose bounding box it lies in."""
+    """Give all pairs (n,) of a point of `row` and a cell whose box is as near, by axis."""
     lower, upper, cells, corners, _, _ = searched
-    leaves = len(lower) // 2
+    leaves, within_reach = len(lower) // 2, np.broadcast_to(tolerance, len(points))
 
     def within(low: Floats, high: Floats, box: Ints) -> NDArray[np.bool_]:
-        near = np.ones(len(row), dtype=bool)
+        near, reach = np.ones(len(row), dtype=bool), within_reach[row]
         for a in range(points.shape[1]):  # column by column: five times as fast
             x = points[row, a]
-            near &= (x >= low[box, a] - tolerance) & (x <= high[box, a] + tolerance)
+            near &= (x >= low[box, a] - reach) & (x <= high[box, a] + reach)
         return near
 
     node = np.ones(len(row), dtype=np.int64)
@@ -445,8 +446,10 @@ def _find_cells(
         found[i] = cell
 
 
-@njit(cache=True)
-def nearest_triangles(points, directions, wanted, searched, across, sides, tolerance):
+def nearest_triangles(
+    points: Floats, directions: Floats, wanted: NDArray[np.int8], searched: SearchedCells,
+    across: Floats, sides: NDArray[np.int8], tolerance: float,
+) -> tuple[Ints, Floats]:  # fmt: skip
     """Triangle (n,) nearest to each of `points` (n, 3), and its distance (n,).
 
     Of those that are equally near within `tolerance` it is the one whose centre lies in the
@@ -458,6 +461,60 @@ def nearest_triangles(points, directions, wanted, searched, across, sides, toler
     the edges, `across` (m, 3) are those of the triangles. `directions` has no rows if none is
     wanted.
     """
+    given = points, directions, wanted, searched, across, sides, tolerance
+    found: tuple[Ints, Floats] = (_nearest_triangles if COMPILED else _triangles_in_numpy)(*given)
+    return found
+
+
+def _triangles_in_numpy(
+    points: Floats, directions: Floats, wanted: NDArray[np.int8], searched: SearchedCells,
+    across: Floats, sides: NDArray[np.int8], tolerance: float,
+) -> tuple[Ints, Floats]:  # fmt: skip
+    """Do as `_nearest_triangles`, for all points with the same wish at once."""
+    found, distance = np.full(len(points), -1), np.full(len(points), np.inf)
+    kept = searched.cells[searched.cells >= 0]
+    wishes = sorted(set(map(tuple, wanted.tolist()))) if len(kept) else []
+    for wish in wishes:
+        rows = np.flatnonzero((wanted == wish).all(axis=1))
+        agreed = kept[(np.array(wish) * sides[kept] >= 0).all(axis=1)]
+        fit = np.isin(np.arange(len(sides)), agreed if len(agreed) else kept)
+        # the nearest corner bounds the distance
+        reach = np.full(len(points), tolerance)
+        reach[rows] += cKDTree(searched.corners[fit].reshape(-1, 3)).query(points[rows])[0]
+        for begin in range(0, len(rows), _AT_ONCE):
+            row, cell = _boxes_around(points, rows[begin : begin + _AT_ONCE], searched, reach)
+            row, cell = row[fit[cell]], cell[fit[cell]]
+            away, depth = _triangle_distances(points[row], searched, across, cell)
+            np.minimum.at(distance, row, away)
+            near = away <= distance[row] + tolerance
+            row, cell, away, depth = row[near], cell[near], away[near], depth[near]
+            inside, on_side = (away <= tolerance) & (depth > tolerance), np.ones(len(row), bool)
+            if len(directions) == len(points):
+                towards = searched.centres[cell] - points[row]
+                on_side = (directions[row] * towards).sum(axis=1) > 0.0
+            order = np.lexsort((depth, on_side, inside))
+            found[row[order]] = cell[order]  # the last of each point stays
+    return found, distance
+
+
+def _triangle_distances(
+    x: Floats, searched: SearchedCells, across: Floats, cell: Ints
+) -> tuple[Floats, Floats]:
+    """Do as `_distance_and_depth` for each of `x` (n, 3) and `cell` (n,)."""
+    corners, ends = searched.corners[cell], np.roll(searched.corners, -1, axis=1)[cell]
+    depth = np.einsum("nka,nka->nk", searched.normals[cell], x[:, None] - ends).min(axis=1)
+    away = np.abs(np.einsum("na,na->n", across[cell], x - corners[:, 0]))
+    out = np.flatnonzero(depth < 0.0)
+    start, edge = corners[out], ends[out] - corners[out]
+    length2 = np.einsum("nka,nka->nk", edge, edge)
+    along = np.einsum("nka,nka->nk", x[out, None] - start, edge)
+    t = (along / np.where(length2 > 0.0, length2, 1.0)).clip(0.0, 1.0)
+    away[out] = np.linalg.norm(x[out, None] - start - t[..., None] * edge, axis=2).min(axis=1)
+    return away, depth
+
+
+@njit(cache=True)
+def _nearest_triangles(points, directions, wanted, searched, across, sides, tolerance):
     n = points.shape[0]
     found = np.empty(n, dtype=np.int64)
     distance = np.empty(n)
