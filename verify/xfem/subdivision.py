@@ -99,7 +99,7 @@ def subdivide(phantom: PhantomMesh) -> Subdivision:
         cell_piece=piece,
         cell_parent=phantom.parent[piece],
         interpolation=interpolation,
-        cut_facets=_cut_facets(points, cells, ids),
+        cut_facets=points[torn_facets(cells, ids)[0][:, 1]],
     )
 
 
@@ -163,18 +163,33 @@ def _oriented(points: Floats, cells: Ints) -> Ints:
     return turned
 
 
-def _cut_facets(points: Floats, cells: Ints, ids: Ints) -> Floats:
-    """Facets where two cells meet in space but do not share their nodes."""
+def torn_facets(cells: Ints, places: Ints) -> tuple[Ints, Ints]:
+    """Facets where two simplices meet in space but do not share their nodes.
+
+    Parameters
+    ----------
+    cells : (c, d + 1) int array
+        Nodes of the simplices.
+    places : (c, d + 1) int array
+        Equal numbers for nodes at the same place.
+
+    Returns
+    -------
+    nodes : (f, 2, d) int array
+        Of each facet as its two simplices have them, those at the same place in the same column.
+    beside : (f, 2) int array
+        The two simplices.
+    """
     # a point is doubled when it has several nodes: its first one is not the only one
-    some = np.zeros(ids.max() + 1, dtype=np.int64)
-    some[ids] = cells
+    some = np.zeros(places.max() + 1, dtype=np.int64)
+    some[places] = cells
     doubled = np.zeros(len(some), dtype=bool)
-    doubled[ids[some[ids] != cells]] = True
-    rows = np.flatnonzero(doubled[ids].any(axis=1))
-    facets, nodes = facets_of(ids[rows]), facets_of(cells[rows])
+    doubled[places[some[places] != cells]] = True
+    rows = np.flatnonzero(doubled[places].any(axis=1))
+    facets, nodes = facets_of(places[rows]), facets_of(cells[rows])
     order = np.argsort(facets, axis=1)
     facets = np.take_along_axis(facets, order, axis=1)
     nodes = np.take_along_axis(nodes, order, axis=1)
-    first, second = equal_rows(facets)
-    torn = (nodes[first] != nodes[second]).any(axis=1)
-    return points[nodes[second][torn]]
+    pairs = np.stack(equal_rows(facets), axis=1)
+    pairs = pairs[(nodes[pairs[:, 0]] != nodes[pairs[:, 1]]).any(axis=1)]
+    return nodes[pairs], rows[pairs // cells.shape[1]]

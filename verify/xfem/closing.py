@@ -1,0 +1,398 @@
+"""Unilateral contact, without friction, of the faces of cuts: Nitsche's method.
+
+With g the normal jump of the displacement over a face (positive: open), σ a mean of the normal
+stresses on both sides and γ > 0, the conditions g ≥ 0, σ ≤ 0, σ g = 0 are σ = [σ + γ g]₋, [x]₋ the
+smaller of x and 0. They are those of the least of the energy
+
+    J(u) = ½ a(u, u) − f·u + ∫ ([σ + γ g]₋² − σ²) / 2γ dS
+
+over the faces (symmetric Nitsche: Chouly & Hild, SIAM J. Numer. Anal. 51, 2013), whose slope is
+consistent: the pressure is p = −[σ + γ g]₋, on both faces alike, and a field that is in the space
+and fulfils the conditions is found to round-off. There are no multipliers, so that there is no
+inf-sup condition to hold; what is to hold is a bound of the stress on a face,
+
+    ∫ σ²/γ dS ≤ a(u, u) / c,  c > 1,  hence  J″ ≥ (1 − 1/c) a  whichever faces touch.
+
+For linear simplices it holds with a known constant. In a piece of volume V and with the modulus of a
+wave M = λ + 2μ, the square of the normal stress is at most M times twice the density of the energy. The
+mean that has the smallest bound weighs stresses by V/M (Annavarapu, Hautefeuille & Dolbow, Comput.
+Methods Appl. Mech. Engrg. 225, 2012, for tied interfaces), so that the larger piece decides and a
+sliver does not. Then
+
+    γ = c n A / (V₁/M₁ + V₂/M₂),
+
+A the largest facet of the cells (no plane section of a simplex is larger) and n the largest number
+of faces that one of the two pieces has. In a cut cell V₁ + V₂ is that of the cell: γ ~ M/h,
+wherever the cut goes.
+
+J is convex and quadratic in parts. Its second derivative is never more than that with all faces
+tied, A. A correction by A lowers J without a search, so that Newton's method, which takes it where
+its own does not lead down, cannot cycle.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from verify.xfem.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    NotConvergedError,
+    SingularStiffnessError,
+    XfemError,
+    finite_array,
+)
+from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, pattern_places
+from verify.xfem.element import Material
+from verify.xfem.internal_force import InternalForce
+from verify.xfem.loads_and_supports import Supports, simplex_rule
+from verify.xfem.phantom import PhantomMesh
+from verify.xfem.statics import StaticSolver
+from verify.xfem.subdivision import subdivide, torn_facets
+
+STABILITY = 2.0  # c: a(u, u) keeps half of itself at least
+
+
+class ClosingFaces:
+    """Faces of the cuts of a body, which cannot overlap; linear kinematics.
+
+    Parameters
+    ----------
+    phantom : PhantomMesh
+    material : Material
+
+    Attributes
+    ----------
+    nodes : (f, 2 (d + 1)) int array
+        Dof nodes of both pieces at each facet of the cut.
+    gap : (f, q, 2 (d + 1), d) float array
+        Normal jump at the quadrature points of each facet, by the displacement of these nodes.
+    stress : (f, 2 (d + 1), d) float array
+        Mean normal stress there, in Pa/m.
+    stiffness : (f,) float array
+        γ, in Pa/m.
+    points : (f, q, d) float array
+        Quadrature points, in metres.
+    weights : (f, q) float array
+        In m^(d − 1).
+
+    Raises
+    ------
+    XfemError
+        If cells are aggregated, the body is a membrane, or its law not Hooke's.
+    """
+
+    def __init__(self, phantom: PhantomMesh, material: Material) -> None:
+        if phantom.aggregation is not None or phantom.mesh.is_membrane or material.law != "hooke":
+            raise XfemError(
+                "contact of a body with aggregated cells, of a membrane or of another law than "
+                "Hooke's; expected a solid or plane body of its own unknowns"
+            )
+        mesh = phantom.mesh
+        self.phantom = phantom
+        body = subdivide(phantom)
+        _, place = np.unique(body.points, axis=0, return_inverse=True)
+        facets, beside = torn_facets(body.cells, place.ravel()[body.cells])
+        pieces = body.cell_piece[beside]
+        corners = body.points[facets[:, 0]]
+        rule, share = simplex_rule(mesh.dim - 1, 2)
+        self.points = np.einsum("qk,fkd->fqd", rule, corners)
+        normal, area = _normals(corners)
+        # out of the first simplex, into the second
+        inward = (body.points[body.cells[beside[:, 1]]].mean(axis=1) - corners[:, 0]) * normal
+        normal *= np.sign(inward.sum(axis=1))[:, None]
+        self.weights = share * area[:, None]
+        lam, mu = (x[phantom.parent[pieces]] for x in material.of_cells(len(mesh.cells)))
+        gradients = mesh.gradients[phantom.parent[pieces]]  # (f, 2, c, d)
+        along = np.einsum("fsid,fd->fsi", gradients, normal)
+        flexible = phantom.part_fraction[pieces] * mesh.measures[phantom.parent[pieces]]
+        flexible /= lam + 2.0 * mu
+        share = flexible / flexible.sum(axis=1, keepdims=True)
+        normal = normal[:, None, None]
+        stress = lam[..., None, None] * gradients + 2.0 * mu[..., None, None] * (
+            along[..., None] * normal
+        )
+        self.stress = _flat(share[..., None, None] * stress, 1)
+        first = mesh.points[mesh.cells[phantom.parent[pieces], 0]]
+        shapes = np.einsum("fsid,fqsd->fqsi", gradients, self.points[:, :, None] - first[:, None])
+        shapes[..., 0] += 1.0
+        shapes[:, :, 0] *= -1.0
+        self.gap = _flat(shapes[..., None] * normal[:, None], 2)
+        self.nodes: Ints = phantom.cells[pieces].reshape(len(pieces), -1)
+        largest = (mesh.measures * np.linalg.norm(mesh.gradients, axis=2).max(axis=1)) * mesh.dim
+        largest = largest[phantom.parent[pieces]].max(axis=1)
+        self.stiffness = (
+            STABILITY * _faces_of_pieces(phantom.part[pieces]) * largest / flexible.sum(axis=1)
+        )
+        self._rows = self.stress[:, None] + self.stiffness[:, None, None, None] * self.gap
+        self._places: tuple[BlockPattern, Ints] | None = None
+
+    @property
+    def couplings(self) -> Ints:
+        """(k, 2) pairs of dof nodes on both sides of each facet."""
+        half = self.nodes.shape[1] // 2
+        one, other = self.nodes[:, :half], self.nodes[:, half:]
+        pairs = np.stack(np.broadcast_arrays(one[:, :, None], other[:, None]), axis=-1)
+        return np.unique(np.sort(pairs.reshape(-1, 2), axis=1), axis=0)
+
+    def trial_stress(self, displacement: Floats) -> Floats:
+        """σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
+        return np.einsum("fqid,fid->fq", self._rows, displacement[self.nodes])
+
+    def pressure(self, displacement: Floats) -> Floats:
+        """Pressure (f, q) between the faces in pascal; zero where they are apart."""
+        return np.maximum(0.0, -self.trial_stress(displacement))
+
+    def energy(self, displacement: Floats) -> float:
+        """Energy in joules beside the elastic one, negative where faces that are apart bear σ."""
+        own = np.einsum("fid,fid->f", self.stress, displacement[self.nodes])
+        squares = self.pressure(displacement) ** 2 - own[:, None] ** 2
+        return float(np.sum(self._per_stiffness * squares)) / 2.0
+
+    def force(self, displacement: Floats) -> Floats:
+        """Slope (N, d) of the energy, in newtons."""
+        return self._force(displacement, -self.pressure(displacement))
+
+    def force_over(self, start: Floats, end: Floats) -> Floats:
+        """Force (N, d) over a step whose work is the change of the energy, exactly.
+
+        The discrete gradient of [s]₋²/2 in s = σ + γ g, ([s₁]₋² − [s₀]₋²)/2(s₁ − s₀), and σ of the
+        middle.
+        """
+        s0, s1 = self.trial_stress(start), self.trial_stress(end)
+        m0, m1 = np.minimum(s0, 0.0), np.minimum(s1, 0.0)
+        mixed = (s0 < 0.0) != (s1 < 0.0)
+        change = np.where(mixed, s1 - s0, 1.0)
+        mean = 0.5 * (m0 + m1) * np.where(mixed, (m1 - m0) / change, 1.0)
+        return self._force(0.5 * (start + end), mean)
+
+    def slope_over(self, start: Floats, end: Floats) -> Floats:
+        """Share (f, q) of the stiffness of closed faces in the derivative of `force_over`."""
+        s0, s1 = self.trial_stress(start), self.trial_stress(end)
+        mixed = (s0 < 0.0) != (s1 < 0.0)
+        change = np.where(mixed, s1 - s0, 1.0)
+        a, b = np.minimum(s1, 0.0) / change, np.minimum(s0, 0.0) / change
+        return np.where(mixed, a - 0.5 * (a**2 - b**2), 0.5 * (s1 < 0.0))
+
+    def _force(self, displacement: Floats, traction: Floats) -> Floats:
+        """Sum of [t (σ + γ g) − σ σ]/γ by the displacements of the nodes, t (f, q) the traction."""
+        own = np.einsum("fid,fid->f", self.stress, displacement[self.nodes])
+        forces = np.einsum("fq,fqid->fid", self._per_stiffness * traction, self._rows)
+        forces -= (self._per_stiffness.sum(axis=1) * own)[:, None, None] * self.stress
+        total = np.zeros_like(displacement)
+        np.add.at(total, self.nodes, forces)
+        return total
+
+    @property
+    def _per_stiffness(self) -> Floats:
+        return self.weights / self.stiffness[:, None]
+
+    def add_stiffness(
+        self, pattern: BlockPattern, blocks: Floats, touching: Floats | Bools, scale: float = 1.0
+    ) -> None:
+        """Add the second derivative of the energy to the nodal blocks (B, d, d).
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Of the body, with the `couplings`.
+        blocks : (B, d, d) float array
+        touching : (f, q) array
+            Share of the stiffness of a closed face: 1 where faces touch, 0 where they are apart.
+        scale : float
+            Of what is there however the faces are.
+        """
+        if self._places is None or self._places[0] is not pattern:
+            rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
+            self._places = pattern, pattern_places(pattern, rows.ravel(), columns.ravel())
+        weights = self._per_stiffness
+        added = np.einsum(
+            "fq,fqia,fqjb->fijab", weights * touching, self._rows, self._rows, optimize=True
+        )
+        own = scale * weights.sum(axis=1)
+        added -= np.einsum("f,fia,fjb->fijab", own, self.stress, self.stress)
+        np.add.at(blocks, self._places[1], added.reshape(-1, *blocks.shape[1:]))
+
+
+def _flat(values: Floats, axis: int) -> Floats:
+    """Join the axes of the two sides and of the corners of each."""
+    shape = values.shape
+    return values.reshape(*shape[:axis], shape[axis] * shape[axis + 1], *shape[axis + 2 :])
+
+
+def _normals(corners: Floats) -> tuple[Floats, Floats]:
+    """Unit normals (f, d) and areas (f,) of facets by their corners (f, d, d)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    if corners.shape[2] == 2:
+        normal, share = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1), 1.0
+    else:
+        normal, share = np.cross(edges[:, 0], edges[:, 1]), 0.5
+    size = np.linalg.norm(normal, axis=1)
+    return normal / size[:, None], share * size
+
+
+def _faces_of_pieces(parts: Ints) -> Ints:
+    """Most of the faces that one of the two pieces (f, 2) of each facet has; a face is a pair."""
+    pairs, which = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
+    count = np.bincount(pairs.ravel(), minlength=parts.max(initial=0) + 1)
+    return count[pairs].max(axis=1)[which.ravel()]
+
+
+class ClosedSolution(NamedTuple):
+    """Equilibrium of a body whose faces may touch.
+
+    Attributes
+    ----------
+    displacement : (N, d) float array
+        At the dof nodes, in metres.
+    strain_energy : float
+        In joules (per metre of thickness in the plane).
+    pressure : (f, q) float array
+        At the quadrature points of the faces, in pascal.
+    residual : float
+        Largest unbalanced force over the largest force in the body.
+    iterations : int
+        Linear solves.
+    solver : {"direct", "iterative"}
+    """
+
+    displacement: Floats
+    strain_energy: float
+    pressure: Floats
+    residual: float
+    iterations: int
+    solver: str
+
+
+_ITERATIONS = 100
+_TOLERANCE = 1e-12  # of the residual, over the largest force
+_ENOUGH = 1e-4  # of the fall of the energy that its slope promises (Armijo)
+_UNSEEN = 1e-13  # of the energy: a fall that round-off hides
+_HALVINGS = 6
+
+
+class _Closing:
+    """Newton's method on J; see the docstring of the module."""
+
+    def __init__(
+        self, force: InternalForce, faces: ClosingFaces, supports: Supports, load: Floats
+    ) -> None:
+        self.force, self.faces, self.load, self.fixed = force, faces, load, supports.fixed
+        self.pattern = body_pattern(force.phantom, faces.couplings)
+        self.elastic = force.stiffness(self.pattern)
+        self.solver = StaticSolver(force, self.pattern, supports.fixed, 1e-13)
+        self.solves = 0
+
+    def energy(self, u: Floats) -> float:
+        elastic = self.force.evaluate(u)[1]
+        return elastic + self.faces.energy(u) - float(np.vdot(self.load, u))
+
+    def residual(self, u: Floats) -> tuple[Floats, float]:
+        """Residual (N, d) and the largest of the forces that it is the sum of."""
+        internal, contact = self.force.evaluate(u)[0], self.faces.force(u)
+        scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
+        return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
+
+    def correction(self, residual: Floats, touching: Bools) -> Floats:
+        blocks = self.elastic.copy()
+        self.faces.add_stiffness(self.pattern, blocks, touching)
+        constrain(self.pattern, self.fixed, blocks)
+        self.solves += 1
+        self.solver.factorize(blocks)
+        return self.solver.solve(residual)
+
+    def tied(self, values: Floats) -> Floats:
+        """Displacement (N, d) with all faces tied, from that of the supports."""
+        force = self.force.evaluate(values)[0]
+        force += self.faces._force(values, self.faces.trial_stress(values))
+        residual = np.where(self.fixed, 0.0, self.load - force)
+        return values + self.correction(residual, np.ones(self.faces.weights.shape, dtype=bool))
+
+    def next(self, u: Floats, residual: Floats, touching: Bools) -> tuple[Floats, bool]:
+        """Lower the energy; and whether by the whole of Newton's correction."""
+        energy, size = self.energy(u), float(np.abs(residual).max())
+        try:
+            step = self.correction(residual, touching)
+            fall = float(np.vdot(residual, step))
+            for halving in range(_HALVINGS):
+                share = 0.5**halving
+                trial = u + share * step
+                seen = share * fall > _UNSEEN * abs(energy)
+                if seen and self.energy(trial) <= energy - _ENOUGH * share * fall:
+                    return trial, halving == 0
+                if not seen and np.abs(self.residual(trial)[0]).max() < size:
+                    return trial, halving == 0
+        except SingularStiffnessError:
+            pass  # what only the contact holds is apart
+        return u + self.correction(residual, np.ones_like(touching)), False
+
+
+def solve_closed(
+    force: InternalForce, faces: ClosingFaces, supports: Supports, load: Floats | None = None
+) -> ClosedSolution:
+    """Equilibrium with linear kinematics of a body whose faces may touch and not overlap.
+
+    It begins with all faces tied in the normal direction.
+
+    Parameters
+    ----------
+    force : InternalForce
+        Of linear kinematics, without a penalty.
+    faces : ClosingFaces
+        Of the same body.
+    supports : Supports
+    load : (N, d) float array, optional
+        Nodal forces in newtons.
+
+    Raises
+    ------
+    SingularStiffnessError
+        If a part is held neither by supports nor by faces that touch.
+    NotConvergedError
+        If the iterations do not suffice: nothing holds a part that the load draws away.
+    XfemError
+        If the force is of another body, of finite rotation or with a penalty, or a load of another
+        shape.
+
+    Examples
+    --------
+    Two halves pressed together by a thousandth are one body again:
+
+    >>> import numpy as np
+    >>> import verify.xfem as xfem
+    >>> from verify.xfem.closing import ClosingFaces, solve_closed
+    >>> mesh = xfem.rectangle_mesh((4, 4))
+    >>> phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+    >>> x, material = mesh.points[:, 0], xfem.isotropic(1e4, 0.0, "plane strain")
+    >>> held = xfem.Supports.none(phantom).prescribe(phantom, x == 0.0)
+    >>> held = held.prescribe(phantom, x == 1.0, [-1e-3, 0.0])
+    >>> faces = ClosingFaces(phantom, material)
+    >>> found = solve_closed(xfem.InternalForce(phantom, material, "linear"), faces, held)
+    >>> float(found.pressure.min().round(9)), float(found.pressure.max().round(9))
+    (10.0, 10.0)
+    """
+    if force.phantom is not faces.phantom or force.is_corotational or force.ghost is not None:
+        raise XfemError("contact is solved in linear kinematics, on one body, without a penalty")
+    shape = force.phantom.node_points.shape
+    given = finite_array(np.zeros(shape) if load is None else load, "load", shape)
+    newton = _Closing(force, faces, supports, given)
+    u = newton.tied(supports.values)
+    for _ in range(_ITERATIONS):
+        residual, scale = newton.residual(u)
+        now = faces.trial_stress(u) < 0.0
+        if np.abs(residual).max() <= _TOLERANCE * scale:
+            break
+        u, whole = newton.next(u, residual, now)
+        if whole and np.array_equal(now, faces.trial_stress(u) < 0.0):
+            break
+    else:
+        raise NotConvergedError(
+            f"contact not found in {_ITERATIONS} iterations: unbalanced force {np.abs(residual).max():.3g} N "
+            f"against forces of {scale:.3g} N. Expected faces or supports that hold every part"
+        )
+    residual, scale = newton.residual(u)
+    return ClosedSolution(
+        u, force.evaluate(u)[1], faces.pressure(u), float(np.abs(residual).max() / scale),
+        newton.solves, "direct" if "direct" in newton.solver.used else "iterative",
+    )  # fmt: skip
