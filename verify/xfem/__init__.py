@@ -123,6 +123,8 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.s
     the state of a body that is cut on the way, and forces that fade where it lets go
 `subdivision`
     the cut body as a conforming mesh
+`closing`
+    contact of the faces of cuts
 """
 
 from verify.xfem.arrays import XfemError

@@ -1,33 +1,32 @@
 """Unilateral contact, without friction, of the faces of cuts: Nitsche's method.
 
-With g the normal jump of the displacement over a face (positive: open), σ a mean of the normal
-stresses on both sides and γ > 0, the conditions g ≥ 0, σ ≤ 0, σ g = 0 are σ = [σ + γ g]₋, [x]₋ the
-smaller of x and 0. They are those of the least of the energy
+Let g be the normal jump of the displacement over a face, positive where it is open. Let σ be a mean
+of the normal stresses on both sides. The conditions g ≥ 0, σ ≤ 0, σ g = 0 are σ = [σ + γ g]₋ with
+any γ > 0. Here [x]₋ is the smaller of x and 0. They hold at the minimum of the energy
 
     J(u) = ½ a(u, u) − f·u + ∫ ([σ + γ g]₋² − σ²) / 2γ dS
 
-over the faces (symmetric Nitsche: Chouly & Hild, SIAM J. Numer. Anal. 51, 2013), whose slope is
-consistent: the pressure is p = −[σ + γ g]₋, on both faces alike, and a field that is in the space
-and fulfils the conditions is found to round-off. There are no multipliers, so that there is no
-inf-sup condition to hold; what is to hold is a bound of the stress on a face,
+over the faces (symmetric Nitsche: Chouly & Hild, SIAM J. Numer. Anal. 51, 2013). The pressure is
+p = −[σ + γ g]₋ on both faces alike. The slope is consistent: a field of the space that fulfils the
+conditions is found to round-off. Without multipliers there is no inf-sup condition. Stability needs
+a bound of the stress on a face instead,
 
     ∫ σ²/γ dS ≤ a(u, u) / c,  c > 1,  hence  J″ ≥ (1 − 1/c) a  whichever faces touch.
 
-For linear simplices it holds with a known constant. In a piece of volume V and with the modulus of a
-wave M = λ + 2μ, the square of the normal stress is at most M times twice the density of the energy. The
-mean that has the smallest bound weighs stresses by V/M (Annavarapu, Hautefeuille & Dolbow, Comput.
-Methods Appl. Mech. Engrg. 225, 2012, for tied interfaces), so that the larger piece decides and a
-sliver does not. Then
+Linear simplices have it with a known constant. Take a piece of volume V and wave modulus
+M = λ + 2μ. There the square of the normal stress is at most 2M times the density of the energy. The
+mean with the least bound weighs stresses by V/M: the larger piece decides, and a sliver does not
+(Annavarapu, Hautefeuille & Dolbow, Comput. Methods Appl. Mech. Engrg. 225, 2012, of ties). Then
 
-    γ = c n A / (V₁/M₁ + V₂/M₂),
+    γ = c n A / (V₁/M₁ + V₂/M₂).
 
-A the largest facet of the cells (no plane section of a simplex is larger) and n the largest number
-of faces that one of the two pieces has. In a cut cell V₁ + V₂ is that of the cell: γ ~ M/h,
-wherever the cut goes.
+A is the largest facet of the cells, as no plane section of a simplex is larger. The piece with more
+faces has n of them. In a cut cell V₁ + V₂ is its volume, so γ is of the order of M/h wherever the
+cut goes.
 
-J is convex and quadratic in parts. Its second derivative is never more than that with all faces
-tied, A. A correction by A lowers J without a search, so that Newton's method, which takes it where
-its own does not lead down, cannot cycle.
+J is convex and quadratic in parts. Its second derivative is at most the one with all faces tied. A
+correction by the latter lowers J without a search. Newton's method takes it where its own does not
+lead down: J always falls, and no set of touching faces comes twice in a circle.
 """
 
 from typing import NamedTuple
@@ -46,12 +45,15 @@ from verify.xfem.arrays import (
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, pattern_places
 from verify.xfem.element import Material
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads_and_supports import Supports, simplex_rule
+from verify.xfem.loads_and_supports import Supports, check_bodies, simplex_rule
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import StaticSolver
 from verify.xfem.subdivision import subdivide, torn_facets
 
 STABILITY = 2.0  # c: a(u, u) keeps half of itself at least
+# share of the largest facet: smaller ones rim pieces of round-off size that the others have taken,
+# along faces of cells and not along the cut
+_RIM = 1e-7
 
 
 class ClosingFaces:
@@ -94,11 +96,15 @@ class ClosingFaces:
         body = subdivide(phantom)
         _, place = np.unique(body.points, axis=0, return_inverse=True)
         facets, beside = torn_facets(body.cells, place.ravel()[body.cells])
-        pieces = body.cell_piece[beside]
-        corners = body.points[facets[:, 0]]
+        largest = mesh.measures * mesh.dim * np.linalg.norm(mesh.gradients, axis=2).max(axis=1)
+        largest = largest[body.cell_parent[beside]].max(axis=1)
+        normal, area = _normals(body.points[facets[:, 0]])
+        some = area > _RIM * largest
+        facets, beside, largest = facets[some], beside[some], largest[some]
+        normal, area = normal[some], area[some]
+        pieces, corners = body.cell_piece[beside], body.points[facets[:, 0]]
         rule, share = simplex_rule(mesh.dim - 1, 2)
         self.points = np.einsum("qk,fkd->fqd", rule, corners)
-        normal, area = _normals(corners)
         # out of the first simplex, into the second
         inward = (body.points[body.cells[beside[:, 1]]].mean(axis=1) - corners[:, 0]) * normal
         normal *= np.sign(inward.sum(axis=1))[:, None]
@@ -120,8 +126,6 @@ class ClosingFaces:
         shapes[:, :, 0] *= -1.0
         self.gap = _flat(shapes[..., None] * normal[:, None], 2)
         self.nodes: Ints = phantom.cells[pieces].reshape(len(pieces), -1)
-        largest = (mesh.measures * np.linalg.norm(mesh.gradients, axis=2).max(axis=1)) * mesh.dim
-        largest = largest[phantom.parent[pieces]].max(axis=1)
         self.stiffness = (
             STABILITY * _faces_of_pieces(phantom.part[pieces]) * largest / flexible.sum(axis=1)
         )
@@ -201,7 +205,7 @@ class ClosingFaces:
         touching : (f, q) array
             Share of the stiffness of a closed face: 1 where faces touch, 0 where they are apart.
         scale : float
-            Of what is there however the faces are.
+            Share of −∫ σ²/γ, whether faces touch or not.
         """
         if self._places is None or self._places[0] is not pattern:
             rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
@@ -222,7 +226,7 @@ def _flat(values: Floats, axis: int) -> Floats:
 
 
 def _normals(corners: Floats) -> tuple[Floats, Floats]:
-    """Unit normals (f, d) and areas (f,) of facets by their corners (f, d, d)."""
+    """Find unit normals (f, d) and areas (f,) of facets by their corners (f, d, d)."""
     edges = corners[:, 1:] - corners[:, :1]
     if corners.shape[2] == 2:
         normal, share = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1), 1.0
@@ -289,7 +293,7 @@ class _Closing:
         return elastic + self.faces.energy(u) - float(np.vdot(self.load, u))
 
     def residual(self, u: Floats) -> tuple[Floats, float]:
-        """Residual (N, d) and the largest of the forces that it is the sum of."""
+        """Residual (N, d), and the largest of the forces in it."""
         internal, contact = self.force.evaluate(u)[0], self.faces.force(u)
         scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
         return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
@@ -303,7 +307,7 @@ class _Closing:
         return self.solver.solve(residual)
 
     def tied(self, values: Floats) -> Floats:
-        """Displacement (N, d) with all faces tied, from that of the supports."""
+        """Displacement (N, d) with all faces tied, from the prescribed one."""
         force = self.force.evaluate(values)[0]
         force += self.faces._force(values, self.faces.trial_stress(values))
         residual = np.where(self.fixed, 0.0, self.load - force)
@@ -347,8 +351,8 @@ def solve_closed(
 
     Raises
     ------
-    SingularStiffnessError
-        If a part is held neither by supports nor by faces that touch.
+    UnsupportedBodyError
+        If a part can move rigidly that supports and closed faces together do not hold.
     NotConvergedError
         If the iterations do not suffice: nothing holds a part that the load draws away.
     XfemError
@@ -357,18 +361,19 @@ def solve_closed(
 
     Examples
     --------
-    Two halves pressed together by a thousandth are one body again:
+    Two halves pressed together by a thousandth are one body again.
 
-    >>> import numpy as np
     >>> import verify.xfem as xfem
     >>> from verify.xfem.closing import ClosingFaces, solve_closed
     >>> mesh = xfem.rectangle_mesh((4, 4))
     >>> phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
+
     >>> x, material = mesh.points[:, 0], xfem.isotropic(1e4, 0.0, "plane strain")
     >>> held = xfem.Supports.none(phantom).prescribe(phantom, x == 0.0)
+
     >>> held = held.prescribe(phantom, x == 1.0, [-1e-3, 0.0])
-    >>> faces = ClosingFaces(phantom, material)
-    >>> found = solve_closed(xfem.InternalForce(phantom, material, "linear"), faces, held)
+    >>> force = xfem.InternalForce(phantom, material, "linear")
+    >>> found = solve_closed(force, ClosingFaces(phantom, material), held)
     >>> float(found.pressure.min().round(9)), float(found.pressure.max().round(9))
     (10.0, 10.0)
     """
@@ -376,6 +381,7 @@ def solve_closed(
         raise XfemError("contact is solved in linear kinematics, on one body, without a penalty")
     shape = force.phantom.node_points.shape
     given = finite_array(np.zeros(shape) if load is None else load, "load", shape)
+    check_bodies(force.phantom, supports, (faces.nodes, faces.gap))
     newton = _Closing(force, faces, supports, given)
     u = newton.tied(supports.values)
     for _ in range(_ITERATIONS):
@@ -387,9 +393,10 @@ def solve_closed(
         if whole and np.array_equal(now, faces.trial_stress(u) < 0.0):
             break
     else:
+        left = np.abs(residual).max()
         raise NotConvergedError(
-            f"contact not found in {_ITERATIONS} iterations: unbalanced force {np.abs(residual).max():.3g} N "
-            f"against forces of {scale:.3g} N. Expected faces or supports that hold every part"
+            f"contact not found in {_ITERATIONS} iterations: unbalanced force {left:.3g} N against "
+            f"forces of {scale:.3g} N. Expected faces or supports that hold every part"
         )
     residual, scale = newton.residual(u)
     return ClosedSolution(

@@ -340,8 +340,17 @@ def check_fixed(fixed: Bools, shape: tuple[int, int]) -> None:
         )
 
 
-def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
+def check_bodies(
+    phantom: PhantomMesh, supports: Supports, faces: tuple[Ints, Floats] | None = None
+) -> None:
     """Check that no free body can move rigidly.
+
+    Parameters
+    ----------
+    phantom : PhantomMesh
+    supports : Supports
+    faces : tuple of array, optional
+        Dof nodes (f, k) and normal jumps (f, q, k, d) of faces that hold each other.
 
     Raises
     ------
@@ -352,7 +361,10 @@ def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
     """
     check_fixed(supports.fixed, phantom.node_points.shape)
     finite_array(supports.values, "supports: values", phantom.node_points.shape)
-    for body in loose_bodies(phantom, supports, np.arange(phantom.bodies.max() + 1)):
+    loose = loose_bodies(phantom, supports, np.arange(phantom.bodies.max() + 1))
+    if len(loose) and faces is not None:
+        loose = _loose_together(phantom, supports, loose, *faces)
+    for body in loose:
         pieces = phantom.corners.bodies[phantom.cells[:, 0]] == body
         volume = phantom.volumes[pieces].sum()
         centre = phantom.volumes[pieces] @ phantom.piece_centroids[pieces] / volume
@@ -365,17 +377,41 @@ def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
 
 def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: Ints) -> Ints:
     """Those of the given free bodies, by number (k,), that can move rigidly."""
-    points, scale = phantom.node_points, phantom.mesh.extent
     found = []
     for body in bodies:
-        nodes = np.flatnonzero(phantom.bodies == body)
-        modes = _rigid_modes((points[nodes] - points[nodes].mean(axis=0)) / scale)
+        nodes, modes = _modes_of(phantom, body)
         held = modes[supports.fixed[nodes]]
-        size = np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)
-        gram = (held / size).T @ (held / size)
-        if len(held) == 0 or np.linalg.eigvalsh(gram)[0] < _LOOSE:
+        if len(held) == 0 or np.linalg.eigvalsh(held.T @ held)[0] < _LOOSE:
             found.append(body)
     return np.array(found, dtype=np.int64)
+
+
+def _loose_together(
+    phantom: PhantomMesh, supports: Supports, loose: Ints, nodes: Ints, gaps: Floats
+) -> Ints:
+    """Return the body (1,) that moves most where loose bodies can move together, or none (0,)."""
+    shape = (*supports.fixed.shape, len(loose), 3 if supports.fixed.shape[1] == 2 else 6)
+    modes = np.zeros(shape)
+    for place, body in enumerate(loose):
+        own, of_body = _modes_of(phantom, body)
+        modes[own, :, place] = of_body
+    held = np.concatenate(
+        [
+            modes[supports.fixed],
+            np.einsum("fqid,fidbm->fqbm", gaps, modes[nodes]).reshape(-1, *shape[2:]),
+        ]
+    ).reshape(-1, shape[2] * shape[3])
+    values, vectors = np.linalg.eigh(held.T @ held)
+    moves = np.abs(vectors[:, 0]).reshape(shape[2:]).max(axis=1)
+    return loose[[int(moves.argmax())]] if values[0] < _LOOSE else loose[:0]
+
+
+def _modes_of(phantom: PhantomMesh, body: int) -> tuple[Ints, Floats]:
+    """Dof nodes (k,) of a free body, and its rigid modes (k, d, modes), each of norm 1."""
+    nodes = np.flatnonzero(phantom.bodies == body)
+    points = phantom.node_points[nodes]
+    modes = _rigid_modes((points - points.mean(axis=0)) / phantom.mesh.extent)
+    return nodes, modes / np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)
 
 
 def _rigid_modes(points: Floats) -> Floats:

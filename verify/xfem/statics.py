@@ -157,7 +157,7 @@ def solve_static(
 
 
 class StaticSolver:
-    """What is quicker for a large body, a factorisation for a small one or where that fails.
+    """Iterations where they are quicker; a factorisation for a small body, or where they fail.
 
     Parameters
     ----------

@@ -1,0 +1,330 @@
+"""Faces of a cut that touch: exact fields, slivers, and the bound by which the method is stable."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from scipy.optimize import minimize
+
+import verify.xfem as xfem
+from tests.xfem.xfem_bodies import boundary_nodes, sparse_stiffness
+from verify.xfem.block_pattern import body_pattern
+from verify.xfem.closing import STABILITY, ClosingFaces, solve_closed
+from verify.xfem.loads_and_supports import UnsupportedBodyError
+
+NU, P = 0.3, 0.01
+SHEAR = 0.5 / (1.0 + NU)
+KOLOSOV = 3.0 - 4.0 * NU
+
+
+def moved(mesh, size=0.2, seed=1):
+    """A mesh whose inner nodes are moved at random, so that it has no lines."""
+    points, inner = mesh.points.copy(), np.ones(len(mesh.points), dtype=bool)
+    inner[boundary_nodes(mesh)] = False
+    h = mesh.measures.mean() ** (1 / mesh.dim)
+    random = np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
+    points[inner] += size * h * random[inner]
+    return xfem.SimplexMesh(points, mesh.cells)
+
+
+def grid(dim, n):
+    mesh = xfem.rectangle_mesh((n, n)) if dim == 2 else xfem.box_mesh((n, n, n))
+    return moved(mesh)
+
+
+def material(dim):
+    return xfem.isotropic(1.0, NU, "plane strain" if dim == 2 else "solid")
+
+
+def closed(mesh, cuts, field, tip="inside"):
+    """Equilibrium with a field (points, points inside the material) as boundary values."""
+    phantom = xfem.cut_mesh(mesh, cuts, tip)
+    exact = field(phantom.node_points, phantom.node_piece_points)
+    outer = np.zeros(len(mesh.points), dtype=bool)
+    outer[boundary_nodes(mesh)] = True
+    fixed = np.repeat(outer[phantom.node_parent, None], mesh.dim, axis=1)
+    faces = ClosingFaces(phantom, material(mesh.dim))
+    force = xfem.InternalForce(phantom, material(mesh.dim), "linear")
+    supports = xfem.Supports(fixed, np.where(fixed, exact, 0.0))
+    return phantom, faces, solve_closed(force, faces, supports), exact
+
+
+def misses(faces, pressure, exact):
+    """Error of the pressure in L2, and the largest, over the exact one."""
+    of = (faces.weights * exact**2).sum()
+    error = (faces.weights * (pressure - exact) ** 2).sum()
+    return np.sqrt(error / of), np.abs(pressure - exact).max() / exact.max()
+
+
+def overlap(faces, displacement):
+    return -np.einsum("fqid,fid->fq", faces.gap, displacement[faces.nodes]).min()
+
+
+BENT = xfem.Polyline([[-0.1, 0.2], [0.3, 0.3], [0.6, 0.55], [0.8, 1.1]])
+CUTS = {
+    "inclined": (2, [xfem.Plane([0.47, 0.47], [0.6, 0.8])]),
+    "bent": (2, [BENT]),
+    "crossing": (2, [xfem.Plane([0.47, 0.47], [0.6, 0.8]), BENT]),
+    "ends inside": (2, [xfem.Polyline([[0.21, 0.33], [0.77, 0.58]])]),
+    "along faces": (2, [xfem.Plane([0.5, 0.5], [0.0, 1.0])]),
+    "in space": (3, [xfem.Plane([0.47] * 3, [0.5, 0.6, 0.62])]),
+    "two in space": (
+        3,
+        [xfem.Plane([0.47] * 3, [0.5, 0.6, 0.62]), xfem.Plane([0.6] * 3, [1, -0.3, 0.2])],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_under_pressure_from_all_sides_a_cut_is_not_felt(name):
+    dim, cuts = CUTS[name]
+    mesh = xfem.rectangle_mesh((6, 6)) if name == "along faces" else grid(dim, 7 if dim == 2 else 4)
+    lame = NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    strain = -P / (dim * lame + 2.0 * SHEAR)
+    _, _faces, found, exact = closed(mesh, cuts, lambda x, _: strain * x)
+    assert np.abs(found.displacement - exact).max() < 1e-12 * np.abs(exact).max()
+    assert np.abs(found.pressure / P - 1.0).max() < 1e-10
+
+
+def bending(normal, origin):
+    """σ = −p (1 + b·t) n ⊗ n, t along the cut: its displacement, and its pressure on the cut."""
+    d = len(normal)
+    basis = np.linalg.qr(np.column_stack([normal, np.eye(d)[:, : d - 1]]))[0]
+    n, along = normal, basis[:, 1:]
+    b = np.array([0.7, -0.4][: d - 1])
+    # strains along the normal and along the cut, over the stress (E = 1)
+    across, beside = (1.0 - NU**2, -NU * (1.0 + NU)) if d == 2 else (1.0, -NU)
+
+    def field(x, _):
+        z, t = (x - origin) @ n, (x - origin) @ along
+        u = t + t * (t @ b)[:, None] - 0.5 * (t**2).sum(axis=1)[:, None] * b
+        u = beside * u - 0.5 * across * z[:, None] ** 2 * b
+        return -P * ((across * z * (1.0 + t @ b))[:, None] * n + u @ along.T)
+
+    return field, lambda x: P * (1.0 + ((x - origin) @ along) @ b)
+
+
+def by_sliver(dim, n, direction, share):
+    """Errors of displacement and pressure with a cut a share of h beside a node."""
+    mesh, direction = grid(dim, n), np.array(direction) / np.linalg.norm(direction)
+    node = mesh.points[((mesh.points - 0.5) ** 2).sum(axis=1).argmin()]
+    origin = node + share / n * direction
+    field, pressure = bending(direction, origin)
+    phantom, faces, found, exact = closed(mesh, [xfem.Plane(origin, direction)], field)
+    at, inside = phantom.node_points, phantom.node_piece_points
+    real = np.sign((at - origin) @ direction) == np.sign((inside - origin) @ direction)
+    error = np.linalg.norm((found.displacement - exact)[real]) / np.linalg.norm(exact[real])
+    return error, *misses(faces, found.pressure, pressure(faces.points))
+
+
+@pytest.mark.parametrize(
+    ("dim", "n", "direction"), [(2, 8, [0.3, 1.0]), (2, 8, [0.0, 1.0]), (3, 4, [0.2, 0.35, 1.0])]
+)
+def test_errors_of_displacement_and_pressure_do_not_grow_with_a_sliver(dim, n, direction):
+    # twice: the cut goes elsewhere through its cells, as on another mesh of the same size
+    usual = np.array(by_sliver(dim, n, direction, 0.5))
+    for share in (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
+        assert (np.array(by_sliver(dim, n, direction, share)) < 2.0 * usual).all(), share
+
+
+def test_pressure_converges_with_the_first_order_beside_a_sliver():
+    errors = np.array([by_sliver(2, n, [0.3, 1.0], 1e-9) for n in (8, 16, 32)])
+    rates = np.log2(errors[0] / errors[-1]) / 2.0
+    assert rates[0] > 1.8
+    assert (rates[1:] > 0.9).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_stress_on_faces_is_bounded_by_the_energy(seed):
+    # ∫ σ²/γ ≤ a(u, u)/c for every u, or a body whose faces are apart has no stable equilibrium
+    random, dim = np.random.default_rng(seed), 2 + seed % 2
+    mesh = grid(dim, 5 if dim == 2 else 2)
+    planes = [
+        xfem.Plane(mesh.points[k] + 10.0 ** -random.uniform(2, 12), random.normal(size=dim))
+        for k in random.integers(len(mesh.points), size=3)
+    ]
+    phantom = xfem.cut_mesh(mesh, planes)
+    faces = ClosingFaces(phantom, material(dim))
+    pattern = body_pattern(phantom, faces.couplings)
+    blocks = np.zeros((len(pattern.columns), dim, dim))
+    faces.add_stiffness(pattern, blocks, np.zeros(faces.weights.shape))
+    K, own = sparse_stiffness(phantom).toarray(), pattern.matrix(blocks).toarray()
+    scale = 1.0 / np.sqrt(np.diag(K))
+    K, own = (scale[:, None] * one * scale for one in (K, own))
+    largest = eigh(-own, K + 1e-10 * np.eye(len(K)), eigvals_only=True)[-1]
+    assert 0.02 < largest < 1.0 / STABILITY
+
+
+def turned(angle, origin, field):
+    """A field of the crack −1 < x < 1 on y = 0, turned and moved; and coordinates along it."""
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+    def moved_field(x, inside):
+        own, side = (x - origin) @ R, (inside - origin) @ R
+        y = own[:, 1]
+        own[:, 1] = np.where(y * side[:, 1] > 0.0, y, np.copysign(1e-14, side[:, 1]))
+        return field(own) @ R.T
+
+    return (
+        moved_field,
+        lambda x: (x - origin) @ R,
+        np.array([[-1.0, 0.0], [1.0, 0.0]]) @ R.T + origin,
+    )
+
+
+def partly_closed(x):
+    """Displacement of a crack that σ_yy → σ′x closes from −a to −a/3.
+
+    Z = σ′(ξ − c/2)√((ξ + c)/(ξ − c)), c = 2a/3, ξ = z − a/3.
+    """
+    Z, integral = westergaard(x)
+    y = x[:, 1]
+    u = 0.5 * (KOLOSOV - 1.0) * integral.real - y * Z.imag
+    v = 0.5 * (KOLOSOV + 1.0) * integral.imag - y * Z.real
+    return np.stack([u, v], axis=1) / (2.0 * SHEAR)
+
+
+def westergaard(x):
+    c, xi = 2.0 / 3.0, x[..., 0] - 1.0 / 3.0 + 1j * x[..., 1]
+    root = np.sqrt(xi - c) * np.sqrt(xi + c)
+    return P * (xi - 0.5 * c) * (xi + c) / root, 0.5 * P * (xi + c) * root
+
+
+def test_the_field_of_the_partly_closed_crack_is_in_equilibrium_and_closes():
+    step, x = 1e-4, np.array([[0.3, 0.4], [-0.7, -0.2], [1.4, 0.5]])
+    # σ = λ tr ε + 2με by differences; Navier's equation by differences of the displacement
+    shift = step * np.eye(2)
+
+    def second(i, j):
+        ends = [(a, b) for a in (-1, 1) for b in (-1, 1)]
+        sums = sum(a * b * partly_closed(x + a * shift[i] + b * shift[j]) for a, b in ends)
+        return sums / (4.0 * step**2)
+
+    lame = NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    xx, yy, xy = second(0, 0), second(1, 1), second(0, 1)
+    div = np.stack([xx[:, 0] + xy[:, 1], xy[:, 0] + yy[:, 1]], axis=1)
+    assert np.abs((lame + SHEAR) * div + SHEAR * (xx + yy)).max() < 1e-5 * P
+    line = np.linspace(-0.99, -0.34, 50)
+    above, below = (partly_closed(np.stack([line, s + 0 * line], axis=1)) for s in (1e-14, -1e-14))
+    assert np.abs((above - below)[:, 1]).max() < 1e-12
+    assert (westergaard(np.stack([line, 0 * line], axis=1))[0].real < 0.0).all()
+
+
+def partly(n):
+    field, local, ends = turned(0.4, 0.013, partly_closed)
+    mesh = moved(xfem.rectangle_mesh((n, n), (-2.0, -2.0), (2.0, 2.0)), 0.15)
+    _phantom, faces, found, exact = closed(mesh, [xfem.Polyline(ends)], field)
+    at = local(faces.points)
+    pressure = np.maximum(0.0, -westergaard(at * [1.0, 0.0])[0].real)
+    touching = at[..., 0][found.pressure > 1e-3 * found.pressure.max()]
+    error = np.linalg.norm(found.displacement - exact) / np.linalg.norm(exact)
+    wrong = misses(faces, found.pressure, pressure)[0]
+    depth = overlap(faces, found.displacement)
+    return 4.0 / n, touching.max() + 1.0 / 3.0, error, wrong, depth
+
+
+def test_a_partly_closed_crack_opens_where_it_shall():
+    h, end, error, pressure, depth = np.array([partly(n) for n in (20, 40, 80)]).T
+    assert (np.abs(end) < h).all()
+    assert (depth < 0.1 * P * h).all()
+    assert np.log2(depth[0] / depth[-1]) / 2.0 > 1.0
+    # as its un-enriched end allows: half an order of the stress, one of the displacement
+    assert np.log2(pressure[0] / pressure[-1]) / 2.0 > 0.5
+    assert pressure[-1] < 0.05
+    assert np.log2(error[0] / error[-1]) / 2.0 > 0.6
+
+
+def closed_shear(x):
+    """Uniform pressure across the crack, and mode II: faces slide and stay together."""
+    y, z = x[:, 1], x[:, 0] + 1j * x[:, 1]
+    root = np.sqrt(z - 1.0) * np.sqrt(z + 1.0)
+    Z = 0.6 * P * z / root
+    u = 0.5 * (KOLOSOV + 1.0) * 0.6 * P * root.imag + y * Z.real
+    v = -0.5 * (KOLOSOV - 1.0) * 0.6 * P * root.real - y * Z.imag
+    u = u / (2.0 * SHEAR) + P * NU * (1.0 + NU) * x[:, 0]
+    return np.stack([u, v / (2.0 * SHEAR) - P * (1.0 - NU**2) * y], axis=1)
+
+
+def test_a_closed_inclined_crack_slides_under_uniform_pressure():
+    errors = []
+    for n in (20, 40, 80):
+        field, local, ends = turned(0.9, 0.013, closed_shear)
+        mesh = moved(xfem.rectangle_mesh((n, n), (-2.0, -2.0), (2.0, 2.0)), 0.15)
+        _phantom, faces, found, exact = closed(mesh, [xfem.Polyline(ends)], field)
+        inner = np.abs(local(faces.points)[..., 0]) < 0.8
+        wrong = np.abs(found.pressure / P - 1.0)[inner]
+        errors.append(
+            [np.linalg.norm(found.displacement - exact) / np.linalg.norm(exact), wrong.mean()]
+        )
+    rates = np.log2(np.array(errors[0]) / errors[-1]) / 2.0
+    assert (rates > 0.8).all()  # its ends are within an element
+
+
+def test_a_ring_cut_along_a_circle_has_the_pressure_of_lame():
+    # u_r = A r + B/r about a centre outside of the body; its cut is a curve
+    centre, radius = np.array([-0.3, -0.4]), 1.1
+    A, B = -P, 0.4 * P
+
+    def field(x, _):
+        r = x - centre
+        return r * (A + B / (r**2).sum(axis=1)[:, None])
+
+    lame = NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    pressure = -(2.0 * (lame + SHEAR) * A - 2.0 * SHEAR * B / radius**2)
+    angles = np.linspace(-0.2, 1.8, 200)
+    arc = xfem.Polyline(centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    errors = []
+    for n in (8, 16, 32):
+        _, faces, found, _exact = closed(grid(2, n), [arc], field)
+        errors.append(misses(faces, found.pressure, np.full(faces.weights.shape, pressure)))
+    assert errors[-1][0] < 0.01
+    assert errors[-1][1] < 0.05
+    assert np.log2(errors[0][0] / errors[-1][0]) / 2.0 > 0.8
+
+
+def wedge(push):
+    """A block cut twice, its wedge pressed back by a force over its top; and its solution."""
+    mesh = grid(2, 9)
+    cuts = [xfem.Plane([0.3, 0.5], [1.0, 0.35]), xfem.Plane([0.72, 0.5], [1.0, -0.3])]
+    phantom = xfem.cut_mesh(mesh, cuts)
+    between = (phantom.node_side == [1, -1]).all(axis=1)
+    points = phantom.node_points
+    fixed = (points[:, 1] == 0.0) & ~between
+    load = np.zeros_like(points)
+    load[between & (points[:, 1] == 1.0)] = push
+    supports = xfem.Supports(np.repeat(fixed[:, None], 2, axis=1), np.zeros_like(points))
+    faces = ClosingFaces(phantom, material(2))
+    force = xfem.InternalForce(phantom, material(2), "linear")
+    return force, faces, supports, load
+
+
+def test_a_wedge_that_only_faces_hold_is_in_balance_and_at_the_least_energy():
+    force, faces, supports, load = wedge([0.2 * P, -P])
+    found = solve_closed(force, faces, supports, load)
+    assert found.residual < 1e-10
+    assert 0 < (found.pressure > 0.0).sum() < found.pressure.size
+    free = ~supports.fixed
+
+    def energy(values):
+        u = np.zeros_like(load)
+        u[free] = values
+        elastic, stored = force.evaluate(u)
+        slope = elastic + faces.force(u) - load
+        return stored + faces.energy(u) - np.vdot(load, u), slope[free]
+
+    start = found.displacement[free]
+    least = energy(start)[0]
+    random = np.random.default_rng(0).normal(size=start.shape) * np.abs(start).mean()
+    other = minimize(energy, start + random, jac=True, method="L-BFGS-B", options={"maxiter": 500})
+    assert other.fun > least - 1e-12 * abs(least)
+
+
+def test_what_nothing_holds_is_named():
+    mesh = xfem.rectangle_mesh((5, 5))
+    phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.5, 0.53], [0.0, 1.0])])
+    held = xfem.Supports.none(phantom).prescribe(phantom, mesh.points[:, 1] == 0.0)
+    force = xfem.InternalForce(phantom, material(2), "linear")
+    with pytest.raises(UnsupportedBodyError, match="around"):  # it can slide
+        solve_closed(force, ClosingFaces(phantom, material(2)), held)
+    force, faces, supports, load = wedge([0.0, P])
+    with pytest.raises(xfem.XfemError, match="faces or supports that hold"):
+        solve_closed(force, faces, supports, load)
