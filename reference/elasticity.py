@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from reference.boundary_conditions import constrained_values, load_form
+from reference.contact import FaceContact, pressures
 from reference.deformation import lame
 from reference.inside_out import naming_weak_places
 from reference.law import Law, mass_matrix
@@ -28,6 +29,7 @@ from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.geometry.simplices import measures
 from verify.scene import Material, Scene
+from verify.solution import ContactPressure
 
 # Poisson's ratio from which the pressure pays, measured: docs/theory/reference.md
 LEAST_POISSON = 0.45
@@ -53,12 +55,18 @@ class LinearSolve:
         How well the system was solved, and by what.
     timings : dict of str to float
         Seconds by phase.
+    contact : ContactPressure or None
+        Of a scene with contact.
+    changes : int
+        Iterations of its active set.
     """
 
     displacement: NDArray[np.float64]
     strain_energy: float
     answer: Answer
     timings: dict[str, float] = field(default_factory=dict)
+    contact: ContactPressure | None = None
+    changes: int = 0
 
 
 def wants_pressure(scene: Scene, degree: int) -> bool:
@@ -116,7 +124,8 @@ def solve_linear(
     start = perf_counter()
     matrix = assembled_matrix(law.stiffness_form)
     most = _MOST_DIRECT_MIXED if pressure else _MOST_DIRECT
-    small = space.dimension == 2 or matrix.getSize()[0] <= most
+    small = space.dimension == 2 or matrix.getSize()[0] <= most or scene.contact.closed
+    touched: tuple[ContactPressure | None, int] = (None, 0)
     x, vector = law.solution.x.petsc_vec, matrix.createVecLeft()
     vector.array[:] = unknowns.own_part(nodal_forces(load, space))
     own, at = unknowns.own_unknowns(held)
@@ -129,6 +138,11 @@ def solve_linear(
         timings["factorisation"] = perf_counter() - start - timings["assembly"]
         with naming_weak_places(scene, space, unknowns):
             answer = solve_directly(solver, matrix, x, vector)
+            if scene.contact.closed:
+                before = perf_counter()
+                touched = _press(space, unknowns, held, (solver, matrix, x, vector))
+                answer = solve_directly(solver, matrix, x, vector)
+                timings["contact"] = perf_counter() - before
         solver.destroy()
     elif pressure:
         weight = _pressure_mass(scene.material, law)
@@ -139,10 +153,51 @@ def solve_linear(
         answer = solve_by_multigrid(matrix, space, x, vector, tolerance, flat)
     timings["solve"] = perf_counter() - start - sum(timings.values())
     law.update()
-    found = LinearSolve(unknowns.everywhere(x.array), law.stored(), answer, timings)
+    found = LinearSolve(unknowns.everywhere(x.array), law.stored(), answer, timings, *touched)
     for entry in (matrix, vector):
         entry.destroy()
     return found
+
+
+def _press(
+    space: ConformingSpace, unknowns: Any, held: NDArray[np.int32], system: tuple[Any, ...]
+) -> tuple[ContactPressure, int]:
+    """Find the pressures of the faces of cuts, and add their forces to the right side.
+
+    Parameters
+    ----------
+    held : (h,) int array
+        Scalar displacements that are prescribed.
+    system : solver, matrix, x and vector of PETSc
+        Solved without contact.
+    """
+    from petsc4py import PETSc
+
+    solver, matrix, x, vector = system
+    faces = FaceContact(space, held)
+
+    fixed, _ = unknowns.own_unknowns(held)
+
+    def forces(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        own = unknowns.own_part(values)
+        own[fixed] = 0.0
+        return np.asarray(own)
+
+    def solve(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        right: Any = np.asfortranarray(np.column_stack([forces(one) for one in columns.T]))
+        size: Any = ((len(right), None), (None, columns.shape[1]))
+        loads = PETSc.Mat().createDense(size, array=right, comm=matrix.comm)
+        found = loads.duplicate()
+        solver.matSolve(loads, found)
+        each = [unknowns.everywhere(one).ravel() for one in found.getDenseArray().T]
+        loads.destroy()
+        found.destroy()
+        return np.column_stack(each)
+
+    gaps = faces.gaps @ unknowns.everywhere(x.array).ravel()
+    found, changes = pressures(faces.compliance(solve), gaps)
+    vector.array[:] += forces(faces.gaps.T @ found)
+    return ContactPressure(faces.points, faces.weights, found[None]), changes
 
 
 def _unknowns_of_flat_cells(matrix: Any, space: ConformingSpace) -> NDArray[np.int32]:

@@ -26,6 +26,7 @@ from reference.linear_solvers import (
     preconditioned_gradients,
     solve_directly,
 )
+from reference.meshing import ConformingMesh
 from reference.meshing.opening import cell_facets, interior_facets
 from reference.space import ConformingSpace, TiedUnknowns, Unknowns
 
@@ -184,16 +185,20 @@ def nodal_forces(form: Any, unknowns: Unknowns) -> Array:
 Numbers = NDArray[np.int64]
 
 
-def facing_nodes(space: ConformingSpace) -> Numbers:
-    """Pairs (f, q, 2) of nodes at one place on both sides of each facet of `mesh.cut_facets`."""
-    mesh, k = space.mesh, space.mesh.cell_dimension
+def sides_of_cut(mesh: ConformingMesh) -> list[tuple[Numbers, Numbers]]:
+    """Cells (f,) on either side of each of `mesh.cut_facets`, and their corners opposite to it."""
     before = mesh.parent[mesh.cells]
     first, second, is_cut, _ = interior_facets(before, mesh.cut_facets)
     first, second = first[is_cut], second[is_cut]
     facets = cell_facets(before)
     order = np.lexsort(facets[first].T[::-1])
     assert np.array_equal(facets[first][order], mesh.cut_facets)
-    both = np.stack([space.facet_nodes(*np.divmod(s[order], k + 1)) for s in (first, second)])
+    return [np.divmod(side[order], mesh.cell_dimension + 1) for side in (first, second)]
+
+
+def facing_nodes(space: ConformingSpace) -> Numbers:
+    """Pairs (f, q, 2) of nodes at one place on both sides of each facet of `mesh.cut_facets`."""
+    both = np.stack([space.facet_nodes(*side) for side in sides_of_cut(space.mesh)])
     # nodes that face each other lie at the same place, to the last digit
     _, place = np.unique(space.node_points[both.ravel()], axis=0, return_inverse=True)
     rank = np.argsort(place.reshape(both.shape), axis=2)

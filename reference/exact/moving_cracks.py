@@ -256,7 +256,7 @@ class Impact(ExactSolution):
         along = np.eye(self.dimension)[0]
         pressed = self._local(points, near)[1] < self._front()[0]
         strain = -self._v / self._speed * pressed
-        return strain[:, None, None] * np.outer(along, along)
+        return np.asarray(strain[:, None, None] * np.outer(along, along))
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
         """Velocity (n, d), m/s; see `ExactSolution`."""

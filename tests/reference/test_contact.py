@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+import scenes
 from fourth_order import difference
+from scipy.optimize import nnls
 
-from reference.exact import exact_solution
+from reference.contact import pressures
+from reference.exact import exact_of, exact_solution
 from verify.errors import InputError
 from verify.scene import Material
+from verify.solvers.conforming import ConformingSolver, ReferenceSolver
 
 STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
 BAR = Material(young=4.0, poisson=0.0, plane="strain", density=1.0)
@@ -101,3 +105,108 @@ def test_halves_that_meet_are_together_for_two_lengths_and_leave_with_velocities
     np.testing.assert_allclose(rate, moment.velocity(points), atol=1e-9)
     slope = difference(moment.displacement, points, 1e-5)
     np.testing.assert_allclose(slope, moment.gradient(points), atol=1e-9)
+
+
+LINES = [
+    {"kind": "polyline", "name": "one", "points": [[-0.1, 0.31], [1.1, 0.74]]},
+    {"kind": "polyline", "name": "other", "points": [[0.37, -0.1], [0.62, 1.1]]},
+]
+PLANE = {"kind": "polygon", "points": [[-0.2, -0.2, 0.3], [1.2, -0.2, 0.5], [1.2, 1.2, 0.7],
+                                       [-0.2, 1.2, 0.5]]}  # fmt: skip
+INNER = {"kind": "polygon", "points": [[0.2, 0.2, 0.3], [0.8, 0.2, 0.5], [0.8, 0.8, 0.7],
+                                       [0.2, 0.8, 0.5]]}  # fmt: skip
+
+
+def pressed(cuts, d, name, parameters, geometry=None, cells=5):
+    """Scene with contact whose boundary is moved by an exact field."""
+    return scenes.scene(
+        cuts, d, contact={"expected": "closed"}, geometry=geometry or scenes.box([1.0] * d),
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        exact={"solution": name, "parameters": parameters}, mesh={"cells": [[cells] * d]},
+    )  # fmt: skip
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(
+    "cuts, d", [(LINES[:1], 2), (LINES, 2), ([PLANE], 3), ([INNER], 3)],
+    ids=["inclined", "crossing", "plane", "inner plane"],
+)  # fmt: skip
+def test_faces_under_hydrostatic_pressure_pass_it_on_as_if_uncut(cuts, d, degree):
+    """Any cut, the uncut field, the pressure of the stress at every point."""
+    strain = -0.1 * np.eye(d)
+    scene = pressed(cuts, d, "linear", {"matrix": strain.tolist(), "shift": [0.0] * d}, cells=3)
+    found = ConformingSolver().solve(scene, 0, 0, degree=degree, mesh="remeshed")
+    exact = exact_of(scene)
+    wanted = -exact.stress(np.zeros((1, d)))[0, 0, 0]
+    np.testing.assert_allclose(found.displacement[0], exact.displacement(found.points), atol=1e-14)
+    np.testing.assert_allclose(found.contact.pressure, wanted, rtol=1e-12)
+    facets = found.cut_facets
+    edges = np.moveaxis(facets[:, 1:] - facets[:, :1], 1, 0)
+    size = np.linalg.norm(edges[0] if d == 2 else 0.5 * np.cross(*edges), axis=1).sum()
+    # P1: facets whose corners are all held have no gap that a pressure could close
+    assert 0.93 * size < found.contact.weights.sum() < (1 + 1e-12) * size
+
+
+@pytest.mark.fenicsx
+def test_drawn_faces_are_free_and_what_contact_adds_is_nothing():
+    strain = 0.1 * np.eye(2)
+    closed = pressed(LINES, 2, "linear", {"matrix": strain.tolist(), "shift": [0.0, 0.0]})
+    open_ = closed.model_copy(update={"contact": scenes.scene().contact})
+    with_contact, without = (ConformingSolver().solve(s, 0, 0) for s in (closed, open_))
+    np.testing.assert_array_equal(with_contact.displacement, without.displacement)
+    assert not with_contact.contact.pressure.any()
+    assert without.contact is None
+
+
+def crack(name, given, cells):
+    points = [(np.array(given["centre"]) + s * given["a"] * ALONG).tolist() for s in (-1, 1)]
+    box = scenes.box([1.5, 1.5], [-1.5, -1.5])
+    return pressed([{"kind": "polyline", "points": points}], 2, name, given, box, cells)
+
+
+def errors_on(found, scene):
+    """Relative L2 error of the pressure, error of the extent in crack lengths, and overlap."""
+    exact, contact = exact_of(scene), found.contact
+    stress = exact.stress(contact.points, contact.points + 1e-9 * ACROSS)
+    wanted = np.maximum(-(stress @ ACROSS @ ACROSS), 0.0)
+    (got,), weights = contact.pressure, contact.weights
+    error = np.sqrt(weights @ (got - wanted) ** 2 / (weights @ wanted**2))
+    extent = weights[got > 1e-3 * got.max()].sum() / 1.2
+    return error, extent
+
+
+@pytest.mark.fenicsx
+def test_the_reference_finds_the_uniform_pressure_of_a_closed_crack():
+    scene = crack("closed_crack", CLOSED, 8)
+    error, extent = errors_on(ReferenceSolver().solve(scene, 0, 0), scene)
+    assert error < 2e-3  # at the tips alone: elements of 1e-3 of the others
+    assert extent == pytest.approx(1.0)
+
+
+@pytest.mark.fenicsx
+def test_the_reference_finds_the_pressure_and_the_zone_of_a_partly_closed_crack():
+    """The zone ends at a third, known to an element; half the elements, half the error."""
+    errors = []
+    for level in (0, 1):
+        scene = crack("partly_closed_crack", PARTLY, 8)
+        found = ReferenceSolver().solve(scene, level, 0)
+        error, extent = errors_on(found, scene)
+        size = found.contact.weights.max() / 1.2
+        assert abs(extent - 1 / 3) <= size
+        errors.append(error)
+    assert errors[1] < 0.1
+    assert errors[0] / errors[1] > 1.5
+
+
+def test_pressures_are_those_of_the_quadratic_program():
+    """On random problems against non-negative least squares, which knows no active sets."""
+    rng = np.random.default_rng(7)
+    for count in (1, 3, 20, 60):
+        half = rng.normal(size=(count, count + 3))
+        matrix, gaps = half @ half.T, rng.normal(size=count)
+        found, _ = pressures(matrix, gaps)
+        lower = np.linalg.cholesky(matrix)
+        wanted, _ = nnls(lower.T, np.linalg.solve(lower, -gaps))
+        np.testing.assert_allclose(found, wanted, atol=1e-8 * max(wanted.max(), 1.0))
+    assert pressures(np.eye(3), np.array([0.0, 1.0, 2.0]))[0].tolist() == [0.0, 0.0, 0.0]

@@ -76,6 +76,7 @@ class ConformingSolver:
     """
 
     name = "conforming"
+    contact = ("static",)
     choices: Mapping[str, Collection[Any]] = {
         "mesh": ("imprinted", "remeshed"), "degree": (1, 2), "scheme": SCHEMES,
         "opening": OPENINGS,
@@ -146,6 +147,7 @@ class ReferenceSolver:
     """
 
     name = "reference"
+    contact = ("static",)
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""
@@ -248,7 +250,9 @@ def _equilibrium(
         if linear.answer.iterations:
             record.iterations["cg"] = linear.answer.iterations
         record.timings |= linear.timings
-        return at_rest(linear.displacement, linear.strain_energy)
+        if linear.contact is not None:
+            record.iterations["contact"] = linear.changes
+        return at_rest(linear.displacement, linear.strain_energy) | {"contact": linear.contact}
     unknowns, _ = constrained_values(scene, space, exact)
     # in space large saddle points of a tangent have no solver but a factorisation
     pressure = pressure and scene.dimension == 2

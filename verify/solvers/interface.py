@@ -96,7 +96,7 @@ def refusal_of(solver: Solver, scene: Scene) -> str | None:
     return one_line(answer, _LONGEST) if answer else refused_contact(solver, scene)
 
 
-def refused_contact(solver: Solver, scene: Scene) -> str | None:
+def refused_contact(solver: Any, scene: Scene) -> str | None:
     """Say which contact of the faces of cuts a solver lacks that a scene asks for, or None.
 
     A solver offers contact by its attribute ``contact``: the analyses that have it, "static" and
