@@ -49,6 +49,7 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")
 _WELDED = ("subdivision", "snapping", "snapping_subdivision")
+_WITH_FACES = (*_WELDED, "virtual_node", "virtual_node_arbitrary")
 _RULES = {
     **dict.fromkeys(
         _WELDED,
@@ -235,6 +236,11 @@ class MethodSolver:
         """Names of those of the method, beside those that `solve` names."""
         return _parameters_of(self._method)
 
+    @property
+    def contact(self) -> Collection[str]:
+        """Analyses with contact of the faces of cuts, if the method leaves two of them."""
+        return XfemSolver.contact if self.name in _WITH_FACES else ()
+
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what ``xfem`` refuses, and what no changed mesh can do."""
         if reason := XfemSolver().refuses(scene):
@@ -360,7 +366,7 @@ class MethodSolver:
         record = Record(timings=dict(body.seconds))
         fields = solve_equilibrium(
             scene, body.phantom, exact_of(scene), record, resisting=body.resisting, law=self._law,
-            load_steps=load_steps,
+            load_steps=load_steps, shown=body.conforming,
         )  # fmt: skip
         self._say(record, body)
         return solution_on(scene, record, body.phantom, fields, size, body.conforming)

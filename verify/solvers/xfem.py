@@ -224,6 +224,7 @@ class XfemSolver:
     """
 
     name = "xfem"
+    contact = ("static",)
     choices = _CHOICES
     parameters = tuple(one.name for one in fields(_Parameters))
 

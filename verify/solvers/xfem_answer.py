@@ -8,12 +8,15 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.accelerated import FAST
+from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
-from verify.solution import Regularisation, Solution
+from verify.solution import ContactPressure, Regularisation, Solution
 from verify.solvers.body_of_scene import material_of
 from verify.solvers.boundary_conditions import loads_of, path_of_supports, support_ends
 from verify.solvers.runs import Record, across_interfaces, at_rest
 from verify.xfem.clip import ROUND_OFF_SHARE
+from verify.xfem.closing import ClosingFaces, solve_closed
+from verify.xfem.element import Material
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
@@ -160,6 +163,7 @@ def solve_equilibrium(
     load_steps: int = 0,
     penalise: bool = False,
     kernels: Kernels = FAST,
+    shown: Subdivision | None = None,
 ) -> dict[str, Any]:
     """Solve a static scene on a cut mesh.
 
@@ -181,6 +185,8 @@ def solve_equilibrium(
     penalise : bool
         Whether with a ghost penalty (linear only).
     kernels : Kernels
+    shown : Subdivision, optional
+        As of `solution_on`; whose faces touch.
 
     Returns
     -------
@@ -198,12 +204,22 @@ def solve_equilibrium(
         load = loads_of(scene, phantom, exact)
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
+    faces = faces_of(scene, body, material, penalise, shown)
+    if faces is not None:
+        with record.timed("solve"):
+            elastic = InternalForce(body, material, "linear", kernels)
+            closed = solve_closed(elastic, faces, supports, load)
+        record.iterations["contact"] = closed.iterations
+        record.notes["linear solver"] = _solver_text(closed.solver, kernels)
+        record.notes["residual"] = f"{closed.residual:.3e}"
+        fields = at_rest(closed.displacement, closed.strain_energy)
+        return fields | {"contact": contact_of(faces, [closed.displacement])}
     if kinematics == "linear" and law is InternalForce:
         ghost = GhostPenalty(body, material) if penalise else None
         static = solve_static(body, material, supports, load, ghost=ghost, kernels=kernels)
         share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
         record.timings |= static.timings
-        record.notes["linear solver"] = _said(static.solver, kernels)
+        record.notes["linear solver"] = _solver_text(static.solver, kernels)
         record.notes["residual"] = f"{static.residual:.3e}"
         record.regularisations += penalised(ghost, share)
         return at_rest(static.displacement, static.strain_energy)
@@ -215,7 +231,7 @@ def solve_equilibrium(
         )
     record.iterations["newton"] = sum(found.iterations)
     record.notes |= {
-        "linear solver": " and ".join(_said(one, kernels) for one in sorted(found.solvers)),
+        "linear solver": " and ".join(_solver_text(one, kernels) for one in sorted(found.solvers)),
         **_path_notes(found),
         "pieces inside out": _inverted(force, found.displacement),
     }
@@ -223,7 +239,39 @@ def solve_equilibrium(
     return at_rest(found.displacement, found.energy)
 
 
-def _said(solver: str, kernels: Kernels) -> str:
+def faces_of(
+    scene: Scene,
+    phantom: PhantomMesh,
+    material: Material,
+    penalise: bool = False,
+    shown: Subdivision | None = None,
+) -> ClosingFaces | None:
+    """Find the faces of cuts that touch, where a scene asks for contact.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If slivers follow others or have a penalty.
+    """
+    if not scene.contact.closed:
+        return None
+    if phantom.aggregation is not None or penalise:
+        raise UnsupportedSceneError(
+            "contact of the faces of a cut is for slivers = 'keep' or 'drop': it needs no others"
+        )
+    return ClosingFaces(phantom, material, shown)
+
+
+def contact_of(
+    faces: ClosingFaces, displacements: Sequence[NDArray[np.float64]]
+) -> ContactPressure:
+    """Return the pressure between faces at displacements (N, d), one per output time."""
+    pressure = np.array([faces.pressure(one).ravel() for one in displacements])
+    points = faces.points.reshape(-1, faces.points.shape[2])
+    return ContactPressure(points, faces.weights.ravel(), pressure)
+
+
+def _solver_text(solver: str, kernels: Kernels) -> str:
     """Say which linear solver has solved."""
     if kernels is FAST:
         return {"direct": "factorisation", "iterative": "own conjugate gradients"}[solver]

@@ -48,7 +48,7 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads_and_supports import Supports, check_bodies, simplex_rule
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import StaticSolver
-from verify.xfem.subdivision import subdivide, torn_facets
+from verify.xfem.subdivision import Subdivision, subdivide, torn_facets
 
 STABILITY = 2.0  # c: a(u, u) keeps half of itself at least
 # share of the largest facet: smaller ones rim pieces of round-off size that the others have taken,
@@ -63,6 +63,8 @@ class ClosingFaces:
     ----------
     phantom : PhantomMesh
     material : Material
+    shown : Subdivision, optional
+        Where the cut body is not as its `subdivide` makes it.
 
     Attributes
     ----------
@@ -85,7 +87,9 @@ class ClosingFaces:
         If cells are aggregated, the body is a membrane, or its law not Hooke's.
     """
 
-    def __init__(self, phantom: PhantomMesh, material: Material) -> None:
+    def __init__(
+        self, phantom: PhantomMesh, material: Material, shown: Subdivision | None = None
+    ) -> None:
         if phantom.aggregation is not None or phantom.mesh.is_membrane or material.law != "hooke":
             raise XfemError(
                 "contact of a body with aggregated cells, of a membrane or of another law than "
@@ -93,7 +97,7 @@ class ClosingFaces:
             )
         mesh = phantom.mesh
         self.phantom = phantom
-        body = subdivide(phantom)
+        body = subdivide(phantom) if shown is None else shown
         _, place = np.unique(body.points, axis=0, return_inverse=True)
         facets, beside = torn_facets(body.cells, place.ravel()[body.cells])
         largest = mesh.measures * mesh.dim * np.linalg.norm(mesh.gradients, axis=2).max(axis=1)
