@@ -12,7 +12,7 @@ import pytest
 
 from verify.runner import tasks
 from verify.runner.child import watch_all
-from verify.runner.tasks import Failure, Limits, Task, all_made, made
+from verify.runner.tasks import Failure, Limits, Task, made
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,14 @@ def test_what_fails_says_why_and_costs_the_others_nothing(tmp_path, guest):
         Task("is large", greedy, {"log": ""}, ("a:Guest",)),
         Task("is well", product, {"a": 2, "b": 3, "log": log}, ("a:Guest",)),
     ]
-    raised, left, large, well = made(four, tmp_path / "kept", limits=limits)
+    raised, left, large, well = made(four, tmp_path / "kept", limits=limits, may_fail=True)
     assert raised == Failure("ValueError: not x")
     assert isinstance(left, Failure)
     assert "exit code 3" in left.reason
     assert large == Failure("killed above 300 MB")
     assert well == [Product(6.0, (2, 3))]
     with pytest.raises(ChildProcessError, match="raises: ValueError: not x"):
-        all_made(four[:1], tmp_path / "kept")
+        made(four[:1], tmp_path / "kept")
 
 
 RUN = """

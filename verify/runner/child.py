@@ -5,9 +5,9 @@ Those count what a process reserves, and LLVM, OpenBLAS and MPI reserve gigabyte
 never touch; and a solver that hits them dies in an unlucky place with an unclear message. The
 watch looks fifty times a second, so that a solve may overshoot by what it can touch in 20 ms.
 
-Its end is the end of everything that it started: of its process group, of its descendants as the
-watch has seen them, and of what bears its mark in the environment that it was started with. Its
-death is told in words, by what it was killed for or by its log.
+Everything that it started ends with it: its process group, its descendants as the watch has seen
+them, and processes with its mark in their environment. Its death is explained by the limit that it
+exceeded, or by its log.
 """
 
 import atexit
@@ -162,7 +162,7 @@ class Child:
 
 
 class Watched[Found](Protocol):
-    """What is under way: a process, or something that waits for one."""
+    """A running process, or an object that waits for one."""
 
     def poll(self) -> Found | None:
         """Look once; return how it ended, or what it found."""
@@ -263,7 +263,7 @@ def _work(
     die_with_parent()
     os.chdir(folder)
     sys.argv = [module, str(argument)]
-    np.random.seed()  # noqa: NPY002 - that of the server would be everyone's
+    np.random.seed()  # noqa: NPY002 - else all have the seed of the server
     random.seed()
     try:
         import_module(module).main(argument)

@@ -1,4 +1,4 @@
-"""What is made of a finished case beside the solves: its comparison, and its drawings.
+"""Comparison and drawings of a finished case.
 
 A comparison runs in a process of its own and says which solve it is at. If it dies there, that
 solve is taken out, with the reason, and the others are compared again: a fault of the comparison
@@ -24,7 +24,7 @@ LEAST_SECONDS = 60.0
 
 
 class Comparison:
-    """The comparison of the solves in `folders` with the truth, and what is made of it.
+    """The comparison of the solves in `folders` with the truth.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def comparison_label(case: str) -> str:
 class Drawings:
     """Cases that wait to be drawn, and the one that is being drawn.
 
-    What could not be drawn is drawn, or said to be undrawable, by the report.
+    The report draws cases that failed here, or says why they cannot be drawn.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class Drawings:
         write_json(question, self.running[0])
 
     def poll(self) -> None:
-        """Forget what is drawn, or has ended the process that draws."""
+        """Forget a case that is drawn, or that has ended the process that draws."""
         if self._child is not None and self._child.poll() is not None:
             self._child = None
             for question in self.running:

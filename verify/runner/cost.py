@@ -1,9 +1,9 @@
 """Size and mass of a body; cost of a case, from its mesh sizes before anything is solved; rough.
 
-Unknowns follow from the numbers of nodes; those of a reference, whose mesh is graded, lie in a
-range. Seconds and bytes per unknown were measured on one core of the machine of the published
-results, over the quick cases. Nothing is meshed. Once a level of a reference is solved, the finer
-ones are forecast from its unknowns and seconds: docs/theory/reference.md has how well.
+Unknowns follow from the numbers of nodes; a reference, whose mesh is graded, has a range. Seconds
+and bytes per unknown were measured on one core of the machine of the published results, over the
+quick cases. Nothing is meshed. Once a level of a reference is solved, the finer ones are forecast
+from its unknowns and seconds; docs/theory/reference.md states the accuracy.
 """
 
 from collections.abc import Sequence
@@ -221,7 +221,7 @@ def forecast_text(scene: Scene, finer: Sequence[LevelCost], timeout: float, memo
 def coarser_reference(scene: Scene, seconds: float) -> tuple[Scene, int]:
     """Ask for elements of a reference so large that its levels are expected within some seconds.
 
-    At most eight times as large as the case asks; those of a given mesh stay.
+    At most eight times as large as the case asks; elements of a given mesh stay.
 
     Returns
     -------
@@ -288,7 +288,7 @@ def mesh_of_level(scene: Scene, level: int) -> tuple[float, float] | None:
 
 
 def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
-    """Return nodes and element size, far from what is singular, of a level of the reference."""
+    """Return nodes and element size, far from singularities, of a level of the reference."""
     body, degree = scene.geometry, scene.reference.degree
     if isinstance(body, MeshFile):
         coarse = mesh_of_level(scene, 0)

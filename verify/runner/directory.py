@@ -27,8 +27,8 @@ from verify.runner.fingerprint import file_digest
 from verify.solvers.interface import MOST_LEVELS
 
 RUN_SCHEMA = 1
-# files by which a process says what is needed if it dies: the solve that a comparison is at, and
-# how many levels a solver has that takes the case
+# files that outlive a process: the solve that a comparison is at, and the number of levels of a
+# solver that accepts the case
 JUDGING, MEASURED, LEVELS = "judging", "measured", "levels"
 _IDENTITY = ("cases", "options_of_result")
 
@@ -77,8 +77,8 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
     Raises
     ------
     InputError
-        If `root` is a file or holds something else, if another run holds it, or if it holds a
-        run with other cases or options.
+        If `root` is a file, holds something else or a run with other cases or options, or is held
+        by another run.
     """
     found = _contents(root)
     if found - {".lock", "run.json.partial"} and "run.json" not in found:
@@ -106,7 +106,7 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
 
 
 def emptied(folder: Path, kept: tuple[str, ...] = ()) -> None:
-    """Make `folder`, or remove all that is in it but what is `kept`."""
+    """Make `folder`, or remove all that is in it but files that are `kept`."""
     folder.mkdir(parents=True, exist_ok=True)
     for leftover in folder.iterdir():
         if leftover.name in kept:
@@ -155,8 +155,8 @@ def _check_same_run(root: Path, identity: dict[str, Any]) -> None:
 class Job:
     """Solve `case` with `solver` on mesh `level`, in `folder`.
 
-    `key` identifies what is computed: scene, solver, level, repetitions, parameters and the
-    code of today. With a `model` it is not the case's own, but another that it is measured by.
+    `key` is a hash of scene, solver, level, repetitions, parameters and today's code. With a
+    `model` the job solves another model of the case, for its adequacy.
     """
 
     case: str
@@ -241,7 +241,7 @@ def solution_files(folder: Path) -> list[Path]:
 
 
 def is_file_name(name: Any) -> bool:
-    """Whether `name` is that of a file beside others, and nothing that leads elsewhere."""
+    """Whether `name` names a file in the same folder, and is no path that leads elsewhere."""
     return isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_][\w.+-]{0,200}", name) is not None
 
 
@@ -251,7 +251,7 @@ def record_of(entry: Any, where: str) -> SolveRecord:
     Raises
     ------
     InputError
-        If they are not those of a record.
+        If a record has other fields.
     """
     return checked(SolveRecord, entry, "record", where)
 
@@ -278,7 +278,7 @@ def outcome_in(folder: Path) -> dict[str, Any] | None:
 
 
 def levels_told(job: Job) -> int:
-    """Return how many levels a solver has that was asked for level 0; 0 if it has not said."""
+    """Return the number of levels that a solver reported with level 0; 0 if it has not."""
     try:
         return min(int((job.folder / LEVELS).read_text()), MOST_LEVELS)
     except (OSError, ValueError):

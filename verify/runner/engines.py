@@ -2,9 +2,8 @@
 
 The scheduler of a cluster hands solves out, restarts those whose worker died, and waits for workers
 that are to come. Each worker must have the same code and versions. No file system is shared: a
-worker solves in a folder of its own, in a child with the limits of the run, which dies if the run
-no longer wants its answer, and the files come back as bytes. The comparison stays on the machine of
-the run.
+worker solves in a folder of its own, in a child with the limits of the run, and returns the files
+as bytes. The child dies if the run is stopped. The comparison stays on the machine of the run.
 """
 
 import logging
@@ -12,7 +11,7 @@ import re
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
@@ -23,37 +22,6 @@ from verify.scene import MeshFile, mesh_path, restore_scene
 from verify.solvers.interface import is_built_in
 
 _CONNECT_SECONDS, _LOOK_SECONDS = 15.0, 1.0
-
-
-class Running(Protocol):
-    """A solve that was started; it writes its files into the folder of its job."""
-
-    log: Path
-
-    def poll(self) -> Ending | None:
-        """Look once; tell how it ended if it has."""
-        ...
-
-    def kill(self) -> None:
-        """End it; nothing of it may go on."""
-        ...
-
-
-class Engine(Protocol):
-    """Starts solves."""
-
-    @property
-    def width(self) -> int:
-        """How many solves run side by side at most."""
-        ...
-
-    def start(self, job: dict[str, Any], folder: Path) -> Running:
-        """Start the solve that ``job.json`` in `folder` describes, whose content is `job`."""
-        ...
-
-    def close(self) -> None:
-        """Leave the engine; what runs has ended or was killed."""
-        ...
 
 
 class LocalEngine:
@@ -73,11 +41,11 @@ class LocalEngine:
         self.width, self._timeout, self._memory = width, timeout, memory
 
     def start(self, job: dict[str, Any], folder: Path) -> Child:
-        """Start a process."""
+        """Start the solve that ``job.json`` in `folder` describes, whose content is `job`."""
         return solving(job, folder, self._timeout, self._memory)
 
     def close(self) -> None:
-        """There is nothing to leave."""
+        """Do nothing: all processes have ended or were killed."""
 
 
 def solving(
@@ -237,7 +205,7 @@ def solve_remotely(
 
 
 def _sign(outcome: Path) -> None:
-    """Note the worker's machine: its times are not those of the machine of the run."""
+    """Note the worker's machine: the times are not of the machine of the run."""
     if outcome.exists():
         content = read_json(outcome)
         content.setdefault("notes", {})["worker"] = provenance()["cpu"]

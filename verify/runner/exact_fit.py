@@ -1,9 +1,8 @@
 """Contradictions between an exact solution and the scene that names it, found before a run.
 
-An exact field is a reference without a half-width, so that whatever of the scene it does not
-fulfil is counted as an error of the solver. It is held against supports, loads, faces of cuts,
-equilibrium and the initial state at points drawn with a fixed seed, and must be continuous
-wherever no cut is. First the points, then what is asked at them.
+An exact field is a reference without a half-width: a condition of the scene that it violates counts
+as an error of the solver. It is checked at points drawn with a fixed seed: supports, loads, faces
+of cuts, equilibrium, initial state. It must be continuous where no cut is.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,15 +1,15 @@
-"""Fingerprints that decide whether a stored solve or verdict is still that of today's code.
+"""Fingerprints that decide whether a stored solve or verdict is still valid for today's code.
 
-What modules depend on is read from their sources, so that nothing lists it: what they import, at
-their top or inside their functions, and what that imports; of a package on the way to a module that
-package's own file, of which names are imported on what it imports too. What is imported by a name
-in a string is not seen: whoever does so names the module. Comments, docstrings and the places of
-words in a file are not code; imports for type checkers alone are none. Data files beside a module,
-and versions of other packages, are part of it.
+The dependencies of a module are read from its source: its imports, at the top or inside functions,
+and theirs in turn. Of a package on the way to a module its ``__init__`` counts, and its imports if
+names are imported from it. Imports by a name in a string are not seen: the caller names the module.
+Comments, docstrings, positions in a file and imports for type checkers do not count. Data files
+beside a module, and versions of other packages, do.
 """
 
 import ast
 import hashlib
+import inspect
 import json
 import os
 import sys
@@ -46,7 +46,7 @@ def digest_of(content: Any) -> str:
 
 
 def bytes_digest(data: bytes) -> str:
-    """Return the hash of some bytes, as `file_digest` does for those of a file."""
+    """Return the hash of some bytes, as `file_digest` does for a file."""
     return hashlib.sha256(data).hexdigest()[:24]
 
 
@@ -104,13 +104,23 @@ def code_of_solver(name: str) -> str:
     return code_digest(_SOLVING, own, *([] if program is None else [program]))
 
 
+def source_of(solver: Any) -> str:
+    """Return the digest of the file that defines a solver, and of its attribute ``files``."""
+    with suppress(OSError, TypeError):  # of no file, or of one that is not there
+        source = inspect.getsourcefile(type(solver))
+        files = [Path(source)] if source else []
+        digests = [file_digest(path) for path in [*files, *getattr(solver, "files", ())]]
+        return digests[0] if len(digests) == 1 else digest_of(digests) if digests else ""
+    return ""
+
+
 def code_of_comparison() -> str:
     """Return the hash of all that a verdict depends on, given the solutions."""
     return code_digest(_COMPARING)
 
 
 class Source(NamedTuple):
-    """What a file says: the hash of its code, and the full names that it imports."""
+    """A source file: the hash of its code, and the full names that it imports."""
 
     digest: str
     imports: list[str]
@@ -124,7 +134,7 @@ class Sources:
     root : Path
         Holds the packages.
     store : Path, optional
-        File that remembers, by their bytes, what files said: parsing them takes seconds.
+        File that keeps parsed sources by the hash of their bytes: parsing them takes seconds.
     """
 
     def __init__(self, root: Path = ROOT, store: Path | None = None) -> None:
@@ -253,7 +263,7 @@ def _parsed(text: bytes, package: str) -> Source:
 
 
 def _imports(tree: ast.AST, package: str) -> Iterator[str]:
-    """Full names of what is imported, but for type checkers alone."""
+    """Full names of imports, but for type checkers alone."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.If) and _is_type_checking(node.test):
             for other in node.orelse:
@@ -293,7 +303,7 @@ def _sha(path: Path) -> str:
 
 
 def _versions(names: Iterable[str]) -> dict[str, str]:
-    """Return the versions of Python and of what is installed of packages by these names."""
+    """Return the versions of Python and of the installed ones of these packages."""
     known = versions()
     found = {"python": known["python"]}
     for name in sorted(set(names) - set(_PACKAGES) - sys.stdlib_module_names):

@@ -1,8 +1,8 @@
 """The comparison of a finished case: ``python -m verify.runner.judging judge.json``.
 
-Reads the stored solves of a case, has `verify.judge` compare and judge them, and writes
-``result.json``, the error fields for the pictures and, last, ``judged.json`` with the key of what
-was compared.
+Reads the stored solves of a case and has `verify.judge` compare and judge them. Writes
+``result.json``, the error fields for the pictures and, last, ``judged.json`` with the key of the
+solves that were compared.
 """
 
 import sys
@@ -175,7 +175,7 @@ def _with_openings(
     exact: Any,
     announce: Callable[[SolveRecord], None],
 ) -> CaseResult:
-    """Add openings and overlaps; those of a guest may not cost the others theirs."""
+    """Add openings and overlaps; if a guest's fail, of built-in solvers alone."""
     own = {name: one for name, one in solutions.items() if is_built_in(name)}
     for given in (solutions, own):
         try:

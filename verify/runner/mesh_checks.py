@@ -38,9 +38,9 @@ Array = NDArray[np.float64]
 _Values = Callable[[Array, float], Any]
 
 _NODES = 3000  # of the mesh on which loose pieces are looked for: cut in 0.1 s
-_SHORTEST = 1e-4  # of the body: the reference puts one facet on what is shorter, and cannot open it
+_SHORTEST = 1e-4  # of the body: the reference puts one facet on a shorter cut, and cannot open it
 _ALONG = 40  # samples of a line inside the bounding box of the body
-_NEAR = 1e-6  # of the body: on its boundary, not inside
+_NEAR = 1e-6  # of the body: on its boundary, not inside it
 _METRES = 100.0  # times the body: a cut as large is not in metres, or the body is not
 
 

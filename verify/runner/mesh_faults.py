@@ -19,8 +19,8 @@ from verify.scene.parts import pieces_on_part
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Of the largest extent of the body. What is closer was meant to be one place: single precision
-# keeps 1e-7. Cells less deep in each other touch.
+# Of the largest extent of the body. Points that are closer were meant to be one: single precision
+# keeps 1e-7. Cells that overlap by less touch.
 _CLOSE = 1e-6
 _FLAT = 1e-9  # of the same: what lies in the plane of a triangle
 # A gap is at most as wide as coordinates of three digits leave it, and narrow beside its facets.
@@ -303,7 +303,7 @@ class _Skin:
         """Cells (c,) through which edges or cells run that are no part of them.
 
         Two bodies that overlap have an edge of one inside a cell of the other, or one holds the
-        other. Of a membrane all edges are tested, in space those of the skin do.
+        other. Of a membrane all edges are tested, in space the edges of the skin.
         """
         # commands that only read cases shall not load numba
         from verify.compare.cell_tree import build_cell_tree, morton_order

@@ -1,7 +1,7 @@
 """From cases to solves: which solvers, which levels, in which order.
 
-The reference gets levels beside those that its scene names, as long as they are needed, and solves
-other models of a case that asks how adequate its own is.
+The reference gets more levels than its scene names while they are needed. It also solves the other
+models of a case with an [adequacy] table.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -82,12 +82,12 @@ class CasePlan:
 
     @property
     def count(self) -> int:
-        """Number of solves, as far as it is known."""
+        """Number of solves that are known or expected."""
         known = len(self.jobs) + len(self.refused) + len(self.models)
         return known + sum(self.awaited.values())
 
     def scene_of(self, job: Job) -> Scene:
-        """Return the scene that a job solves: that of the case, or of another model of it."""
+        """Return the scene that a job solves: the case, or another model of it."""
         return self.other_scenes.get(job.model, self.scene)
 
     def ordered(self) -> list[Job]:
@@ -104,7 +104,7 @@ class CasePlan:
         record : SolveRecord
             Of `job`.
         levels : int
-            Of the solver; 0 if it has not said how many.
+            Of the solver; 0 if it has not reported them.
         """
         if job.level or job.model or job.solver not in self.awaited:
             return []
@@ -213,10 +213,9 @@ def plan_case(
 def begun_after(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], tuple[Any, ...]]:
     """Return the key by which the solves of a run are sorted as they are begun.
 
-    One after the other they keep the order of the plans. Side by side, the case that is expected
-    to take longest is begun first, and in each case level 0 of each solver, then the reference,
-    coarse to fine, which is most of it: what is short is left for the end, when it fills all
-    processes to the last.
+    One after the other they keep the order of the plans. Side by side, the longest case by the
+    forecast is begun first: short ones then fill all processes to the end. In each case level 0 of
+    each solver comes first, then the reference from coarse to fine.
 
     A solve of a guest that was begun and left no record comes last: it may end the run once more.
     """
@@ -254,7 +253,7 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
     scenes : dict of str to Scene
         By model.
     """
-    # what only reads cases shall not wait for the comparison that this imports
+    # commands that only read cases shall not wait for the comparison that this imports
     from verify.judge.models import other_scene
 
     jobs, scenes = [], {}
@@ -283,8 +282,8 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
 def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
     """Take the next level of the reference out of the plan's spare ones, if it is needed.
 
-    It is if the case was judged by levels of the reference, each of them solved, whose
-    uncertainty is above a tenth of an error that it judges.
+    It is needed if all levels so far are solved and the half-width of the reference is above a
+    tenth of an error.
 
     Parameters
     ----------
@@ -307,13 +306,13 @@ def levels_in_vain(
 ) -> list[tuple[Job, SolveRecord]]:
     """List the levels of a reference that need not be solved, each with a record that says so.
 
-    Those that wait when one has failed, and too few are left for the reference to have an error
-    bar: nothing is judged by it then.
+    These wait when one has failed and too few are left for the reference to have an error bar:
+    nothing is judged by it then.
 
     Parameters
     ----------
     plan : CasePlan
-        Whose own reference it is; those of other models and of exact cases are not looked at.
+        Of the case; references of other models and of exact cases are left alone.
     failed : Job
     record : SolveRecord
         Of `failed`.
@@ -356,7 +355,7 @@ def levels_left_out(
     solved : Job
         A level of its reference.
     records : sequence of SolveRecord
-        Of all levels that are solved, that of `solved` last.
+        Of all levels that are solved, `solved` last.
     waiting : collection of Job
         Of all cases.
     """

@@ -4,8 +4,8 @@ A fresh Python takes longer to import what solving and judging need than many a 
 that starts threads or MPI is imported: FEniCSx is not, only the Python packages that it builds on.
 Compiled kernels are loaded, and none is compiled.
 
-The server ends whatever was started below it when the runner dies: what has lost its parent is
-given to it by the kernel. What is imported here by something else is imported, and no more.
+The server ends all processes below it when the runner dies: the kernel gives it those that have
+lost their parent. Where another process imports this module, it only imports.
 """
 
 import contextlib

@@ -1,9 +1,9 @@
 """References that were solved before: kept in a folder that later runs look into, or in one file.
 
 An entry of the cache is a folder named by a key that hashes all that the reference depends on: the
-physics of the scene, the level, the parameters, the code of the reference and the versions of what
-it stands on. Whatever changes gives another key, so that an outdated entry is never found; it only
-takes up room until `remove` is asked for it.
+physics of the scene, the level, the parameters, the code of the reference and the versions of its
+packages. Any change gives another key, so that an outdated entry is never found; it only takes up
+room until it is removed.
 
 ::
 
@@ -12,11 +12,10 @@ takes up room until `remove` is asked for it.
 
 A bundle is a zip file, to be committed, so that runs that judge by it need no FEniCSx:
 ``bundle.json`` with such entries, and the files of each in one ``<key>.tar.xz``, since output times
-repeat their mesh (in bundles of schema 1 below ``<key>/``). It is given to
-a run by name (``--references``), so that, other than in the cache, an entry is found by the physics
-of the scene alone: the code and the versions that made it are those that it says, and the report
-repeats them. A scene whose physics changed is not found, which is an error and not a reason to
-compute something else.
+repeat their mesh (in bundles of schema 1 below ``<key>/``). A run is given it by name
+(``--references``). Its entries are therefore found by the physics of the scene alone, and the
+report states the code and the versions that made them. If the physics of a scene has changed, that
+is an error.
 """
 
 import io
@@ -59,7 +58,7 @@ _HOUR = 3600.0
 BUNDLE_SCHEMA = 2
 _CONTENTS = "bundle.json"
 _PACKED = ".tar.xz"
-# what is read of others: a bundle of ours unpacks to some ten times its size
+# limits for bundles of others: one of ours unpacks to some ten times its size
 _LARGEST_CONTENTS, _LARGEST_FILE, _MOST_TIMES = 2**26, 2**31, 200
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same references give the same bytes
 
@@ -104,7 +103,7 @@ class Entry:
         return self.code != code_of_solver(REFERENCE)
 
     def taken_by(self, job: Job, words: str) -> SolveRecord:
-        """Return its record as that of `job`, with a note in `words` on where it comes from."""
+        """Return its record for `job`, with a note in `words` on where it comes from."""
         code = "; the code of the reference has changed since" if self.outdated else ""
         said = f"{words}, solved {self.made}{self._by()}{code}"
         notes = {**self.record.notes, "cache": said}
@@ -219,7 +218,7 @@ class ReferenceCache:
         return ""
 
     def entries(self) -> list[Entry]:
-        """Return what is kept, by case, level and date; what cannot be read is not listed."""
+        """Return the entries by case, level and date; unreadable ones are not listed."""
         found = []
         for folder in self._folders():
             try:
@@ -246,10 +245,9 @@ class ReferenceCache:
             self._remove(self.root / entry.key)
 
     def remove_damaged(self) -> int:
-        """Remove what is not a whole entry, and return how many there were.
+        """Remove incomplete entries, and return how many there were.
 
-        What a run that was killed left behind is damaged after an hour; before, it may be that
-        of a run that still writes.
+        An unfinished entry counts as damaged after an hour; before, a run may still write it.
         """
         count = 0
         for folder in self._folders(_HOUR):
@@ -297,7 +295,7 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
     ------
     InputError
         If a level of a scene's reference is not in the cache, the scene has none, or the file
-        cannot be written where it is asked for.
+        cannot be written there.
     OSError
         If the disk is full.
     """

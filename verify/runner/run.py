@@ -1,10 +1,9 @@
 """The run: solves in parallel processes, then the comparison of each finished case.
 
-It notices Ctrl-C and friends between two steps, so that nothing is left half written, and ends with
-an exit code: a failed verdict (1) goes before a failed solve (3), as a FAIL is only given when the
-whole interval of what is known violates the limit, so that it stands whatever the missing solves
-would have said, and a script that repeats a run on code 3 must not take a wrong answer for a bad
-day of the machine. A FAIL that its case lists as a known finding does not count.
+Signals (Ctrl-C) are handled between two steps, so that nothing is left half written. A failed
+verdict (exit code 1) outranks a failed solve (3), so that retries on code 3 do not hide it: FAIL is
+given only if the whole interval violates the limit, which missing solves cannot change. A FAIL that
+its case lists as a known finding does not count.
 """
 
 import signal
@@ -89,7 +88,7 @@ def run_cases(
     command: str = "",
     drawings: Path | None = None,
 ) -> RunSummary:
-    """Solve, compare and judge `scenes` into the directory `out`; resume what is there.
+    """Solve, compare and judge `scenes` into the directory `out`; resume a run that is there.
 
     Parameters
     ----------
@@ -110,7 +109,7 @@ def run_cases(
         If a case or `out` is bad, or there is no mpiexec for several ranks; then nothing was
         written.
     RunStoppedError
-        If SIGINT, SIGTERM or SIGHUP came; what is finished stays and is reused next time.
+        If SIGINT, SIGTERM or SIGHUP came; finished solves stay and are reused next time.
     OSError
         If the directory cannot be written (disk full).
     """

@@ -55,7 +55,7 @@ def select_cases(
             for scene in named
             if (is_named or (_of_weight(scene, weight) and not scene.played_only))
             and (wanted is None or wanted(scene))
-        ]  # what is for `verify play` every solver would refuse
+        ]  # every solver would refuse a case that is for `verify play`
         for scene in _with_rows_compared(asked, rows):
             twin = chosen.setdefault(scene.name, scene)
             if twin.file != scene.file:
@@ -207,7 +207,7 @@ class Options:
     imported: tuple[str, ...] = ()
 
     def of_result(self) -> dict[str, Any]:
-        """Return those that change what is computed; a resumed run must have the same."""
+        """Return the options that change numbers; a resumed run must have the same."""
         return {
             "solvers": list(self.solvers),
             "repetitions": self.repetitions,

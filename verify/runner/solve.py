@@ -133,7 +133,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
 
 
 def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
-    """Note what is measured after a solve: the speed of the machine, and the critical step."""
+    """Note the speed of the machine and the critical step, measured after a solve."""
     from verify.provenance import calibration_note
 
     return {

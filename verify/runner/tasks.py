@@ -1,8 +1,8 @@
 """Calls of functions as jobs: each in a watched process, and kept, so that it is made once.
 
-For what a study measures and no comparison of a run does: systems of slivers, trials of the
-reference, tables. ``python -m verify.runner.tasks TASK.json`` makes one; what it found lies beside
-with the key of what was asked, and the code of it.
+For measurements of studies that are no comparison of a run: systems of slivers, trials of the
+reference, tables; and for loading solvers. ``python -m verify.runner.tasks TASK.json`` makes one.
+Its result lies beside, with the key of the call and of its code.
 """
 
 import json
@@ -24,8 +24,7 @@ from verify.processes import die_with_parent, start_server
 from verify.result import checked
 from verify.runner.child import Child, Ending, death, watch_all
 from verify.runner.directory import emptied, folder_name
-from verify.runner.fingerprint import code_digest, code_of_solver, digest_of
-from verify.runner.loading import source_of
+from verify.runner.fingerprint import code_digest, code_of_solver, digest_of, source_of
 from verify.solvers import find_solver
 from verify.solvers.interface import is_built_in, solver_in
 
@@ -35,7 +34,7 @@ _LONGEST_NAME = 80
 
 @dataclass(frozen=True)
 class Task:
-    """Call of a function of a module; of two that ask the same one is made.
+    """Call of a function of a module; of two equal ones one is made.
 
     Attributes
     ----------
@@ -46,21 +45,24 @@ class Task:
     arguments : mapping of str to object
         Plain data.
     solvers : tuple of str
-        That it runs: what it finds depends on their code.
+        That it runs: its result depends on their code.
+    fresh : bool
+        Whether it needs a Python of its own, as solvers of others among `solvers` do.
     """
 
     name: str
     function: Callable[..., Any]
     arguments: Mapping[str, Any]
     solvers: tuple[str, ...] = ()
+    fresh: bool = False
 
     def question(self) -> dict[str, Any]:
-        """Return what is asked, as plain data."""
+        """Return the call as plain data."""
         place = {"module": self.function.__module__, "function": self.function.__name__}
         return {**place, "arguments": self.arguments}
 
     def key(self) -> str:
-        """Return the hash of what is asked and of all code that answers."""
+        """Return the hash of the call and of all code that it runs."""
         code = [code_digest(__name__, self.function.__module__)]
         for name in self.solvers:
             guest = "" if is_built_in(name) else source_of(find_solver(solver_in(name)))
@@ -85,7 +87,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a task has found nothing: what it raised, or how its process died."""
+    """Why a task has no result: its exception, or how its process died."""
 
     reason: str
 
@@ -95,10 +97,12 @@ def made(
     folder: Path,
     announce: Callable[[str], None] = lambda text: None,
     limits: Limits | None = None,
+    look: Callable[[], None] = lambda: None,
+    may_fail: bool = False,
 ) -> list[Any]:
-    """Make the tasks that are not kept in `folder`; return what each has found, or a `Failure`.
+    """Make the tasks that are not kept in `folder`; return their results.
 
-    In the end those of other tasks are removed from it.
+    In the end the folders of other tasks are removed from it.
 
     Parameters
     ----------
@@ -106,8 +110,17 @@ def made(
     folder : Path
         Each has a folder of its own in it.
     announce : callable
-        Told what has ended.
+        Told which task has ended.
     limits : Limits, optional
+    look : callable
+        Called again and again; an exception of it ends all tasks.
+    may_fail : bool
+        Whether a task that failed has a `Failure` as its result.
+
+    Raises
+    ------
+    ChildProcessError
+        If a task fails that may not; the results of the others are kept.
     """
     limits, found = limits or Limits(), dict[int, Any]()
     places = [folder / _folder_name(task) for task in tasks]
@@ -123,36 +136,18 @@ def made(
 
     start_server()
     starts = [partial(_started, tasks[number], places[number], limits) for number in waiting]
-    watch_all(starts, ended, limits.jobs)
-    asked = {_folder_name(task) for task in tasks}
+    watch_all(starts, ended, limits.jobs, look)
     for other in folder.glob("*/task.json"):
-        if other.parent.name not in asked:
+        if other.parent not in places:
             rmtree(other.parent)
+    failed = [number for number in sorted(found) if isinstance(found[number], Failure)]
+    if failed and not may_fail:
+        raise ChildProcessError(f"{tasks[failed[0]].name}: {found[failed[0]].reason}")
     return [found[number] for number in range(len(tasks))]
 
 
-def all_made(
-    tasks: Sequence[Task],
-    folder: Path,
-    announce: Callable[[str], None] = lambda text: None,
-    limits: Limits | None = None,
-) -> list[Any]:
-    """Make tasks of which none may fail.
-
-    Raises
-    ------
-    ChildProcessError
-        If one does; what the others found is kept.
-    """
-    found = made(tasks, folder, announce, limits)
-    for task, one in zip(tasks, found, strict=True):
-        if isinstance(one, Failure):
-            raise ChildProcessError(f"{task.name}: {one.reason}")
-    return found
-
-
 def main(task_file: Path) -> None:
-    """Make the task of a file, and write beside it what was found, or why nothing was."""
+    """Make the task of a file, and write beside it the result, or why there is none."""
     die_with_parent()
     task = read_json(task_file)
     if task["guest"]:  # found from where the study was started
@@ -173,14 +168,14 @@ def _folder_name(task: Task) -> str:
 
 def _started(task: Task, place: Path, limits: Limits) -> Child:
     emptied(place)
-    own = all(map(is_built_in, task.solvers))
+    own = not task.fresh and all(map(is_built_in, task.solvers))
     write_json({**task.question(), "key": task.key(), "guest": not own}, place / "task.json")
     files = place / "task.json", place / "log.txt"
     return Child(__name__, *files, limits.timeout, limits.bytes, own=own)
 
 
 def _kept(task: Task, place: Path) -> Any:
-    """Return what was found; None if it is not there, damaged, or of another question or code."""
+    """Return a result that is kept; None if it is missing, damaged, or of another call or code."""
     try:
         content = read_json(place / _FOUND)
         if content.get("key") != task.key():

@@ -1,4 +1,4 @@
-"""Work of a run: what waits, what runs, what is done; solves, comparisons and drawings."""
+"""Work of a run: solves, comparisons and drawings that wait, run or are done."""
 
 import os
 from bisect import insort
@@ -12,7 +12,7 @@ from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line
 from verify.result import FORECAST, LOG, CaseResult, SolveRecord, Status, write_result
-from verify.runner.child import POLL_SECONDS, Ending, death
+from verify.runner.child import POLL_SECONDS, Child, Ending, death
 from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
 from verify.runner.cost import forecast_text
 from verify.runner.directory import (
@@ -26,7 +26,7 @@ from verify.runner.directory import (
     store_record,
     stored_record,
 )
-from verify.runner.engines import ClusterEngine, Engine, LocalEngine, Running
+from verify.runner.engines import ClusterEngine, LocalEngine, RemoteSolve
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.plan import (
     CasePlan,
@@ -39,6 +39,8 @@ from verify.runner.plan import (
 from verify.runner.references import REFERENCE, ReferenceBundle, ReferenceCache
 from verify.runner.selection import Options
 from verify.scene import RatioCheck, Scene, scene_content
+
+Running = Child | RemoteSolve
 
 
 class Families:
@@ -93,27 +95,27 @@ class Families:
 
 
 class Progress(Protocol):
-    """Who is told how the run goes."""
+    """Receiver of the progress of a run."""
 
     def planned(self, solves: int, cases: int) -> None:
-        """Say how much there is to do, as far as it is known; said again when that changes."""
+        """Report how much there is to do; repeated when that changes."""
         ...
 
     def started(self, label: str) -> None:
-        """Say that a solve or a comparison begins."""
+        """Report that a solve or a comparison begins."""
         ...
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
-        """Say that a solve ended."""
+        """Report that a solve ended."""
         ...
 
     def judged(self, result: CaseResult) -> None:
-        """Say that a case is compared and judged."""
+        """Report that a case is compared and judged."""
         ...
 
 
 class Work:
-    """The state of a run: what waits, what runs, what is done."""
+    """The state of a run."""
 
     def __init__(
         self,
@@ -146,7 +148,7 @@ class Work:
         self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
         limits = options.timeout, self.memory
         self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
-        self.engine: Engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
+        self.engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
 
     def until_done(self, check: Callable[[], None]) -> list[CaseResult]:
         """Run everything; kill what runs if that fails, or if `check`, called in turn, raises."""

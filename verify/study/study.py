@@ -23,7 +23,7 @@ from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.runner import Options, Progress, run_cases
 from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import cache_folder, digest_of
-from verify.runner.tasks import Limits, Task, all_made, made
+from verify.runner.tasks import Limits, Task, made
 from verify.scene import Scene
 from verify.solution import Solution, read_solution
 
@@ -211,16 +211,15 @@ class Making:
             Its name; parts are kept in ``NAME-parts``.
         tasks : sequence of Task
         may_fail : bool
-            Whether a part that failed is a `Failure` among the others.
+            Whether a part that failed has a `Failure` as its result.
 
         Raises
         ------
         ChildProcessError
-            If a part fails that may not; what the others found is kept.
+            If a part fails that may not; the results of the others are kept.
         """
-        make = made if may_fail else all_made
-        folder = self.out / f"{study}-parts"
-        return make(tasks, folder, self.announce, Limits(self.processes))
+        folder, limits = self.out / f"{study}-parts", Limits(self.processes)
+        return made(tasks, folder, self.announce, limits, may_fail=may_fail)
 
     def run(
         self,
