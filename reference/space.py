@@ -15,8 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from reference.installation import create_simplex_mesh
 from reference.meshing import ConformingMesh
-from reference.meshing.opening import measures
-from verify.geometry.simplices import mesh_edges
+from verify.geometry.simplices import measures, mesh_edges
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]

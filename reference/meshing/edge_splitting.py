@@ -14,10 +14,10 @@ from verify.geometry.simplices import mesh_edges, nearest_parts
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
-_EXPONENT = {2: 0.8, 3: 2 / 3}  # of element sizes around what is singular, see `Grading`
+_EXPONENT = {2: 0.8, 3: 2 / 3}  # of element sizes around singularities, see `Grading`
 _RADIUS = 1 / 8  # of the body: within that distance a given mesh is graded
 _SMALLEST = 1e-9  # of the radius of the grading: nearer, distances of file coordinates are noise
-_LONGEST = {2: 1.5, 3: 2.0}  # longest edge of a cell over the mean edge, the size that is asked for
+_LONGEST = {2: 1.5, 3: 2.0}  # longest edge of a cell over the mean edge, the wanted size
 _SHRINK = 0.25  # of one ring around a singular point to the next
 _SAME = 1e-10  # of the body's size: a node closer than that to a singular point is on it
 # area over the square of the longest edge, at most, of a flat triangle: an angle that no mesh
@@ -187,8 +187,8 @@ def graded_to(
     """Bisect cells until h(r) = size · (r/R)^β around singular points or lines.
 
     R is an eighth of the body. Longest edges are halved, neighbours first where these have a
-    longer one (Rivara, Int. J. Num. Meth. Eng. 20, 1984), so shapes stay bounded. β is that of
-    `Grading`: 0.8 in the plane, ⅔ in space.
+    longer one (Rivara, Int. J. Num. Meth. Eng. 20, 1984), so shapes stay bounded. β, as of
+    `Grading`, is 0.8 in the plane and ⅔ in space.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def _longest_to_split(
     """Edges (e, 2) that are the longest of all cells around them, on the way to large cells.
 
     And which cells (m,) were looked at: they hold all that have one of the edges. Nodes are `away`
-    (n,) from what is singular, m: the large cells are near it, and so is what has to be split.
+    (n,) from the singularity, m: the large cells and all cells to be split are near it.
     """
     near, reach = away[cells].min(axis=1), float(away[cells[large]].max())
     while True:

@@ -265,7 +265,7 @@ def check_separation(features: list[Feature], size: float, where: str) -> None:
     Raises
     ------
     InputError
-        Saying which two, their distance and what is resolved; or that they lie on each other,
+        With the two, their distance and the least that is resolved; or if they lie on each other,
         or at an angle of less than about 5e-4, over a length.
     """
     # first: points at which parts touch tangentially are roots of rounding as crossings, 5e-9 off
@@ -331,7 +331,7 @@ def _off_ends(
 
 
 def _check_no_overlap(features: list[Feature], size: float, where: str) -> None:
-    """Refuse two features that stay closer than what is resolved over a length."""
+    """Refuse two features that stay closer than the resolution over a length."""
     for one, other in permutations(features, 2):
         if one.name == other.name == "the boundary" or one.gap(other) > _RESOLVED * size:
             continue
@@ -372,8 +372,8 @@ def _foot(feature: Feature, point: NDArray[np.float64]) -> NDArray[np.float64]:
 def _strip_cells(features: list[Feature], size: float, share: float) -> float:
     """Estimate how many cells the strips between close features take.
 
-    With cells of `share` times the sum of the distances to both features, the integral of
-    1/h² across the pair is 2/(share² gap) and a cell covers √3/4 h².
+    Cells have `share` times the sum of the distances to both features. The integral of 1/h²
+    across the pair is then 2/(share² gap), and a cell covers √3/4 h².
 
     Parameters
     ----------

@@ -6,9 +6,9 @@ conforming mesh is had that differs from an unfitted one by nothing but the cut 
 of a method that cuts through its elements. Slivers are left as they come.
 
 A realised cut of elements has its corners on edges of the mesh. These become nodes and halve all
-cells around them, after which the triangles are facets, or flat groups of them are the same
-polygons divided otherwise. Where two cuts cross within a cell there are corners elsewhere: then all
-are imprinted like any plane polygons, which splits more cells.
+cells around them. The triangles are then facets, or flat groups of them are the same polygons
+divided otherwise. Where two cuts cross within a cell there are corners elsewhere: then all are
+imprinted like any plane polygons, which splits more cells.
 """
 
 from itertools import pairwise, permutations
@@ -21,10 +21,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reference.meshing.edge_splitting import barycentric, loosen_front, split_edges
-from reference.meshing.opening import cell_facets, inner_facets, measures
+from reference.meshing.opening import cell_facets, inner_facets
 from verify.errors import InputError
 from verify.geometry.planar import inside_polygon
-from verify.geometry.simplices import distance_to_outline, mesh_edges, oriented
+from verify.geometry.simplices import distance_to_outline, measures, mesh_edges, oriented
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
@@ -371,8 +371,8 @@ class Realised(NamedTuple):
     facets : (…, 3) array
         Nodes of the *interior* facets along the triangles.
     fitted : bool
-        Whether every triangle lies within one cell of the given mesh, as those of an element-wise
-        cut of that mesh do.
+        Whether every triangle lies within one cell of the given mesh, as the facets of an
+        element-wise cut of that mesh do.
     """
 
     points: Array
@@ -491,7 +491,7 @@ def _shares(corners: Array, x: Array) -> Array:
 
 
 def _as_facets(mesh: Mesh, wanted: Cells) -> tuple[Cells, Cells]:
-    """Facets of the mesh that are triangles, or fill flat groups of them; and what is left."""
+    """Facets of the mesh that are triangles, or fill flat groups of them; and the other ones."""
     points, cells, _ = mesh
     touched = np.zeros(len(points), dtype=bool)
     touched[wanted] = True

@@ -1,10 +1,10 @@
 """Lines and planes that a mesh has to follow beside cuts: interfaces, and ends of parts.
 
-An inequality begins or ends where both sides of one of its comparisons are equal. Where that is a
-line, a circle or a plane, its part inside the body at which the material changes is imprinted on
-the reference's mesh: cells lie on either side of it. Other interfaces run through cells. Supports
-and tractions end along lines on a box and on the boundary of a given mesh; of that the lines too at
-which cuts end, to which a graded reference is graded.
+An inequality begins or ends where both sides of one of its comparisons are equal. Of a line, a
+circle or a plane, the part inside the body at which the material changes is imprinted on the
+reference's mesh: cells lie on either side of it. Other interfaces run through cells. Supports and
+tractions end along lines on a box and on the boundary of a given mesh. On that boundary the lines
+at which cuts end count too: a graded reference is graded to them.
 """
 
 from collections.abc import Callable
@@ -321,8 +321,8 @@ def split_at_part_ends(
 ) -> tuple[Array, Cells, Cells]:
     """Split the edges of boundary facets in which a support or traction ends.
 
-    Facets then lie on a part or beside it, and so do those of every refinement: the reference
-    holds the part itself. Curved ends stay inside facets.
+    Facets then lie on a part or beside it, in every refinement too: the reference holds the part
+    itself. Curved ends stay inside facets.
 
     Parameters
     ----------

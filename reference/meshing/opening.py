@@ -9,8 +9,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
+from verify.geometry.simplices import measures
 
-_SPECK = 1e-4  # size across over that of the body, below which an inner part is a speck
+_TINY = 1e-4  # of the body's size: an inner part less than that across stays joined
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class ConformingMesh:
         Cell and opposite corner of each facet on the outer boundary (faces of the cut are not).
     cut_facets : (f, k) int array
         Nodes before opening of each facet of the cut.
-    specks : (s,) float array
-        Measures (m^k) of parts of round-off size that were left joined to a neighbour, over that
-        of the body.
+    tiny_parts : (s,) float array
+        Measures (m^k) of inner parts that were left joined to a neighbour as they are tiny, over
+        the body's.
     """
 
     points: NDArray[np.float64]
@@ -41,7 +42,7 @@ class ConformingMesh:
     parent: NDArray[np.int64]
     boundary: NDArray[np.int64]
     cut_facets: NDArray[np.int64]
-    specks: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    tiny_parts: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def dimension(self) -> int:
@@ -132,7 +133,7 @@ def interior_facets(
 
 
 def inner_facets(cells: NDArray[np.int64], facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Keep those of some facets (f, d) that two cells share, ascending, each once."""
+    """Keep the facets (f, d) that two cells share, ascending, each once."""
     facets = np.unique(np.sort(facets, axis=1), axis=0)
     keys, wanted = _facet_keys(cell_facets(cells), facets)
     values, times = np.unique(keys, return_counts=True)
@@ -148,8 +149,8 @@ def open_cut(
     after the first gets a fresh node. Tips and fronts stay closed, mouths open, and a junction
     gets as many nodes as there are sectors, without being told which is which.
 
-    A part inside the body that is less than a ten-thousandth of it across, as between three cuts
-    that miss a common point, stays joined to the part with which it shares the largest face.
+    An inner part less than a ten-thousandth of the body across stays joined to the part with which
+    it shares the largest face. Three cuts that miss a common point make such parts.
 
     Parameters
     ----------
@@ -168,17 +169,17 @@ def open_cut(
     k = cells.shape[1] - 1
     cut_facets = np.asarray(cut_facets, dtype=np.int64).reshape(-1, k)
     first, second, is_cut, outer = interior_facets(cells, cut_facets)
-    is_cut, specks = _without_specks(points, cells, (first, second, is_cut, outer))
+    is_cut, tiny = _without_tiny_parts(points, cells, (first, second, is_cut, outer))
 
     opened, parent = _opened(cells, first[~is_cut], second[~is_cut])
     boundary = np.column_stack(np.divmod(outer, k + 1))
     facets = np.unique(cell_facets(cells)[first[is_cut]], axis=0)
-    mesh = ConformingMesh(points[parent], opened, parent, boundary, facets, specks)
+    mesh = ConformingMesh(points[parent], opened, parent, boundary, facets, tiny)
     _check_opening(mesh, len(outer))
     return mesh
 
 
-def _without_specks(
+def _without_tiny_parts(
     points: NDArray[np.float64],
     cells: NDArray[np.int64],
     found: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]],
@@ -197,25 +198,15 @@ def _without_specks(
     size /= size.sum()
     inner = np.ones(count, dtype=bool)
     inner[part[outer // (k + 1)]] = False
-    specks = np.flatnonzero(inner & (size < _SPECK**k))
+    tiny = np.flatnonzero(inner & (size < _TINY**k))
     is_cut = is_cut.copy()
-    for speck in specks:
-        ours = np.flatnonzero(is_cut & ((part[one] == speck) != (part[other] == speck)))
-        beside = np.where(part[one[ours]] == speck, part[other[ours]], part[one[ours]])
+    for own in tiny:
+        ours = np.flatnonzero(is_cut & ((part[one] == own) != (part[other] == own)))
+        beside = np.where(part[one[ours]] == own, part[other[ours]], part[one[ours]])
         faces = measures(points[cell_facets(cells)[first[ours]]])
         neighbour = np.bincount(beside, faces).argmax()
         is_cut[ours[beside == neighbour]] = False
-    return is_cut, size[specks]
-
-
-def measures(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Measures (m,) of simplices (m, k + 1, d), in m^k."""
-    edges = corners[:, 1:] - corners[:, :1]
-    if edges.shape[1] == edges.shape[2]:
-        return np.asarray(np.abs(np.linalg.det(edges)) / (2 if edges.shape[1] == 2 else 6))
-    if edges.shape[1] == 1:
-        return np.asarray(np.linalg.norm(edges[:, 0], axis=1))
-    return np.asarray(0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1))
+    return is_cut, size[tiny]
 
 
 def doubled_nodes(cells: NDArray[np.int64], cut_facets: NDArray[np.int64]) -> NDArray[np.int64]:

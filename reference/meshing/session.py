@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 _MESHED = 2e-9
 _SMALLEST = 1e-12  # of the grading radius: nearer, coordinates do
 _SAME = 1e-9  # of the body: points that close are one
-_DOMAIN = 0.4  # of the way from a tip to what is next: the smallest domain of an integral
+_DOMAIN = 0.4  # of the way from a tip to the next feature: the smallest domain of an integral
 _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
 
 
@@ -42,8 +42,8 @@ _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matt
 class Grading:
     """Element size h(r) = size · min(1, (r/radius)^exponent) around singular points.
 
-    With exponent 0.8 quadratic elements reach their full order at a crack tip (h ∝ r^β with
-    β > 1 − λ/p, λ = ½, p = 2). The smallest size is where h(r) = r.
+    With exponent 0.8 quadratic elements reach their full order at a crack tip: h ∝ r^β,
+    β > 1 − λ/p; λ = ½, p = 2. The smallest size is where h(r) = r.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Grading:
         return float(self.radius * max(ratio ** (1 / (1 - self.exponent)), _SMALLEST))
 
     def meshed(self, extent: float) -> float:
-        """Size that gmsh is asked for at a singular point of a body that long, m; rings go on."""
+        """Size for gmsh at a singular point of a body that long, m; rings refine it further."""
         return max(self.smallest, extent * _MESHED)
 
     def halved(self, level: int) -> "Grading":
@@ -122,7 +122,7 @@ class Grading:
         return found
 
     def smallest_at(self, clear: float, extent: float) -> float:
-        """Element size that gmsh is asked for at a point that is graded to from `clear` on, m."""
+        """Element size for gmsh at a point to which the mesh is graded from `clear` on, m."""
         return max(clear * self.share ** (1 / (1 - self.exponent)), extent * _MESHED)
 
 
@@ -152,7 +152,7 @@ def singular_points(scene: Scene) -> Array:
 
 
 def clear_radii(scene: Scene, points: Array) -> Array:
-    """Distance (k,) from singular points to what is next to them, m, where a domain must fit.
+    """Distance (k,) from singular points to the nearest feature, m, where a domain must fit.
 
     That is at tips whose stress intensity the scene asks for; it is infinite elsewhere.
     """

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import loosen_front
 from reference.meshing.inner_lines import clamped_edges, part_lines, solid_interfaces
-from reference.meshing.opening import ConformingMesh, measures, open_cut
+from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.session import (
     Grading,
     add_polygon,
@@ -23,6 +23,7 @@ from reference.meshing.session import (
     simplices,
 )
 from verify.errors import InputError
+from verify.geometry.simplices import measures
 from verify.scene import Box, Scene
 
 Array = NDArray[np.float64]

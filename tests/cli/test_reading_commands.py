@@ -14,7 +14,7 @@ from command_line import run_here
 from scenes import catalogue
 
 from verify.cli import build_parser, main, progress
-from verify.cli.progress import Waiting, said_to_wait
+from verify.cli.progress import Waiting, waiting_reported
 from verify.cli.run import of_one_solver, of_solvers
 from verify.cli.streams import print_line, printable_streams
 from verify.scene import list_cases
@@ -242,7 +242,7 @@ def test_after_a_word_the_next_silence_is_as_short_as_the_first(monkeypatch):
 
 
 def test_nothing_is_said_of_what_is_soon_done(capsys):
-    with said_to_wait(sys.stderr, "a little thing"):
+    with waiting_reported(sys.stderr, "a little thing"):
         time.sleep(0.1)
     assert capsys.readouterr().err == ""
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 from surface_measures import sphere
 
-from verify.compare.simplices import measures
+from verify.geometry.simplices import measures
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.simulator.surfaces import SurfaceCollider

@@ -31,7 +31,7 @@ examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line `argv` (default: that of the process) and return its exit code."""
+    """Run the command line `argv` (default: ``sys.argv``) and return its exit code."""
     pin_to_one_thread()
     with printable_streams():
         return _run(argv)
@@ -46,7 +46,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except (InputError, UnsupportedSceneError) as error:
         return _fail(str(error), 2)
     except ModuleNotFoundError as error:
-        if error.name not in ("numba", "pyvista"):  # all else that may be missing is asked for
+        if error.name not in ("numba", "pyvista"):  # others are checked where they are needed
             raise
         missing = f"{error.name}, which is not installed: python -m pip install {error.name}"
         return _fail(f"this command needs {missing}", 3)

@@ -33,7 +33,7 @@ def _cache() -> "ReferenceCache":
 
 
 def list_(*, as_json: AsJson = False) -> int:
-    """What is kept."""
+    """List the references that are kept."""
     cache = _cache()
     rows: list[dict[str, Any]] = [
         {

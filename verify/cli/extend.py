@@ -118,7 +118,7 @@ def import_(
       verify import statics/f3_inclined f3 --solver freefem --out run
       verify import statics/f3_inclined f3 --solver freefem --beside xfem --out run
 
-    Exit codes are those of `verify run`.
+    Exit codes as of `verify run`.
     """
     from verify.cli.progress import progress_on
     from verify.cli.ranking import rank_run
@@ -178,14 +178,14 @@ def conform(
 
     if ":" not in solver:
         start_server()  # it loads while this process does
-    from verify.cli.progress import said_to_wait
+    from verify.cli.progress import waiting_reported
     from verify.cli.run import of_one_solver
     from verify.conformance import conform, exit_code_of
     from verify.solvers.interface import one_name, parameters_of, solver_in
 
     name = one_name(solver)
     given = parameters_of(name, {solver_in(name): of_one_solver(parameters)})
-    with said_to_wait(sys.stderr, f"conformance of {name}"):
+    with waiting_reported(sys.stderr, f"conformance of {name}"):
         results = conform(name, given, timeout, checks)
     code = exit_code_of(results)
     if as_json:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from verify.scene import Scene
 
 
-_UNWRAPPED = 10_000  # columns of what is no terminal: one line per case, for grep
+_UNWRAPPED = 10_000  # columns where there is no terminal: one line per case, for grep
 _AS_IT_IS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
@@ -113,7 +113,7 @@ def describe(
 
 
 def _description(scene: "Scene") -> str:
-    """Return the case in words: requirement, body, cuts, supports, loads, what is judged."""
+    """Return the case in words: requirement, body, cuts, supports, loads, checks."""
     from verify.scene import scene_hash
 
     parts: list[tuple[str, list[str]]] = [
@@ -262,7 +262,7 @@ def check(
 
 
 def _checked(file: str, options: "Options") -> dict[str, Any]:
-    """Return what is said of a file, whether good or bad."""
+    """Return the checks of a file as plain values."""
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
@@ -327,12 +327,12 @@ def report(
       verify report out
       verify report out --format markdown
     """
-    from verify.cli.progress import said_to_wait
+    from verify.cli.progress import waiting_reported
     from verify.report.rendering import render
     from verify.report.study_page import render_study, studies_in
 
     if (directory / "run.json").is_file():
-        with said_to_wait(sys.stderr, f"the report of {directory}"):
+        with waiting_reported(sys.stderr, f"the report of {directory}"):
             page = render(directory, form)
         print(f"report: {page}")
         return 0

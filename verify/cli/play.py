@@ -113,7 +113,7 @@ def _check_outputs(out: Path | None, window: bool, frames: int, records: Path | 
 def _played(
     stage: "Stage", scene: "Scene", out: Path | None, count: int, zoom: float, records: Path | None
 ) -> dict[str, Any]:
-    """Play without a window, write what is asked for, and return the summary."""
+    """Play without a window, write the files, and return the summary."""
     from verify.files import asked_place, write_whole
     from verify.simulator import PHASES, Session, quality_of
     from verify.simulator.animation import Frame

@@ -1,4 +1,4 @@
-"""Progress of a run: bars on a terminal, plain lines elsewhere; what is waited for, in lines."""
+"""Progress of a run: bars on a terminal, plain lines elsewhere; waits, in lines."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -16,13 +16,13 @@ _FIRST, _LONGEST = 2.0, 60.0  # s of silence before the first line, and before a
 
 
 class Waiting:
-    """A thread that says what is waited for after 2 s without a word, then ever more seldom.
+    """A thread that reports a wait after 2 s without a line, then ever more seldom.
 
     Parameters
     ----------
     stream : TextIO
     doing : callable
-        Returns what is being done; empty: nothing is said.
+        Returns the current work in words; empty: no line.
     """
 
     def __init__(self, stream: TextIO, doing: Callable[[], str]) -> None:
@@ -33,7 +33,7 @@ class Waiting:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """Write a line; what is waited for now has begun."""
+        """Write a line, and wait 2 s for the next again."""
         with self._changed:
             self._write(text)
             self._patience = _FIRST
@@ -63,8 +63,8 @@ class Waiting:
 
 
 @contextmanager
-def said_to_wait(stream: TextIO, what: str) -> Iterator[None]:
-    """Say on `stream` that `what` is being done, for as long as it takes more than 2 s."""
+def waiting_reported(stream: TextIO, what: str) -> Iterator[None]:
+    """Report on `stream` that `what` is being done, if it takes more than 2 s."""
     begun = monotonic()
     waiting = Waiting(stream, lambda: f"{what} ({monotonic() - begun:.0f} s)")
     try:
@@ -74,10 +74,10 @@ def said_to_wait(stream: TextIO, what: str) -> Iterator[None]:
 
 
 class ClosableProgress(Progress, Protocol):
-    """A progress display that is told of what is no solve too, and can leave the screen."""
+    """A progress display for other work than solves too, which can leave the screen."""
 
     def doing(self, what: str) -> None:
-        """Take note of what is done from now on, before or after the solves."""
+        """Note the work that begins, before or after the solves."""
         ...
 
     def say(self, text: str) -> None:
@@ -91,7 +91,7 @@ class ClosableProgress(Progress, Protocol):
 
 @contextmanager
 def progress_on(stream: TextIO, expected: str = "") -> Iterator[ClosableProgress]:
-    """Give bars if `stream` is a terminal, else lines; say what is expected as the work begins."""
+    """Give bars if `stream` is a terminal, else lines; write `expected` as the work begins."""
     display: ClosableProgress = (_Bars if stream.isatty() else _Lines)(stream, expected)
     try:
         yield display
@@ -119,7 +119,7 @@ def _case_text(result: CaseResult) -> str:
 
 
 class _Lines:
-    """One line per finished solve and case, and for what is waited for."""
+    """One line per finished solve and case, and for waits."""
 
     def __init__(self, stream: TextIO, expected: str) -> None:
         self.expected, self.done, self.total = expected, 0, 0
@@ -156,7 +156,7 @@ class _Lines:
 
 
 def _oldest(running: dict[str, float]) -> str:
-    """Return what has been under way for longest, with its seconds, and how much is beside it."""
+    """Return the longest work under way, with its seconds, and the number of others."""
     under_way = dict(running)  # another thread changes it
     if not under_way:
         return ""
@@ -166,7 +166,7 @@ def _oldest(running: dict[str, float]) -> str:
 
 
 class _Bars:
-    """A bar over the solves, with what runs now, above it what went wrong."""
+    """A bar over the solves, with the one that runs now; failures above it."""
 
     def __init__(self, stream: TextIO, expected: str) -> None:
         from rich.console import Console

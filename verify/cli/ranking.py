@@ -46,7 +46,7 @@ def rank_run(
     timeout : float
         Wall seconds of a solve of the run; of the suite's small ones at most 120.
     announce : callable
-        Is told what is being done.
+        Told which solver is checked.
 
     Returns
     -------

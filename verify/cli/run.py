@@ -149,7 +149,7 @@ def run(
       3  a solve failed, timed out, ran out of memory, or could not be stored
       4  nothing ran: no case matches, or every solver refused
       5  with --strict: something is UNDECIDED, refused, warned of, or without any verdict
-      128+n  stopped by signal n (130: Ctrl-C); what is finished stays
+      128+n  stopped by signal n (130: Ctrl-C); finished solves stay
     """
     if not asked.solvers or any(":" not in name for name in asked.solvers):
         from verify.processes import start_server
@@ -305,7 +305,7 @@ def _drawings(beside: bool) -> Iterator[Path | None]:
 
 
 def _load_report() -> None:
-    with contextlib.suppress(Exception):  # it is said when the report is to be written
+    with contextlib.suppress(Exception):  # reported when the report is to be written
         import_module("verify.report.rendering").load()
 
 

@@ -22,7 +22,7 @@ def costs_of(scene: Scene, options: Options) -> list[LevelCost]:
 
 
 def case_lines(costs: Sequence[LevelCost]) -> list[str]:
-    """Return a line per solver, and one for the whole; none for what is not estimated."""
+    """Return a line per solver, and one for the whole; none without an estimate."""
     if not costs:
         return []
     lines = []

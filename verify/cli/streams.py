@@ -35,7 +35,7 @@ class _Printable:
 
 @contextmanager
 def printable_streams() -> Iterator[None]:
-    """Filter what is printed meanwhile: titles, reasons and names come from others' files."""
+    """Filter the output of the block: titles, reasons and names come from others' files."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (stream if stream is None else _Printable(stream) for stream in before)
     try:

@@ -25,10 +25,11 @@ from verify.compare.body import Body
 from verify.compare.cell_tree import morton_order
 from verify.compare.locate import Field, squares
 from verify.compare.simplex_bodies import SimplexBody
-from verify.compare.simplices import bisect, heights, in_frames, measures, points_in, split_at_level
+from verify.compare.simplices import bisect, heights, in_frames, points_in, split_at_level
 from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
+from verify.geometry.simplices import measures
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,9 @@ from verify.compare.body_rule import graded_breaks
 from verify.compare.cell_tree import morton_order
 from verify.compare.sides import nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
-from verify.compare.simplices import divide, measures, points_in, split_at_level
+from verify.compare.simplices import divide, points_in, split_at_level
 from verify.geometry.patches import Patch, PlanePatch
+from verify.geometry.simplices import measures
 
 Array = NDArray[np.float64]
 

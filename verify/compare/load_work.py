@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.mass import boundary_facets, shape_functions
-from verify.compare.simplices import facet_nodes, measures, simplex_rule
+from verify.compare.simplices import facet_nodes, simplex_rule
 from verify.errors import InputError
+from verify.geometry.simplices import measures
 from verify.scene import BodyForce, Scene, Traction
 from verify.scene.parts import Pieces, held_nodes, pieces_on_part
 from verify.scene.physics import PrescribedMotion, factor_at, jumps

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import build_cell_tree, holding_cells
 from verify.compare.locate import nearest_of_triangles
 from verify.compare.sides import distance_to_segments, nearest_segments
-from verify.compare.simplices import measures, simplices, triangle_frames
+from verify.compare.simplices import simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.geometry.patches import Patch, PlanePatch
-from verify.geometry.simplices import feet, rim_edges
+from verify.geometry.simplices import feet, measures, rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.geometry import Box, MeshFile

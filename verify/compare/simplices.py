@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
+from verify.geometry.simplices import measures
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -224,21 +225,6 @@ def points_in(corners: Array, order: int) -> tuple[Array, Array]:
 # A corner whose level is below this share of the largest is on the surface: round-off.
 _ON = 1e-14
 _ROUNDS = 64  # of bisection: every edge could be halved 20 times
-
-
-def measures(corners: Array) -> Array:
-    """Lengths, areas or volumes (m,) of simplices (m, k + 1, d), k ≤ d."""
-    edges = corners[:, 1:] - corners[:, :1]
-    if edges.shape[1] == edges.shape[2]:
-        size: Array = np.abs(np.linalg.det(edges))
-    elif edges.shape[1:] == (2, 3):  # Gram's determinant is a square: it loses thin triangles
-        opposite = np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
-        apex, rows = np.argmax(opposite, axis=1), np.arange(len(corners))
-        at, after, before = (corners[rows, (apex + k) % 3] for k in range(3))
-        size = np.linalg.norm(np.cross(after - at, before - at), axis=1)  # of the shorter edges
-    else:
-        size = np.linalg.norm(edges[:, 0], axis=1)
-    return size / factorial(edges.shape[1])
 
 
 def heights(corners: Array) -> Array:

@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import connected_components
 
 from reference.exact import ExactSolution, exact_of
 from verify.compare.hooke import hooke
-from verify.compare.simplices import measures
 from verify.errors import UnsupportedSceneError
+from verify.geometry.simplices import measures
 from verify.scene import (
     Box,
     CutFaces,

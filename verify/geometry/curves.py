@@ -140,7 +140,7 @@ def closed_pieces(corners: Array) -> list[Piece]:
 
 
 def meeting_parameters(one: Piece, other: Piece) -> Array:
-    """Parameters (k,) on `one` of its points on `other`; those of an overlap's ends too."""
+    """Parameters (k,) on `one` of its points on `other`; of an overlap its ends."""
     match one, other:
         case Segment(), Segment():
             return _segment_segment(one, other)
@@ -199,7 +199,7 @@ def _arc_arc(one: Arc, other: Arc) -> Array:
 
 
 def _on_arc(arc: Arc, points: Array) -> Array:
-    """Parameters of those of `points` on the arc's circle that lie within its sweep."""
+    """Parameters of the `points` on the arc's circle that lie within its sweep."""
     offset = points - arc.centre
     turned = np.mod(np.arctan2(offset[:, 1], offset[:, 0]) - arc.start_angle, 2 * np.pi)
     turned = np.where(turned > 2 * np.pi - _END, 0.0, turned) / arc.sweep

@@ -139,7 +139,7 @@ class DiscPatch(_Flat):
     """
 
     semi_axes: tuple[float, float]
-    plane = False  # in its parameters: what is straight in space is not straight there
+    plane = False  # in its parameters: straight lines in space are not straight there
 
     @property
     def cells(self) -> Array:

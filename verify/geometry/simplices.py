@@ -40,13 +40,36 @@ def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
 
 def measures(simplices: Array) -> Array:
     """Lengths, areas, volumes (m,) of segments, triangles, tetrahedra (m, c, d); of a point 1."""
-    count = simplices.shape[1] - 1
-    if count in (0, simplices.shape[2]):
-        sides = simplices[:, 1:] - simplices[:, :1]
-        return np.abs(np.linalg.det(sides)) / factorial(count) if count else np.ones(len(sides))
-    edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
-    across = 0.5 * np.cross(*edges) if len(edges) == 2 else edges[0]
-    return np.asarray(np.linalg.norm(across, axis=1))
+    edges = simplices[:, 1:] - simplices[:, :1]
+    count, d = edges.shape[1:]
+    if count == 0:
+        return np.ones(len(edges))
+    if count == d:
+        size = np.abs(np.linalg.det(edges))
+    elif count == 2:  # Gram's determinant is a square: it loses thin triangles
+        opposite = np.linalg.norm(simplices[:, [2, 0, 1]] - simplices[:, [1, 2, 0]], axis=2)
+        apex, rows = np.argmax(opposite, axis=1), np.arange(len(simplices))
+        at, after, before = (simplices[rows, (apex + k) % 3] for k in range(3))
+        size = np.linalg.norm(np.cross(after - at, before - at), axis=1)  # of the shorter edges
+    else:
+        size = np.linalg.norm(edges[:, 0], axis=1)
+    return np.asarray(size / factorial(count))
+
+
+def boundary_facets(cells: Ints) -> tuple[Ints, Ints, Ints]:
+    """Facets (f, c − 1) that one cell (m, c) alone has; that cell (f,), the opposite corner (f,).
+
+    Nodes ascend in each facet, and facets are in lexicographic order. Corners are 0 … c − 1.
+    """
+    count, corners = cells.shape
+    facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)]))
+    key = facets[:, 0]
+    for column in facets.T[1:]:
+        key = key * (int(cells.max(initial=0)) + 1) + column
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
+    alone = order[first[np.diff(np.append(first, len(key))) == 1]]
+    return facets[alone], alone % count, alone // count
 
 
 def unit_normals(simplices: Array) -> Array:

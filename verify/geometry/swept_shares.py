@@ -1,9 +1,9 @@
 """Shares of the cut in the supports of nodes that a blade has swept, and when they begin to grow.
 
-A node is let go when its cut begins to be swept. The force that has held it is then multiplied by
-1 − s, with s(t) the swept share of ∫ N dA over the cut in its support: nothing is late, as s is a
-half when the blade is in the middle. Integrals are exact where the time of the blade is linear over
-a simplex of the cut: on straight parts of a path at one speed. Other cuts are divided.
+A node is released when its cut begins to be swept. Its tie force is then multiplied by 1 − s, with
+s(t) the swept share of ∫ N dA over the cut in its support. Nothing is late: s is a half when the
+blade is in the middle. Integrals are exact where the time of the blade is linear over a simplex of
+the cut: on straight parts of a path at one speed. Other cuts are divided.
 """
 
 from collections.abc import Callable
@@ -203,7 +203,7 @@ class SweptShares:
 
 
 def swept_measure(times: Array, sizes: Array, time: float) -> float:
-    """Sum up to a time what is swept of simplices of given sizes (e,), m² (in the plane m).
+    """Sum the swept parts of simplices of given sizes (e,) at a time, m² (in the plane m).
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def swept_measure(times: Array, sizes: Array, time: float) -> float:
 
 
 def _left(times: Array, values: Array, time: float) -> Array:
-    """Integral (e,) of a linear function over what is not swept yet of simplices at a time.
+    """Integral (e,) of a linear function over the unswept parts of simplices at a time.
 
     Of a triangle that is, from the middle corner on, the triangle at the last corner, and before
     all but the one at the first.

@@ -32,9 +32,9 @@ from verify.compare.load_work import (
 from verify.compare.locate import ROUND_OFF, Field, SolutionField
 from verify.compare.mass import consistent_mass, density_of, inertia_of, kinetic, separated_parts
 from verify.compare.motion import step_at
-from verify.compare.simplices import measures
 from verify.compare.support_work import taken_up
 from verify.errors import InputError, UnsupportedSceneError
+from verify.geometry.simplices import measures
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.acceptance import Quantity, ReactionQuantity, SectionQuantity, StressQuantity
 from verify.scene.parts import Pieces, clipped

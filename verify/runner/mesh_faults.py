@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
-from verify.geometry.simplices import feet, measures
+from verify.geometry.simplices import boundary_facets, feet, measures
 from verify.result import Notice, NoticeKind
 from verify.scene import Gravity, MeshFile, Scene, Traction, read_mesh
 from verify.scene.geometry import GROUP
@@ -234,16 +234,8 @@ class _Skin:
         self.points, self.cells = points, cells
         self.membrane = cells.shape[1] == points.shape[1]
         self.size = float(np.ptp(points, axis=0).max())
-        corners, count = cells.shape[1], len(points)
-        facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)]))
-        key = facets[:, 0]
-        for column in facets.T[1:]:
-            key = key * count + column
-        order = np.argsort(key, kind="stable")
-        first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
-        alone = order[first[np.diff(np.append(first, len(key))) == 1]]
-        self.facets, self.behind = facets[alone], alone % len(cells)  # (f, k − 1), (f,)
-        self.opposite = cells[self.behind, alone // len(cells)]
+        self.facets, self.behind, corner = boundary_facets(cells)  # (f, k − 1), (f,)
+        self.opposite = cells[self.behind, corner]
 
     @cached_property
     def nodes(self) -> Ints:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import on_simplices
+from verify.geometry.simplices import boundary_facets, on_simplices
 from verify.read_mesh import RawMesh, base_of, dimension_of, read_raw
 from verify.scene.strict import nearest
 
@@ -313,20 +313,13 @@ def _parts(
         found[name] = {c: np.concatenate(some) for c, some in parts.items()}
     for name, nodes in raw.nodes.items():
         inside = np.isin(used, nodes)
-        facets = _boundary_facets(cells)
+        facets = boundary_facets(cells)[0]
         whole = facets[inside[facets].all(axis=1)]
         own = found.setdefault(name, {})
         own.setdefault(1, points[used[inside]][:, None])
         if len(whole):
             own.setdefault(k, points[used[whole]])
     return found
-
-
-def _boundary_facets(cells: Ints) -> Ints:
-    """Facets (f, k) that one cell alone has."""
-    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(cells.shape[1])]))
-    distinct, count = np.unique(facets, axis=0, return_counts=True)
-    return np.asarray(distinct[count == 1])
 
 
 def _oriented(points: Array, cells: Ints, where: str) -> tuple[Ints, int]:

@@ -14,6 +14,7 @@ from verify.errors import InputError
 from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
 from verify.geometry.simplices import (
     area_inside,
+    boundary_facets,
     distance_to_outline,
     distance_to_pieces,
     length_inside,
@@ -118,11 +119,8 @@ def part_without_facets(scene: SceneTables) -> str | None:
 
 def part_without_mesh(scene: SceneTables, points: Array, cells: Ints) -> str | None:
     """Which support or traction acts on no node or facet of a given mesh, (n, d) and (m, k)."""
-    corners = cells.shape[1]
-    rest = [[j for j in range(corners) if j != k] for k in range(corners)]
-    facets = np.sort(cells[:, rest].reshape(-1, corners - 1), axis=1)
-    distinct, count = np.unique(facets, axis=0, return_counts=True)
-    if not (count == 1).any():
+    facets = boundary_facets(cells)[0]
+    if not len(facets):
         acting = [
             f"supports[{i}]" for i, one in enumerate(scene.supports)
             if not scene.geometry.holds_inside(one.where)
@@ -133,7 +131,7 @@ def part_without_mesh(scene: SceneTables, points: Array, cells: Ints) -> str | N
                 f"{acting[0]}: the surface is closed and has no rim to act on; hold a group of its "
                 "triangles or nodes, or let the body move freely in a dynamic analysis"
             )
-    return _without_facets(scene, points[distinct[count == 1]], "")
+    return _without_facets(scene, points[facets], "")
 
 
 def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:

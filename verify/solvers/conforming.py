@@ -303,9 +303,9 @@ def _solution(
 ) -> Solution:
     mesh = space.mesh
     kind = "loose part of round-off size joined to its neighbour"
-    largest = float(mesh.specks.max(initial=0.0))
+    largest = float(mesh.tiny_parts.max(initial=0.0))
     record.regularisations += [
-        Regularisation(kind, len(mesh.specks), largest, "volume fraction of the body"),
+        Regularisation(kind, len(mesh.tiny_parts), largest, "volume fraction of the body"),
         *support_ends(scene, space, size),
         *across_interfaces(scene, mesh.points, mesh.cells),
     ]

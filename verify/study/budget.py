@@ -1,12 +1,11 @@
 """The budget study of a case: a chain of answers taken apart, and the choice among the models.
 
 Ends of cuts: linear elements without tip functions are too stiff at the end of a cut. Away from it
-their error is, to first order, what the displacement changes by when the end is moved (the
-derivative by its place, the only field that can come from there), so that an answer is that of a
-cut with other ends. How far these are off is a number of elements that depends on where the end
-falls among the nodes alone. Measured on a Griffith crack (docs/guide/studies.md), for an end that
-is realised on an edge of which the hindmost node lies `behind` it: two thirds of `behind`, and a
-third of an element more. An end that is made a node costs that third alone.
+their error is, to first order, the change of the displacement when the end is moved. The answer
+thus belongs to a cut with other ends. Their shift in elements depends only on where the end falls
+among the nodes. It was measured on a Griffith crack (docs/guide/studies.md). For an end realised on
+an edge whose hindmost node lies `behind` it: two thirds of `behind`, and a third of an element
+more. An end that is made a node costs that third alone.
 """
 
 from dataclasses import dataclass
@@ -211,8 +210,8 @@ def budget_study(
     Raises
     ------
     InputError
-        If `level` or `metric` is none of the scene, the scene is played and not solved, or
-        something without which there is no budget was not solved.
+        If `level` or `metric` is none of the scene, the scene is played and not solved, or a
+        solve that the budget needs failed.
     """
     if scene.played_only:
         raise InputError(scene.played_only, str(scene.file or scene.name))

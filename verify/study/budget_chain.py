@@ -40,7 +40,7 @@ REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
 
 
 # Of scenes, a place, solvers, their parameters and whether they are timed: solves all levels by
-# these solvers and no others. The place names what is kept of it; timed runs are repeated.
+# these solvers and no others. The place names the run directory; timed runs are repeated.
 type Solve = Callable[..., list[Solved]]
 
 _SAME = 1e-9  # of the body's size
@@ -97,7 +97,7 @@ class Chain:
 
 
 def is_realised_as_asked(scene: Scene, solution: Solution) -> bool:
-    """Say whether the cut of `solution` is that of `scene`, tips and all, to round-off."""
+    """Whether `solution` has the cut of `scene`, tips included, to round-off."""
     body = body_of(scene)
     if cut_deviation(solution, body) > _SAME * body.size:
         return False
@@ -421,7 +421,7 @@ def mean_wait(scene: Scene, body: AnyBody, solution: Solution) -> float | None:
     body : AnyBody
         With the cuts as asked.
     solution : Solution
-        Whose facets of the cut are those of its elements.
+        Whose facets of the cut belong to its elements.
 
     Returns
     -------

@@ -56,7 +56,7 @@ class Distances:
     scale: dict[str, Array]
 
     def of(self, name: str) -> tuple[Array, float]:
-        """Return a norm of each pair by each rule (pairs, rules), and that of the first field.
+        """Return a norm of each pair by each rule (pairs, rules), and the first field's norm.
 
         Over time all is held against the largest norm of the first field at any time: a
         vibration passes through zero.
@@ -121,7 +121,7 @@ class Answer:
     quantities : dict of str to (float, float)
         Value and half-width per quantity of interest; those it does not have are missing.
     norms : dict of str to float
-        Bound of the absolute norm of its own error, per norm; 0 for what is not a reference.
+        Bound of the absolute norm of its own error, per norm; 0 if it is no reference.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Coverage of the error bars: stated uncertainty of the reference against its true error.
 
-A trial is one reference on a case whose truth is known: what it states, and what is true.
+A trial is one reference on a case whose truth is known: its stated half-width and its true error.
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -31,7 +31,7 @@ from verify.study.study import Finding, Making, Study, held
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 _LEVELS = 3  # that a reference is made of
-# Relative errors below are those of the solve and of the quadrature, not of the elements
+# Relative errors below come from the solve and the quadrature, not from the elements
 _ROUND_OFF = 1e-10
 # A truth that is itself uncertain by more than this share of the error judges nothing
 _SURE = 0.1
@@ -247,10 +247,9 @@ def _verdict(own: Sequence[Trial], hits: Sequence[bool], asked: float) -> Verdic
 def binomial_tail(hits: Sequence[bool], scenes: Sequence[Hashable], share: float) -> float:
     """Return the probability of so few hits if each is one with probability `share`.
 
-    Hits of one scene are correlated. Their number and that of the trials are divided by the
-    design effect, the variance of the hit rate between scenes over the binomial one, at least 1
-    (J. N. K. Rao, A. J. Scott, A simple method for the analysis of clustered binary data,
-    Biometrics 48, 1992).
+    Hits of one scene are correlated. The numbers of hits and trials are divided by the design
+    effect: the variance of the hit rate between scenes over the binomial one, at least 1.
+    Rao, Scott, A simple method for the analysis of clustered binary data, Biometrics 48, 1992.
     """
     n, k = len(hits), sum(hits)
     if k == n:

@@ -33,7 +33,7 @@ def plane_scene(
     cut : dict
         One cut.
     at : float
-        Where the opening is asked for, as a fraction of the cut's length.
+        Place of the opening that is measured, as a fraction of the cut's length.
     """
     place = random_point(random, geometry, cut)
     opening = {"kind": "opening", "name": "opening", "at": at}
@@ -377,8 +377,8 @@ def _across(at: float, upper: list[float]) -> Content:
 def sudden_crack(random: Random) -> Content:
     """Return a crack of length 1 that opens suddenly in a plate under tension, at any angle.
 
-    Each end is that of a half-infinite crack until a pressure wave has come from the other one;
-    the boundary is half a length away or farther, and waves go there and back.
+    Each end behaves as the tip of a half-infinite crack until a pressure wave arrives from the
+    other one. The boundary is at least half a length away, and waves go there and back.
     """
     poisson = float(random.uniform(0.0, 0.4))
     angle = float(random.uniform(15.0, 45.0) * random.choice([-1.0, 1.0]))

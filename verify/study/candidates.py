@@ -71,9 +71,9 @@ def cheapest_adequate(
 ) -> tuple[Candidate | None, Finding]:
     """Return the fastest candidate whose error certainly is within `tolerance`, and say so.
 
-    The verdict is UNDECIDED if another adequate one may be as fast (their times overlap, or the
-    machine was loaded and they differ by less than a factor of two), or if one that is faster
-    may be adequate too (the interval of its error holds the tolerance).
+    The verdict is UNDECIDED if another adequate candidate may be as fast: their times overlap, or
+    differ by less than a factor of two on a loaded machine. It is UNDECIDED too if a faster one
+    may be adequate: the interval of its error holds the tolerance.
     """
     known = [c for c in candidates if not c.reason]
     adequate = sorted((c for c in known if c.high <= tolerance), key=lambda c: c.seconds)
@@ -131,7 +131,7 @@ def _of_the_others(
 
 _NONE = float("nan")
 _STANDARD = "trapezoidal, side-wise mass"
-# in words, and the parameters of the solver; what is left out by --quick comes last
+# in words, and the parameters of the solver; the last ones are left out by --quick
 _MOTIONS: list[tuple[str, dict[str, Any]]] = [
     ("implicit Euler, side-wise mass", {"scheme": "implicit_euler"}),
     ("central differences, side-wise mass", {"scheme": "central_differences"}),

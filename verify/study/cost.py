@@ -35,12 +35,12 @@ class CostStudy(Study):
         Per step of the cut: the error at which the solvers are compared, and per solver the
         time that it takes (median, least, most; s), None if it does not reach the error.
     running : dict of str to list of (float, float, float)
-        Time so far, per solver and step: what is paid once, and the steps; None from the first
-        step that a solver does not reach.
+        Time so far, per solver and step: the set-up, paid once, and the steps; None from the
+        first step that a solver does not reach.
     points : list of dict
         Every solve of the last step.
     front : list of (str, int)
-        Solver and level of those of them that no other beats in time and error.
+        Solver and level of the points that no other beats in time and error.
     left_out : list of dict
         Solves that failed or were refused, with reasons.
     contended : str
@@ -112,7 +112,7 @@ def cost_study(case: str, results: Sequence[CaseResult], metric: str) -> CostStu
 
 
 def _add(sums: list[_Times | None], step: _Times | None, once: float) -> None:
-    """Add a step to the sums of a solver, the first with what is paid once; None from then on."""
+    """Add a step to the sums of a solver, the first with its set-up; None from then on."""
     before = sums[-1] if sums else (once, once, once)
     if before is None or step is None:
         sums.append(None)

@@ -1,8 +1,8 @@
 """Iterations against error: solvers of motion that stop by a count, over iterations and substeps.
 
-Two errors are told apart. That of the iterations is the distance from the same steps, solved; that
-of the whole is the distance from the smallest steps, solved. Who solves them is a solver too, by
-default the same one with ``step=solved``; both answer on one mesh, and nodes are compared.
+Two errors are told apart. The iteration error is the distance from the same steps, solved; the
+whole error is the distance from the smallest steps, solved. A solver solves them too, by default
+the same one with ``step=solved``. Both answer on one mesh, and nodes are compared.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Grid:
-    """What is varied.
+    """The settings that are varied.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Setting:
     energy_drift : float or None
         Of the energy in play, by the energies of the scene's law.
     quantities : dict of str to float
-        Those of the scene.
+        Of the scene.
     seconds : float or None
         As the solver measures itself, first call apart.
     reason : str

@@ -23,7 +23,7 @@ from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import one_name, parameters_in, refusal_of, solver_in
 from verify.study.study import Finding, Making, Study, held
 
-AT_MOST = "energy_drift at most"  # with its uncertainty: that of a mass that is not declared
+AT_MOST = "energy_drift at most"  # with its half-width, from a mass that is not declared
 
 
 @dataclass(frozen=True)
@@ -244,7 +244,7 @@ def energy_study(
     making: Making,
     quick: bool = False,
 ) -> MeasuredStudy:
-    """Run every motion with every solver, and measure what is kept.
+    """Run every motion with every solver, and measure the conserved quantities.
 
     Parameters
     ----------

@@ -19,9 +19,9 @@ def step_by_running(
 ) -> tuple[float, float]:
     """Bracket the largest `time_step` at which a motion of `scene` does not blow up.
 
-    The body starts at rest, and its supports and loads act at once. A run has blown up where a
-    displacement is not finite or a thousand times the body's size, or the solver says so by an
-    error of arithmetic, value or run time. Others are faults, and raised.
+    The body starts at rest, and its supports and loads act at once. A run has blown up if a
+    displacement is not finite or above a thousand times the body's size. An ArithmeticError,
+    ValueError or RuntimeError of the solver counts as a blow-up too; other errors are raised.
 
     Parameters
     ----------

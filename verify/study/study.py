@@ -1,10 +1,9 @@
 """The shape of every study: what it solves, its rows, its findings, and the files of both.
 
 A study asks `Making` for its solves: scenes by the runner, single parts as tasks. Every solve and
-every part runs in a watched process with limits of time and memory, and is kept: a study that was
-stopped goes on where it was when it is asked for again. What it found is a `Study` with rows (a
-table) and findings (sentences with verdicts), written as versioned JSON and CSV and shown as a
-page by one renderer.
+every part runs in a watched process with limits of time and memory, and is kept: the same command
+resumes a study that was stopped. Its result is a `Study` with rows (a table) and findings
+(sentences with verdicts). It is written as versioned JSON and CSV, and one renderer makes a page.
 """
 
 import shutil
@@ -41,7 +40,7 @@ class Finding:
         The stated limit or the known result against which it is held.
     verdict : Verdict or None
         PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell or there
-        are none; None for what is only shown.
+        are none; None for a finding without a limit.
     """
 
     topic: str
@@ -190,9 +189,9 @@ class Making:
     out : Path
         Directory of the study.
     announce : callable
-        Told what is under way, and what has ended.
+        Told which parts begin and end.
     processes : int
-        Parts side by side; what is timed runs alone.
+        Parts side by side; timed solves run alone.
     progress : callable
         Gives the progress of a run of scenes.
     """
@@ -236,7 +235,7 @@ class Making:
         ----------
         scenes : sequence of Scene
         place : str
-            Run directory, below that of the study.
+            Run directory, below the study's own.
         solvers : sequence of str
         repetitions : int
         parameters : mapping, optional
@@ -276,7 +275,7 @@ class Making:
         return found
 
     def place_of(self, study: str, question: Any) -> str:
-        """Return the run directory of a question of a study; those of other ones are removed."""
+        """Return the run directory of a question of a study; remove those for other questions."""
         name = f"{study}-{digest_of(plain(question))[:8]}"
         for other in self.out.glob(f"{study}-????????"):
             if other.name != name and (other / "run.json").is_file():

@@ -114,7 +114,7 @@ def thesis_study(making: Making, quick: bool) -> ThesisStudy:
     Raises
     ------
     ChildProcessError
-        If a table cannot be measured; what is finished is kept.
+        If a table cannot be measured; finished parts are kept.
     """
     names, solvers = (CASES[:2], SOLVERS[:4]) if quick else (CASES, SOLVERS)
     scenes = [coarsest(load_scene(name), 2 if quick else 3) for name in names]

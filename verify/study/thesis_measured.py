@@ -38,7 +38,7 @@ class SliverSystem:
     size : float
         Distance of the cut from a layer of nodes, in element sizes.
     ratio : float
-        Critical explicit step over that of the uncut body.
+        Critical explicit step over the step of the uncut body.
     condition, scaled : float
         Condition number of the stiffness, and of the stiffness scaled by its diagonal.
     """
@@ -91,7 +91,7 @@ class MethodOnCase:
     energy : float or None
         Relative error of the strain energy.
     critical_step : float or None
-        Over that of the uncut mesh; None where the method has none or its mesh is not the
+        Over the step of the uncut mesh; None where the method has none or its mesh is not the
         background mesh.
     seconds : float or None
         Wall time of what each cut costs anew, median.
@@ -118,7 +118,7 @@ class MethodOnCase:
 
 @dataclass(frozen=True)
 class CriticalStep:
-    """Critical explicit step of a solver on a mesh level of a case, over that of the uncut mesh."""
+    """Critical explicit step of a solver on a level of a case, over the uncut mesh's."""
 
     case: str
     solver: str
@@ -202,7 +202,7 @@ def critical_steps(content: dict[str, Any], solvers: Sequence[str]) -> list[Crit
                 own, whole = with_uncut_twin(system, scene, level, {})
                 ratio = critical_step(own) / critical_step(whole)
             except (UnsupportedSceneError, InputError):
-                continue  # the solver has said why
+                continue  # the solve has the reason
             found.append(CriticalStep(name, solver, level, ratio))
     return found
 
