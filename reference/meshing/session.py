@@ -67,8 +67,8 @@ class Grading:
         Largest element at that place over its distance from the point.
     curves : bool
         In space: whether to grade to fronts, kinks and junctions of the cuts and to the edges
-        where supports end. With exponent ⅔, where quadratic elements reach order 3 in energy
-        around an edge, the unknowns grow by no more than h⁻³ (but for a logarithm).
+        where supports end. With exponent ⅔ quadratic elements reach order 3 in energy around an
+        edge. The unknowns grow by no more than h⁻³, but for a logarithm.
     fronts : sequence of (Front, float)
         In space: fronts that a domain must fit around, each with the radius of its smallest, m.
         There elements are as large as `share` of that radius, farther off of the distance.

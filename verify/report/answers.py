@@ -1,8 +1,8 @@
 """Answers of a run to the four questions: accuracy, energy, slivers, cost; each in one sentence.
 
 How large are the displacement errors, does the energy drift, what do slivers do, and what does
-accuracy cost? Numbers come from the results alone. An error and a time are compared with those of
-conforming elements (`BASELINE`) in the same case, where that was solved, since the error itself
+accuracy cost? Numbers come from the results alone. An error and a time are divided by the error
+and time of conforming elements (`BASELINE`) in the same case, if solved. The error itself
 depends on the case more than on the method. A median over cases carries the interval between the
 medians of the cases' lower and upper ends: whatever the truth of each case, its median lies there.
 """
@@ -20,7 +20,7 @@ from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, finest
 BASELINE = "conforming"
 _REFERENCE = "reference"
 _ERROR = "displacement_l2"
-_TAKERS = ("a blade", "damping")  # what is to take energy
+_TAKERS = ("a blade", "damping")  # sinks of energy that a case states
 _NAMED = 3  # solvers in a sentence
 _BEYOND = 0.1  # probability that a median lies outside its interval
 _PARAMETER = "epsilon"  # of a family of slivers, in elements
@@ -59,7 +59,7 @@ def answers(results: Sequence[CaseResult]) -> list[Answer]:
 
 
 def accuracy(results: Sequence[CaseResult]) -> Answer:
-    """Answer how large displacement errors are, beside those of conforming elements."""
+    """Answer how large displacement errors are, beside conforming elements."""
     question, found = "Accuracy", dict(_ratios(results, _error_ratio))
     if found:
         said = _compared(found, "has", "displacement error of {} at equal element size")
@@ -163,7 +163,7 @@ def cost(results: Sequence[CaseResult]) -> Answer:
 
 
 def _over_cases(own: Mapping[str, Ratio]) -> dict[str, Ratio]:
-    """Widen the ends of each ratio so that those of the median hold the spread over cases too.
+    """Widen the ends of each ratio so that the ends of the median hold the spread over cases too.
 
     Repetitions in one run share its load. Cases are measured at other moments: between the k-th
     and the k-th last of them the median lies with 90 %, whatever the distribution (sign test).

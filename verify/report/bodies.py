@@ -45,7 +45,7 @@ class Body:
     edges : (e, 2) int array
         Outline; the two faces of a cut are part of it, since nodes are doubled there.
     values : (n,) or (m,) float array
-        What is coloured, per node or per triangle.
+        Coloured values, per node or per triangle.
     element_edges : (k, 2) int array
         Edges of the elements.
     material : (n, 3) float array
@@ -243,7 +243,7 @@ class View:
     right, up, towards : (3,) tuples of float
         Axes of the picture; `towards` points at the viewer.
     window : (x0, x1, y0, y1)
-        What is seen, in the picture's axes, m.
+        Visible part, in the picture's axes, m.
     size : (width, height)
         In pixels.
     colours : str
@@ -309,7 +309,7 @@ def common_view(
 
 _DPI = 100
 _OUTLINE, _ELEMENTS = (0.1, 0.1, 0.1, 1.0), (0.0, 0.0, 0.0, 0.25)
-_FACETS = 12_000  # up to which those of solids are split
+_FACETS = 12_000  # up to which facets of solids are split
 
 
 def draw(body: Body, view: View) -> bytes:
@@ -329,7 +329,7 @@ def draw(body: Body, view: View) -> bytes:
 
 
 def _layers(body: Body, view: View) -> list[Collection]:
-    """Return what is drawn of a body, the lowest first."""
+    """Return the layers of the picture of a body, the lowest first."""
     places = view.projected(body.points)
     if np.ptp(body.points[:, 2]) != 0 or len(body.values) != len(body.points):
         return [_painted(body, view, places)]
@@ -444,7 +444,7 @@ def packed(body: Body, view: View) -> dict[str, str]:
     """Return the attributes of the element that ``turntable.js`` makes a view of.
 
     Places and values are 16-bit shares of their ranges. The triangles of the outer surface come
-    first, then those of the faces of cuts.
+    first, then the faces of cuts.
 
     Returns
     -------

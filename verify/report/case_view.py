@@ -55,7 +55,7 @@ class CaseView:
     defect : str
         Why it cannot be shown; empty if it can.
     unjudged : list of SolveRecord
-        Those of a case that was not judged.
+        Solves of a case that was not judged.
     """
 
     anchor: str
@@ -87,7 +87,7 @@ class CaseView:
 
 
 def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
-    """Return what is shown of case number `index`; what cannot be shown is said."""
+    """Return the view of case number `index`, with notes on missing pictures."""
     anchor, result = f"case-{index + 1}", entry.result
     if result is None:
         return CaseView(anchor, entry.name, entry.name, Verdict.ERROR,
@@ -129,7 +129,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
 
 
 def show_pictures(view: CaseView) -> None:
-    """Take the rows of pictures from those of the case, in place of what is there."""
+    """Set the rows of pictures anew from the pictures of the case."""
     view.rows, pictures = [], view.pictures
     frames = [picture for body in pictures.film for picture in body]
     for kind, group, bar in (("deformed", pictures.deformed, "displacement |u|"),

@@ -252,7 +252,7 @@ def key(names: Sequence[str], palette: Palette) -> Drawing:
 def _errors(
     results: Sequence[CaseResult], example: str, palette: Palette, over_time: bool
 ) -> Drawing | None:
-    """Draw the error of one case over h or time, those of all others faintly below it."""
+    """Draw the error of one case over h or time, all others faintly below it."""
 
     def at(point: Point) -> float | None:
         if not over_time:
@@ -291,7 +291,7 @@ def _errors(
 
 
 def _bars(curves: Sequence[tuple[Curve, Places]]) -> Iterator[tuple[float, float]]:
-    """Yield places below the errors, as far as their uncertainty is worth a band."""
+    """Yield places below the errors whose half-width is wide enough for a band."""
     for curve, places in curves:
         for point, (x, y) in zip(curve.points, places, strict=False):
             if point.uncertainty > y / 30:

@@ -76,7 +76,7 @@ class Drawing:
 
 @dataclass
 class Figure:
-    """Panels that belong together, and what has to be said about them."""
+    """Panels that belong together, with their caption."""
 
     panels: list[Drawing] = field(default_factory=list)
     caption: str = ""
@@ -142,12 +142,12 @@ def is_error(name: str) -> bool:
 
 
 def error_title(name: str) -> str:
-    """Return what is judged of a metric: an error, or the relative error of a quantity."""
+    """Return the title of a judged metric: an error, or the relative error of a quantity."""
     return metric_title(name) if is_error(name) else f"relative error of the {metric_title(name)}"
 
 
 def solver_title(name: str) -> str:
-    """Return the name of a solver, with what is varied of it, as it is written in figures."""
+    """Return the name of a solver, with its parameters, as it is written in figures."""
     return re.sub(r"^\w+", lambda first: _SOLVERS.get(first[0], first[0]), name)
 
 
@@ -160,7 +160,7 @@ def _decimal(value: float, digits: int) -> tuple[str, int | None]:
         return "0", None
     exponent = int(
         f"{value:.{digits - 1}e}".partition("e")[2]
-    )  # of what is written: 0.9996 is 1.00
+    )  # of the rounded number: 0.9996 is 1.00
     if -3 <= exponent < 5:
         text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
         return text.replace("-", "−"), None

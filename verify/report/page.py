@@ -133,7 +133,7 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[tuple[str, str]]:
-    """Return what is not a plain pass, in lists of at most six entries, failures first."""
+    """Return verdicts that are no plain pass, in lists of at most six entries, failures first."""
     failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
     errors = _unjudged(judged)
     errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
@@ -220,7 +220,7 @@ def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
 
 
 def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[AnswerView]:
-    """Return the four answers with their panels; what cannot be drawn is said by its sentence."""
+    """Return the four answers with their panels; without data a sentence stands alone."""
     found = answers(run.results)
     panels = answer_panels(run.results, found, palette)
     by_name = {case.name: case for case in cases}
@@ -275,7 +275,7 @@ def page_view(
     palette : Palette
         By which they are drawn.
     notes : list of str
-        What has to be said about the pictures of all cases.
+        On the pictures of all cases.
     short : bool
         Whether cases, families and the reading aid are left out.
     """
@@ -352,7 +352,7 @@ def _finest(result: CaseResult, metric: str) -> dict[str, Point]:
 
 
 def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Table]:
-    """Return the table of a question, a row per solver, and that of what was left out."""
+    """Return the table of a question, a row per solver, and the table of omissions."""
     comparisons = _merged(ranking[question])
     shown = [one for one in comparisons if one["standings"]]
     tables = []

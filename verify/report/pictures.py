@@ -39,7 +39,7 @@ _WILD = 1e3  # times the smallest displacement beside it: what moves farther is 
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
 _PEAK = 0.995  # of the nodes: what single nodes have is no measure of a map
 _CLIP = 2.0  # times the peak of the solver in the middle, where the scale ends
-_TIP_SHARE = 0.15  # of the cut's length: half of what is shown around a tip
+_TIP_SHARE = 0.15  # of the cut's length: half of the window around a tip
 _TIP_CELLS = 4.0  # elements that are shown on each side of a tip at least
 _TIP_SIZE = (420, 420)  # in pixels
 _PLANE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -72,7 +72,7 @@ class Picture:
 
 @dataclass
 class CasePictures:
-    """The pictures of a case and what has to be said about them.
+    """The pictures of a case, with notes.
 
     `deformed` share view, colours and `scale` (displacements are drawn that much enlarged). Bodies
     that move have frames of a `film` instead, for each its output times. `tip` are the errors
@@ -101,7 +101,7 @@ class CasePictures:
 
 
 def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
-    """Prepare the pictures of a case from what is stored; what is missing becomes a note."""
+    """Prepare the pictures of a case from stored solutions; a missing one becomes a note."""
     pictures = CasePictures()
     if entry.result is None:
         return pictures
@@ -239,8 +239,8 @@ def _add_error_maps(pictures: CasePictures, root: Path, result: CaseResult) -> N
 def scale_top(bodies: Sequence[Body]) -> float:
     """Return where the scale of maps ends: no higher than their largest value.
 
-    A solver that errs by far more than the one in the middle would leave nothing to see of the
-    others, and so would a single node: both are clipped.
+    A solver that errs by far more than the median one would hide all others, and so would a
+    single node: both are clipped.
     """
     largest = [float(body.values.max()) for body in bodies]
     peaks = [float(np.quantile(body.values, _PEAK, method="lower")) for body in bodies]

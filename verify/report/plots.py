@@ -221,14 +221,14 @@ def _tick(value: float, as_power: bool) -> str:
 
 _TOTAL, _PART = "#4d4d4d", "#0067a5"
 _MARKED = 15  # places of a curve up to which each has its marker
-_DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
+_DRAWABLE = 1e200  # larger values, and not-a-number, leave a gap
 
 
 @dataclass(frozen=True)
 class Series:
     """A curve, whose places that cannot be drawn are gaps.
 
-    `second` stands below its name; `ringed` are those of its places that stand out.
+    `second` stands below its name; `ringed` are places that stand out.
     """
 
     name: str
@@ -239,7 +239,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Bar:
-    """A part of a whole with the half-width of its interval, and what is written beside it."""
+    """A part of a whole with the half-width of its interval, and its label."""
 
     name: str
     value: float

@@ -110,7 +110,7 @@ def sketch(scene: Mapping[str, Any]) -> Drawing | None:
 
 
 def _flat(points: Any) -> Points:
-    """Return points of the plane as they are, those of space in a cabinet projection."""
+    """Return points of the plane as they are, points of space in a cabinet projection."""
     places = np.asarray(points, dtype=float)
     if places.shape[1] == 2:
         return places

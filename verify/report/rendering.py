@@ -1,8 +1,8 @@
 """Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``.
 
 Cases may have been drawn before, beside the solves of other cases: `main` does so. Each question in
-its folder names a run directory, the folder of a case in it, and the file to write. What is written
-is read back by the process that asked for it, and by nobody else.
+its folder names a run directory, the folder of a case in it, and the file to write. Only the
+process that asked reads the file.
 
 The page has three forms: HTML, escaped by Jinja2, Markdown, escaped by `in_markdown`, and PDF,
 which a browser without a window prints. All read the same view data and the same page; only the
@@ -189,7 +189,7 @@ class _Inline:
         self.count = 0
 
     def drawing(self, drawing: Drawing) -> Markup:
-        """Return the inside of an SVG element, its identifiers made those of this page alone."""
+        """Return the inside of an SVG element, its identifiers made unique on this page."""
         self.count += 1
         return Markup(re.sub(r'( id="|href="#|url\(#)', rf"\g<1>f{self.count}-", drawing.body))
 
@@ -257,8 +257,8 @@ def render(directory: Path, form: str = "html", drawings: Path | None = None) ->
         it and with PDF. A summary is Markdown without the cases: the verdicts, the rankings, where
         they come from; with it comes the CSV file alone.
     drawings : Path, optional
-        Folder in which `verify.report.rendering` has left cases of this run. What is read there is
-        trusted: it is one that the caller has made for it.
+        Folder in which `verify.report.rendering` has left cases of this run. Its files are
+        trusted: the caller made the folder.
 
     Returns
     -------
@@ -268,7 +268,7 @@ def render(directory: Path, form: str = "html", drawings: Path | None = None) ->
     Raises
     ------
     InputError
-        If `directory` holds no run; if PDF is asked for and no browser prints.
+        If `directory` holds no run, or PDF is wanted and no browser prints.
     OSError
         If the files cannot be written.
     """

@@ -55,7 +55,7 @@ class CaseEntry:
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory in memory: ``run.json``, the cases, and what is wrong with them.
+    """A run directory in memory: ``run.json``, the cases, and their defects.
 
     `ranking` is what ``ranking.json`` holds, None if there is none.
     """
@@ -104,7 +104,7 @@ def load_run(directory: Path) -> Run:
 
 
 def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[str]]:
-    """Read the ranking of the run; one of other cases is that of an earlier run."""
+    """Read the ranking of the run; a ranking of other cases is of an earlier run."""
     if not path.is_file():
         return None, []
     try:
@@ -137,7 +137,7 @@ def load_record(directory: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def load_entry(folder: Path) -> CaseEntry:
-    """Read the case in `folder`; what is missing or damaged is a defect of the entry."""
+    """Read the case in `folder`; a missing or damaged file is a defect of the entry."""
     name = folder.name.replace("__", "/")
     try:
         result = read_result(folder / "result.json")

@@ -39,7 +39,7 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
     ------
     InputError
         If the record is not there, is no record of this kind, or has another schema version;
-        if PDF is asked for and no browser prints.
+        if PDF is wanted and no browser prints.
     OSError
         If the page cannot be written.
     """
@@ -163,7 +163,7 @@ def _scatters(trials: Sequence[Mapping[str, Any]]) -> list[tuple[int, Drawing | 
 
 
 def _thesis(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the figures of the thesis with those of here beside them."""
+    """Return the figures of the thesis with ours beside them."""
     face, steps, delays = record["face"], record["steps"], record["delays"]
     cuts = [0.0, *(float(row["asked"]) for row in face)]
     added = {
@@ -229,7 +229,7 @@ _SCALED = "condition number scaled by the diagonal"
 _FREQUENCY, _MEASURE = "lowest natural frequency", "conforming"
 _ERRORS = ("displacement_l2", "energy_norm")
 _DRAWN = ("condition number", _SCALED, _STEP)
-_LEAST = (0.9, 0.5, 0.1)  # of the step: what is good, fair and poor
+_LEAST = (0.9, 0.5, 0.1)  # of the step: good, fair, poor
 _MOST = (1e3, 1e4, 1e6)  # of the condition number
 
 
@@ -298,7 +298,7 @@ def _maps(measured: Records) -> list[tuple[Table, str]]:
 
 
 def _worst(measured: Records) -> list[tuple[Table, str]]:
-    """Return the table of what is worst of each solver over ε, beside the conforming mesh."""
+    """Return the table of the worst value of each solver over ε, beside the conforming mesh."""
 
     def values(solver: str, quantity: str) -> dict[float, float]:
         own = listed(measured, solver=solver, quantity=quantity)

@@ -1,4 +1,4 @@
-"""The scene: what is asked of every solver. Strict, in SI units, solver-neutral."""
+"""The scene: the question to every solver. Strict, in SI units, solver-neutral."""
 
 from verify.scene.acceptance import BoundCheck, PartQuantity, RateCheck, RatioCheck, ValueCheck
 from verify.scene.cuts import (

@@ -183,7 +183,7 @@ class StressQuantity(Strict):
 
 
 class FractureQuantity(Strict):
-    """What is asked for at an end of a plane cut, or at a point of a front."""
+    """A quantity at an end of a plane cut, or at a point of a front."""
 
     name: Line
     cut: str = "cut"
@@ -204,7 +204,7 @@ class FractureQuantity(Strict):
 
     @property
     def at_blade(self) -> bool:
-        """Whether it is asked for at a blade, not at a point of a front."""
+        """Whether it is measured at a blade, not at a point of a front."""
         return self.column == 2 and self.point is None
 
 
@@ -315,7 +315,7 @@ class RatioCheck(_Check):
 
     @property
     def compared(self) -> str | None:
-        """The other solver, unless the error is over that of another row."""
+        """The other solver, unless the error is over the error in another row."""
         return self.to if self.row is None else None
 
 

@@ -32,7 +32,7 @@ from verify.scene.strict import (
 Array = NDArray[np.float64]
 Facets = tuple[Array, NDArray[np.int64]]
 
-_TURN = 64  # points on a full circle in space, where no spacing is asked for
+_TURN = 64  # points on a full circle in space, without a given spacing
 
 
 class CutShape(Strict):
@@ -190,7 +190,7 @@ class PolygonCut(_SpatialCut):
     rules: ClassVar[Rules] = (("", lambda c: _defect_of_corners(c.points), "{}"),)
 
     def facets(self, spacing: float | None = None) -> Facets:
-        """Triangulate the polygon; `spacing` does not matter to what is plane."""
+        """Triangulate the polygon; `spacing` does not matter to a plane."""
         corners = np.array(self.points, dtype=float)
         return corners, ear_clipping(corners)
 
@@ -365,7 +365,7 @@ class SphereCut(_SpatialCut):
 
 
 class SweptCut(_SpatialCut):
-    """A polyline in space, swept along a vector; its positive side is that of points × along."""
+    """A polyline in space, swept along a vector; points × along is on its positive side."""
 
     kind: Literal["swept"]
     points: list[Point3] = Field(
@@ -414,7 +414,7 @@ class SweptCut(_SpatialCut):
 
 
 def _defect_of_corners(points: list[Point3]) -> str | None:
-    """Why corners are not those of a plane simple polygon, or None if they are."""
+    """Why corners do not make a plane simple polygon, or None if they do."""
     corners = np.array(points, dtype=float)
     centred = corners - corners.mean(axis=0)
     _, sizes, axes = np.linalg.svd(centred)

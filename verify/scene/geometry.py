@@ -55,7 +55,7 @@ class _Body(Strict):
         return False
 
     def extremes(self) -> Array:
-        """Points (n, d) whose bounding box is that of the body; none where it is not known."""
+        """Points (n, d) with the same bounding box as the body; none where it is not known."""
         return np.zeros((0, 3))
 
     def holds(self, points: Array, tolerance: float) -> Bools:
@@ -77,7 +77,7 @@ class _PlaneBody(_Body):
         raise NotImplementedError
 
     def extremes(self) -> Array:
-        """Points (n, 2) whose bounding box is that of the body."""
+        """Points (n, 2) with the same bounding box as the body."""
         return self.outline()
 
     def holds(self, points: Array, tolerance: float) -> Bools:
@@ -179,7 +179,7 @@ class Box(_Body):
 
 
 class MeshFile(_Body):
-    """A mesh file; parts of it are said by inequalities, or are its groups: ``group:NAME``."""
+    """A mesh file; its parts are inequalities, or its groups: ``group:NAME``."""
 
     kind: Literal["file"]
     file: Path = Field(description="mesh file, relative to the case file")

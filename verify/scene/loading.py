@@ -1,4 +1,4 @@
-"""Reading case files: TOML in, `Scene` out, or one clear line about what is wrong.
+"""Reading case files: TOML in, `Scene` out, or one clear line about the fault.
 
 A case whose numbers depend on a parameter is a family with one row per value: ``[parameters]``
 names the parameter and lists its values. Wherever a text of the case uses the name, the value
@@ -198,7 +198,7 @@ def _content(path: Path) -> dict[str, Any]:
         content = tomllib.loads(text)
     except RecursionError:
         raise InputError(f"not valid TOML: {too_deep}", str(path)) from None
-    except ValueError as error:  # TOMLDecodeError is one, and so is that of too many digits
+    except ValueError as error:  # TOMLDecodeError is one; too many digits raise another
         raise InputError(f"not valid TOML: {one_line(error)}", str(path)) from None
     if deeper_than(content, _DEEPEST):
         raise InputError(f"not a case: {too_deep}", str(path))

@@ -5,7 +5,7 @@ else by bisection, until its chords are within a tolerance. Loads and supports o
 on these pieces, so that a part is the same for all of them, whatever the mesh.
 
 A support cannot end inside a facet of linear elements. All solvers follow one rule: it holds every
-facet that its part meets with positive measure. As facets are divided what is held shrinks to the
+facet that its part meets with positive measure. As facets are divided the held facets shrink to the
 part, so that the energy under a load rises from level to level.
 """
 
@@ -35,15 +35,15 @@ _CHORD = {2: 1e-13, 3: 1e-6}
 _SMALLEST = {2: 1e-13, 3: 2e-4}
 # of the body: the largest simplex on which a comparison that is not affine is tried
 _LARGEST = {2: 1 / 256, 3: 1 / 64}
-_STRIP = 1e-5  # of the body: a narrower strip beside an edge belongs to what is next to it
+_STRIP = 1e-5  # of the body: a narrower strip beside an edge belongs to its neighbour
 _STRAIGHT = 1e-6  # of 1 − cos of an angle: a boundary that turns less has no edge
 
 
 def on_part(geometry: Geometry, where: str, points: Array, size: float) -> NDArray[np.bool_]:
     """Tell which points (n, d) of the boundary lie on the part `where`, its ends included.
 
-    `size` is that of the body, m: within 1e-9 of it a point is on a part; so the node at the end
-    of ``x < 0.3`` is, whichever way it was rounded.
+    `size` is the size of the body, m: within 1e-9 of it a point is on a part. So is the node at
+    the end of ``x < 0.3``, whichever way it was rounded.
     """
     if where == "boundary":
         return np.ones(len(points), dtype=bool)
@@ -79,7 +79,7 @@ class Pieces:
 
     @property
     def share(self) -> Array:
-        """(r,) measure of each over that of its facet."""
+        """(r,) measure of each over the measure of its facet."""
         return np.abs(np.linalg.det(self.barycentric))
 
     def covered(self, count: int) -> Array:
@@ -128,9 +128,9 @@ def pieces_on_part(
 
     Notes
     -----
-    A strip beside an edge of the body (where its boundary turns) that is narrower than 1e-5 of the
-    body belongs to what is next to it: ``x > 0.999999`` means a face, and nothing of the faces
-    beside it. A curved end is followed to 1e-6 of the body in space, to round-off in the plane.
+    A strip beside an edge of the body that is narrower than 1e-5 of the body belongs to its
+    neighbour: ``x > 0.999999`` means a face, and nothing of the faces beside it. A curved end is
+    followed to 1e-6 of the body in space, to round-off in the plane.
     """
     count, k, d = corners.shape
     boundary = corners if boundary is None else boundary
@@ -230,7 +230,7 @@ def _bisected(pieces: Pieces, i: Ints, j: Ints, share: Array) -> Pieces:
 
 
 def _normal_projections(corners: Array) -> Array:
-    """Projections (q, d, d) onto what is normal to simplices (q, k, d)."""
+    """Projections (q, d, d) onto the normal space of simplices (q, k, d)."""
     along = np.linalg.qr(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))[0]
     projections: Array = np.eye(corners.shape[2]) - along @ np.swapaxes(along, 1, 2)
     return projections
@@ -319,7 +319,7 @@ class HeldFacets:
     ----------
     held : (q,) bool array
     ended : (e,) int array
-        Those of them in which the part ends.
+        Held facets in which the part ends.
     shift : float
         How far the farthest point that is held is from the part, m.
     """
@@ -374,7 +374,7 @@ def held_facets(
 
 
 def shifted_ends(found: list[HeldFacets], size: float) -> list[Regularisation]:
-    """Report by how much supports hold more than their parts; `size` is that of the elements, m."""
+    """Report by how much supports hold more than their parts; `size` is the element size, m."""
     count, shift = (
         sum(len(one.ended) for one in found),
         max((one.shift for one in found), default=0.0),
@@ -392,8 +392,8 @@ def held_nodes(
 ) -> tuple[Ints, HeldFacets]:
     """Find the nodes of the boundary that a support on the part `where` holds.
 
-    Those of the facets that it holds, each on its own side of the cuts; and those on the part at
-    whose place no facet is held: a part may be a corner or an edge of the body.
+    These are the nodes of the facets that it holds, each on its own side of the cuts. Nodes on the
+    part at whose place no facet is held count too: a part may be a corner or an edge of the body.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class Moduli(NamedTuple):
 
 
 class MaterialRegion(Strict):
-    """A region of another material; what it does not name is that of ``[material]``."""
+    """A region of another material; keys that it does not give are as in ``[material]``."""
 
     where: str = Field(
         description="an inequality in x, y, z, or 'group:NAME' of a mesh file; of regions that "
@@ -97,7 +97,7 @@ class Material(Strict):
 
     @property
     def each(self) -> "list[Material]":
-        """All materials, each alone: that outside the regions, then that of each region."""
+        """All materials, each alone: first outside the regions, then in each region."""
         base = self.model_copy(update={"regions": []})
         given = [r.model_dump(exclude={"where"}, exclude_none=True) for r in self.regions]
         return [base, *(base.model_copy(update=own) for own in given)]
@@ -283,8 +283,8 @@ class Support(Strict):
     def values(self, points: Array, factor: float = 1.0, time: float = 0.0) -> Array:
         """Prescribed displacement (k, held) of points (k, d), m, unless it is ``"exact"``.
 
-        A history's factor multiplies the displacement and the angle of a rotation; `time` (s) is
-        that of its formulas.
+        A history's factor multiplies the displacement and the angle of a rotation; `time` (s)
+        enters its formulas.
         """
         assert self.displacement != "exact"
         moved = factor * field_values(self.displacement, points, time)
@@ -354,7 +354,7 @@ class PrescribedMotion:
 
 
 class _Load(Strict):
-    """A load with numbers or formulas, one per component, or that of the exact solution."""
+    """A load with numbers or formulas, one per component, or from the exact solution."""
 
     @property
     def components(self) -> Sequence[float | str] | Literal["exact"]:
@@ -363,7 +363,7 @@ class _Load(Strict):
 
     @property
     def exact(self) -> bool:
-        """Whether it is that of the exact solution."""
+        """Whether it is taken from the exact solution."""
         return self.components == "exact"
 
     @property
@@ -390,7 +390,7 @@ class Gravity(_Load):
 
 
 class BodyForce(_Load):
-    """Force per volume, or that of the exact solution."""
+    """Force per volume, or the exact solution's."""
 
     kind: Literal["body_force"]
     force: Components | Literal["exact"] = Field(
@@ -504,7 +504,7 @@ Kinematics = Annotated[
 
 
 class Analysis(Strict):
-    """What is solved for."""
+    """The analysis: statics or dynamics, kinematics, times."""
 
     kind: Literal["static", "dynamic"] = "static"
     kinematics: Kinematics = Field(

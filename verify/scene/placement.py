@@ -1,6 +1,6 @@
 """Placement in the body: of cuts, and of the points, parts and regions that a scene names.
 
-Each function says in words what is wrong, key first, or nothing.
+Each function returns the first fault in words, key first, or nothing.
 """
 
 from collections.abc import Callable, Iterable
@@ -32,7 +32,7 @@ from verify.scene.tables import SceneTables
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_TOLERANCE = 1e-9  # of the size of what is compared
+_TOLERANCE = 1e-9  # of the size of the compared parts
 _ON_CUT = 1e-3  # of the body: the cut that a point is held against is triangulated
 _SAMPLES = 2**16  # of the body: a region of less than about 1e-4 of it may be missed
 _TURNS, _RINGS = {2: 256, 3: 48}, 24  # points on a circle, and circles of a sphere
@@ -53,7 +53,7 @@ def points_of_body(scene: SceneTables) -> Array:
 
 
 def empty_region(scene: SceneTables, points: Array) -> str | None:
-    """Which material is that of none of the points (n, d) of the body."""
+    """Which material none of the points (n, d) of the body has."""
     regions = scene.material.regions
     if not regions or not len(points):
         return None
@@ -105,7 +105,7 @@ def group_fault(scene: SceneTables) -> str | None:
 
 # ---------------------------------------------------------------------------- parts of the boundary
 def part_without_facets(scene: SceneTables) -> str | None:
-    """Which support or traction would act nowhere, as far as the scene alone tells.
+    """Which support or traction would act nowhere, by the scene alone.
 
     A traction needs a part of the boundary's facets; a support that, or a node of the structured
     meshes of the scene. Of other meshes nothing is known but that they have nodes at the corners.
@@ -303,7 +303,7 @@ def on_unit_sphere(d: int) -> tuple[Array, Array]:
 def misplaced_point(
     scene: SceneTables, size: float | None = None, holds: Callable[[Array], bool] | None = None
 ) -> str | None:
-    """Which quantity is asked for where there is no material, or two values.
+    """Which quantity is at a place without material, or with two values.
 
     Of a body from a mesh file its `size`, m, must be given, and whether it `holds` a point (d,).
     """

@@ -1,7 +1,7 @@
 """The scene, and the rules that take more than one of its tables.
 
 Each rule is a row of a table: place, what breaks the rule, message. A place with brackets is a key
-of the entries of a list: of all (``supports[*].where``), or of those of some kinds
+of the entries of a list: of all (``supports[*].where``), or of some kinds
 (``loads[gravity].acceleration``, ``loads[gravity|traction]``). What breaks a rule is asked of the
 scene, or of the scene and the entry. It answers with nothing where the rule holds, else with what
 the braces of the message stand for.
@@ -31,7 +31,7 @@ from verify.scene.strict import Rule, Rules, first_broken, nearest
 from verify.scene.tables import SceneTables
 
 _MOST = 1e10  # nodes of a mesh (25 TB in the plane), and time steps
-_ON_FRONT = 1e-3  # of the radius or the edge: what is given in a few digits is on the front
+_ON_FRONT = 1e-3  # of the radius or the edge: a point given in a few digits is on the front
 _VALUES = "{} values; expected {}"
 _IN_TIME = "belongs to a dynamic analysis"
 _AFTER_END = "{:g} s is after the end, {:g} s"
@@ -157,7 +157,7 @@ def _point_elsewhere(scene: SceneTables, asked: Any) -> int | None:
 
 
 def _axis_in_plane(part: Any) -> tuple[str, str] | None:
-    """Break the rule where a component of a part is asked for that a plane body has not."""
+    """Break the rule for a component of a part that a plane body has not."""
     axes = ("x", "y") if part.of == "linear_momentum" else ("z",)
     return None if part.component in (None, *axes) else (part.of, " or ".join(axes))
 
@@ -450,7 +450,7 @@ _BY_LIST = _by_list()
 
 
 class Scene(SceneTables):
-    """One case. Solver-neutral: it says what is asked, never how a solver shall do it."""
+    """One case. Solver-neutral: it states the problem, never how a solver shall solve it."""
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "Scene":

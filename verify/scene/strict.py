@@ -34,7 +34,7 @@ Positive = Annotated[
 ]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
-# of what is printed: no escapes of the terminal, no marks of direction
+# printed later: no escapes of the terminal, no marks of direction
 Line = Annotated[
     str,
     Field(

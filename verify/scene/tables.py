@@ -84,7 +84,7 @@ class Moving(Strict):
 
 
 class InitialField(Strict):
-    """Displacement and velocity by formulas, or those of the exact solution at the time 0."""
+    """Displacement and velocity by formulas, or of the exact solution at the time 0."""
 
     kind: Literal["field"]
     displacement: Components | Literal["exact"] | None = Field(
@@ -203,7 +203,7 @@ class Adequacy(Strict):
 
     @property
     def models(self) -> list[str]:
-        """Names of what is measured."""
+        """Names of the models that are compared."""
         return [name for name in ("kinematics", "material", "motion") if getattr(self, name)]
 
 
@@ -345,7 +345,7 @@ class SceneTables(Strict):
         Raises
         ------
         InputError
-            If a blade sweeps what is no cut of another kind; see `ToolPathCut.whole`.
+            If a blade sweeps a surface that is no cut of another kind; see `ToolPathCut.whole`.
         """
         return [cut.whole() for cut in self.cuts]
 

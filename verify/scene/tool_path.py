@@ -1,8 +1,8 @@
 """A cut made by a tool on its way: where its tip is at what time, and in space how deep it reaches.
 
-A facet of a conforming mesh, or an element of an unfitted one, is separated at the first step
-that begins after the blade has passed all of it. What it passed before the time 0 is open from
-the start.
+A facet of a conforming mesh is separated at the first step that begins after the blade has passed
+all of it; so is an element of an unfitted mesh. Places passed before the time 0 are open from the
+start.
 """
 
 from collections.abc import Sequence
@@ -41,8 +41,8 @@ Directions = Annotated[list[Point3], Field(min_length=1)]
 class ToolPathCut(CutShape):
     """Points of the tool's tip in order, with times or a speed; in space a blade of some depth.
 
-    In the plane what lies left of the path is its positive side; in space the positive side is
-    that of (direction of motion) × (direction of the blade).
+    The positive side is left of the path in the plane; in space it is where (direction of motion)
+    × (direction of the blade) points.
     """
 
     kind: Literal["tool_path"]
