@@ -55,7 +55,7 @@ def uncut_bound(scene):
 
 
 @pytest.mark.parametrize("epsilon", ["0.1", "0.0001", "1e-12"])
-@pytest.mark.parametrize("case", ["slivers/plane_edges", "slivers/plane_vertices"])
+@pytest.mark.parametrize("case", ["slivers/plane_edges", "benchmark/c8_slivers"])
 def test_no_sliver_makes_the_step_with_a_generalised_stabilisation_less_than_a_cell_may(
     case, epsilon
 ):

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from verify.study.measured_scenes import MeasuredStudy
     from verify.study.study import Making, Solved, Study
 
+SLIVERS = ("slivers/*", "benchmark/c8_*")
 _SOLVER = "'NAME [PARAMETER=VALUE …]'"
 Quick = Annotated[bool, Arg("less of it, in under a minute")]
 Tolerance = Annotated[float, Arg("relative error that is good enough", "T", read=positive)]
@@ -72,7 +73,7 @@ class Measured:
 
 def slivers(
     cases: Annotated[
-        Sequence[str], Arg("names, patterns or files; none: cases/slivers", "CASE")
+        Sequence[str], Arg("names, patterns or files; none: cases/slivers and C8", "CASE")
     ] = (),
     *,
     measured: Measured,
@@ -82,7 +83,7 @@ def slivers(
     from verify.study.slivers import sliver_study
 
     def study(making: "Making") -> "Study":
-        return _over_scenes(sliver_study, cases or ["slivers/*"], None, measured, making)
+        return _over_scenes(sliver_study, cases or [*SLIVERS], None, measured, making)
 
     return _written("slivers", answer, study)
 
@@ -275,7 +276,7 @@ def _over_scenes(
     from verify.runner.selection import select_cases
     from verify.study.measured_scenes import variant_of
 
-    named = bool(cases) and list(cases) != ["slivers/*"]
+    named = bool(cases) and list(cases) != [*SLIVERS]
     scenes = select_cases(cases, expression, "quick" if measured.quick and not named else "heavy")
     variants = [variant_of(text) for text in measured.solvers or ("xfem", "conforming")]
     processes = measured.processes or len(os.sched_getaffinity(0))

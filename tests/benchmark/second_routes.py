@@ -1,0 +1,96 @@
+"""The second route of the scenes at rest in the plane: `python second_routes.py c1_slit` prints it.
+
+Values of `cases/benchmark/values.toml` and pages of `docs/benchmark` stand on it. Each answer is
+that of the finer of two meshes. One quantity may differ little between both by chance, so the
+largest relative difference of all quantities counts for each.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import plane_cracks
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def c1_slit(size, grade):
+    """Griffith's crack, with the exact displacement on the border: every quantity by its name."""
+    young, poisson, a, centre = 1.0, 0.3, 1.0, np.array([0.07, -0.04])
+    angle, shear = np.deg2rad(37.0), young / (2 * (1 + poisson))
+    along = np.array([np.cos(angle), np.sin(angle)])
+    normal = np.array([-along[1], along[0]])
+    tension, slide = normal[1] ** 2, normal[1] * along[1]
+    gamma = (along[1] ** 2 - normal[1] ** 2) / 4 + 0.5j * slide
+    s = tension - 1j * slide
+
+    def field(points):
+        z = (points - centre) @ (along + 1j * normal)
+        root = np.sqrt(z - a) * np.sqrt(z + a)
+        phi, slope = 0.5 * s * root + gamma * z, 0.5 * s * z / root + gamma
+        omega = 0.5 * s * root.conj() - gamma * z.conj()
+        w = (3 - 4 * poisson) * phi - omega - (z - z.conj()) * slope.conj()
+        return np.outer(w.real, along) / (2 * shear) + np.outer(w.imag, normal) / (2 * shear)
+
+    crack = np.array([centre - a * along, centre + a * along])
+    answer = plane_cracks.solve(
+        [-2, -2], [2, 2], [crack], [], [centre], field, young, poisson, size * 4, grade
+    )
+    k_1, k_2 = plane_cracks.intensity(answer, crack[1], along, 0.5)
+    opening = plane_cracks.opening(answer, centre, normal)
+    return {"strain_energy": answer.energy, "opening": opening, "K_I": k_1, "K_II": k_2}
+
+
+def c2_meeting(size, grade):
+    """Two cracks that cross and a branch, in a homogeneous strain on the border."""
+    cracks = {
+        "flat": np.array([[0.171, 0.382], [0.823, 0.571]]),
+        "steep": np.array([[0.563, 0.207], [0.391, 0.779]]),
+        "branch": np.array([[0.66, 0.52375], [0.795, 0.742]]),
+    }
+    flat, steep = cracks["flat"], cracks["steep"]
+    ways = np.array([flat[1] - flat[0], steep[0] - steep[1]])
+    crossing = flat[0] + np.linalg.solve(ways.T, steep[0] - flat[0])[0] * ways[0]
+    asked = {
+        "opening_before": ("flat", 0.25),
+        "opening_between": ("flat", 0.6),
+        "opening_above": ("steep", 0.8),
+        "opening_of_the_branch": ("branch", 0.5),
+    }
+    places = [(1 - s) * cracks[name][0] + s * cracks[name][1] for name, s in asked.values()]
+    answer = plane_cracks.solve(
+        [0, 0], [1, 1], list(cracks.values()), [crossing], places,
+        lambda x: x @ np.array([[0.04, 0.01], [0.01, 0.05]]), 1.0, 0.3, size, grade,
+    )  # fmt: skip
+    along = {name: (b - a) / np.linalg.norm(b - a) for name, (a, b) in cracks.items()}
+    values = {"strain_energy": answer.energy}
+    for (name, (crack, _)), place in zip(asked.items(), places, strict=True):
+        t = along[crack]
+        values[name] = plane_cracks.opening(answer, place, np.array([-t[1], t[0]]))
+    ends = {"flat_start": -1, "flat_end": 1, "steep_start": -1, "steep_end": 1, "branch": 1}
+    for name, sign in ends.items():
+        crack = name.split("_")[0]
+        tip = cracks[crack][int(sign > 0)]
+        factors = plane_cracks.intensity(answer, tip, sign * along[crack], 0.08)
+        values |= {f"K_{mode}_{name}": k for mode, k in zip(("I", "II"), factors, strict=True)}
+    return values
+
+
+SCENES = {"c1_slit": c1_slit, "c2_meeting": c2_meeting}
+
+
+def second_route(scene):
+    """Give {quantity: (value, half-width)}; the size of a factor is that of both modes."""
+    coarse, fine = (SCENES[scene](0.1, grade) for grade in (0.5, 0.25))
+    other = {name: name.replace("K_II", "K_I") for name in fine}
+    other |= {name: name.replace("K_I", "K_II") for name in fine if "K_II" not in name}
+    size = {
+        name: np.hypot(v, fine[other[name]] * (other[name] != name)) for name, v in fine.items()
+    }
+    relative = max(abs(fine[name] - coarse[name]) / size[name] for name in fine)
+    return {name: (value, relative * size[name]) for name, value in fine.items()}
+
+
+if __name__ == "__main__":
+    for name, (value, half_width) in second_route(sys.argv[1]).items():
+        print(f"{name:24} {value:.9g} ± {half_width:.0e}")

@@ -1,0 +1,97 @@
+"""Frozen values of the benchmark: what the pages say, by two routes that agree, each held anew."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from math import hypot
+from pathlib import Path
+
+import pytest
+import second_routes
+
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.judge.reference import exact_reference
+from verify.result import read_result
+from verify.scene import load_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+VALUES = tomllib.loads((ROOT / "cases/benchmark/values.toml").read_text("utf-8"))
+SCENES = {name: table for name, table in VALUES.items() if name != "version"}
+# largest relative half-width of the second route (`dimension` of the scene, or "motion")
+WIDEST = {2: 1e-4, 3: 5e-3, "motion": 1e-2}
+
+
+def parsed(text):
+    """Value and half-width of "1.25 ± 1e-3"; a closed form has no half-width."""
+    value, _, half_width = text.partition(" ± ")
+    return float(value), float(half_width or 0.0)
+
+
+def size_of(name, values):
+    """What a half-width is relative to: the value; of a factor, those of both modes together."""
+    other = name.replace("K_II", "K_I") if "K_II" in name else name.replace("K_I", "K_II")
+    value = parsed(values[name][0])[0]
+    return hypot(value, parsed(values[other][0])[0]) if other != name and other in values else value
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_both_routes_agree_and_are_as_narrow_as_asked(scene):
+    loaded = load_scene(f"benchmark/{scene}")
+    kind = "motion" if loaded.analysis.kind == "dynamic" else loaded.dimension
+    for name, (first, second) in SCENES[scene].items():
+        (one, narrow), (two, wide) = parsed(first), parsed(second)
+        assert abs(one - two) <= narrow + wide, name
+        assert wide <= WIDEST[kind] * abs(size_of(name, SCENES[scene])), name
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_page_states_the_values(scene):
+    page = (ROOT / f"docs/benchmark/{scene.split('_')[0]}.md").read_text("utf-8")
+    assert f"Version {VALUES['version']}" in page
+    rows = dict(re.findall(r"^\| `(\w+)` (\|.*±.*\|)$", page, flags=re.MULTILINE))
+    assert rows == {name: f"| {one} | {two} |" for name, (one, two) in SCENES[scene].items()}
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("scene", [s for s in SCENES if load_scene(f"benchmark/{s}").exact])
+def test_closed_forms_are_those_of_the_judge(scene):
+    from reference.exact import exact_of
+
+    loaded = load_scene(f"benchmark/{scene}")
+    judged = exact_reference(loaded, exact_of(loaded), body_of(loaded), law_of(loaded)).quantities
+    for name, (first, _) in SCENES[scene].items():
+        stated, half_width = parsed(first)
+        assert abs(judged[name][0] - stated) <= half_width, name
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("scene", second_routes.SCENES)
+def test_the_second_route_gives_what_is_stated(scene):
+    """Half-widths, too; another version of scipy may triangulate otherwise."""
+    for name, (value, half_width) in second_routes.second_route(scene).items():
+        stated, wide = parsed(SCENES[scene][name][1])
+        print(f"{name:24} {SCENES[scene][name][0]:24} {value:.9g} ± {half_width:.0e}")
+        assert abs(value - stated) <= wide + half_width, name
+        assert half_width <= 2 * wide, name
+
+
+@pytest.mark.heavy
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("scene", SCENES)
+def test_solvers_are_off_by_what_the_page_says(scene, tmp_path):
+    """Two digits of the errors in L2 and in the energy norm, level by level."""
+    command = ["verify", "run", f"benchmark/{scene}", "--repetitions", "1", "--no-conform"]
+    subprocess.run(
+        [sys.executable, "-m", *command, "--no-report", "--out", str(tmp_path)], check=True
+    )
+    solves = read_result(next(tmp_path.glob("cases/*/result.json"))).solves
+    page = (ROOT / f"docs/benchmark/{scene.split('_')[0]}.md").read_text("utf-8")
+    rows = re.findall(r"^\| `(xfem|conforming)` \| ([^|]*) \| ([^|]*) \|", page, flags=re.MULTILINE)
+    assert len(rows) == 2
+    for solver, *columns in rows:
+        for metric, column in zip(("displacement_l2", "energy_norm"), columns, strict=True):
+            found = [m.value for s in solves if s.solver == solver for m in s.metrics
+                     if m.name == metric]  # fmt: skip
+            assert found == pytest.approx([float(text) for text in column.split(",")], rel=0.06)
