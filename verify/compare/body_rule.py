@@ -306,18 +306,17 @@ def _in_strips(curves, ys, columns, strips, u, wu, v, wv):
         low, high = ys[slab], ys[slab + 1]
         middle = 0.5 * (low + high)
         m0, m1 = _x(curves[left], middle), _x(curves[right], middle)
+        breaks = np.zeros((last - first + 2, 1))
+        breaks[1:-1, 0], breaks[-1] = (columns[first:last] - m0) / (m1 - m0), 1.0
+        steps = breaks[1:] - breaks[:-1]
+        across, parts = (breaks[:-1] + steps * u).ravel(), (steps * wu).ravel()
         for i in range(len(heights)):
-            y = low + (high - low) * heights[i]
+            y, end = low + (high - low) * heights[i], n + len(across)
             x0 = _x(curves[left], y)
             width = _x(curves[right], y) - x0
-            weight = (high - low) * shares[i] * width
-            for k in range(first, last + 1):
-                start = (columns[k - 1] - m0) / (m1 - m0) if k > first else 0.0
-                step = ((columns[k] - m0) / (m1 - m0) if k < last else 1.0) - start
-                for q in range(len(u)):
-                    points[n, 0], points[n, 1] = x0 + width * (start + step * u[q]), y
-                    weights[n] = weight * (step * wu[q])
-                    n += 1
+            points[n:end, 0], points[n:end, 1] = x0 + width * across, y
+            weights[n:end] = (high - low) * shares[i] * width * parts
+            n = end
     return points, weights
 
 

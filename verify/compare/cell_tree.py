@@ -372,11 +372,13 @@ def _holding_in_numpy(
     every = np.arange(len(points))
     for rows in (every[::_BESIDE], every):
         if rows is every:
-            before = found[every // _BESIDE * _BESIDE]
-            rows = every[before >= 0]
-            depth, agreed = fitting(rows, before[rows])
-            same = rows[agreed & (depth > tolerance)]
-            found[same] = before[same]
+            for ahead in (0, 1):
+                tried = (every // _BESIDE + ahead) * _BESIDE
+                before = found[np.minimum(tried, (len(points) - 1) // _BESIDE * _BESIDE)]
+                rows = every[(found < 0) & (before >= 0)]
+                depth, agreed = fitting(rows, before[rows])
+                same = rows[agreed & (depth > tolerance)]
+                found[same] = before[same]
             rows = every[found < 0]
         for begin in range(0, len(rows), _AT_ONCE):
             row, cell = _boxes_around(points, rows[begin : begin + _AT_ONCE], searched, tolerance)
