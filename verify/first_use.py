@@ -153,8 +153,8 @@ def _comparison() -> None:
             )  # fmt: skip
         origin = np.ascontiguousarray(corners[:, 0])
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
-        nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
-        evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
+        bends = np.empty((len(corners), mesh.space, mesh.space, 1 + mesh.space))
+        evaluate_quadratic(points, cells, origin, origin, bends, shape.gradients[:, 1:])
         squares(points)
         still, gradients = np.zeros((1, *mesh.points.shape)), np.zeros((1, mesh.space, mesh.space))
         difference_squares(gradients, gradients)

@@ -9,7 +9,7 @@ from solid_meshes import cube_grid, solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import LIMIT, realised_cut
-from verify.compare.error_norm import cut_rules
+from verify.compare.error_norm import cut_rule_of
 
 SEEDS = range(12)
 
@@ -22,7 +22,7 @@ def record(cuts, facets, size=0.1):
     body = body_of((solid_scene if space else scene)(cuts))
     points, cells = cube_grid(n, n, n) if space else grid(n, n)
     given = solution(points, cells, 0 * points, cut_facets=facets)
-    return realised_cut(given, body, cut_rules(body, size, 1)[0]).record
+    return realised_cut(given, body, cut_rule_of(body, size)).record
 
 
 def line(points, name="cut"):

@@ -25,7 +25,7 @@ def measured(cut, cells, solver, **parameters):
     size = [cells] * (3 if space else 2)
     case = (solid_scene if space else scene)([cut], mesh={"cells": [size]})
     solution, body = find_solver(solver).solve(case, 0, 0, **parameters), body_of(case)
-    rules = Rules(body, 1 / cells, 1)
+    rules = Rules(body, 1 / cells)
     one = Measured(solution, body, law_of(case), case, measured_cut(solution, body, rules))
     record, _ = with_cut(SolveRecord("case", solver, 0, Status.SOLVED), one, rules)
     return record, solution.cut_facets

@@ -133,7 +133,9 @@ def test_the_estimated_integration_error_in_space_covers_the_true_one(cut, n):
         (true_l2, lambda r: displacement_error(field, true, r)),
         (true_energy, lambda r: energy_error(field, true, r, cut.law)),
     ):
-        found = integrate_norm(measure, family)
-        off = abs(found.norm.absolute - truth) / found.norm.scale
-        assert off <= found.integration_error
-        assert found.integration_error < 0.05 * found.norm.relative
+        # by all rules; by the two coarser, which are asked first
+        for first, share in ((0, 0.05), (1, 0.15)):
+            found = integrate_norm(measure, family[first:])
+            off = abs(found.norm.absolute - truth) / found.norm.scale
+            assert off <= found.integration_error
+            assert found.integration_error < share * found.norm.relative

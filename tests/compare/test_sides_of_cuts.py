@@ -6,7 +6,7 @@ from cut_meshes import scene as plane_scene
 from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, random_square
 
 from verify.compare.body import body_of
-from verify.compare.error_norm import cut_rules, displacement_jump, rules
+from verify.compare.error_norm import cut_rule_of, displacement_jump, rules
 from verify.compare.errors import nodal_error
 from verify.compare.realised import cut_deviation, field_of
 from verify.scene import load_scene
@@ -18,7 +18,7 @@ def _places_read_wrong(parted, seed, n, volume):
     """How many places are read from another part than they lie in, and how many were read."""
     scene, body, solution, there = parted(np.random.default_rng(seed), n)
     field = field_of(solution, body)
-    cut = cut_rules(body, 1.0 / n, 1)[0]
+    cut = cut_rule_of(body, 1.0 / n)
     asked = [(cut.points, cut.positive), (cut.points, cut.negative)]
     if volume:
         points = rules(body, 1.0 / n, 1)[0].points
@@ -87,4 +87,4 @@ def test_the_ends_of_a_cut_have_no_sides_beyond_them():
     random = np.random.default_rng(5)
     solution, _ = moved_parts(scene, random_square(12, random), 1 / 12)
     field = field_of(solution, body)
-    assert np.abs(displacement_jump(field, cut_rules(body, 1 / 12, 1)[0])).max() < _MOVED
+    assert np.abs(displacement_jump(field, cut_rule_of(body, 1 / 12))).max() < _MOVED

@@ -5,6 +5,7 @@ import pytest
 from cut_meshes import STRAIGHT, layered, quadratic, scene, solution
 from judged_fields import Cubic, judged
 
+from verify.compare import errors
 from verify.compare.body import body_of
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.quantities import Measured
@@ -81,6 +82,20 @@ def test_interpolants_of_a_smooth_field_converge_with_orders_two_and_one(tmp_pat
     assert excess[1] / excess[2] == pytest.approx(4, rel=0.1)
     write_result(result, tmp_path / "result.json")
     assert read_result(tmp_path / "result.json").verdicts == result.verdicts
+
+
+@pytest.mark.parametrize(("limit", "finest"), [(1.0001, True), (2.0, False)])
+def test_the_finest_rule_is_asked_only_where_a_verdict_hangs_on_it(monkeypatch, limit, finest):
+    solvers = {"xfem": {2: LEVELS[2]}}
+    found = assess([BOUND], solvers, EXACT).solves[0].metric("energy_norm")
+    asked, made = [], errors.rule_of
+    monkeypatch.setattr(errors, "rule_of", lambda *a: asked.append(a[2]) or made(*a))
+    close = BOUND | {"at_most": limit * found.value}
+    again = assess([close], solvers, EXACT).solves[0].metric("energy_norm")
+    assert (0 in asked) == finest
+    # both are right, as far as they say
+    assert abs(again.value - found.value) <= again.uncertainty + found.uncertainty
+    assert again.uncertainty < 0.02 * again.value
 
 
 def test_a_comparison_with_the_sides_swapped_fails():

@@ -268,7 +268,7 @@ def test_the_interval_of_a_reaction_holds_the_value_of_far_finer_meshes():
     )  # fmt: skip
     levels = {k: find_solver("conforming").solve(scene, k, repetitions=0) for k in range(4)}
     fine = values(scene, solution=levels.pop(3))
-    rules = Rules(body_of(scene), 1 / 32, 1)
+    rules = Rules(body_of(scene), 1 / 32)
     known = conforming_reference(scene, levels, body_of(scene), law_of(scene), rules).quantities
     for name, (value, width) in known.items():
         assert abs(value - fine[name]) <= width < 0.1 * abs(value), name

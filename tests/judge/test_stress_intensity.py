@@ -133,13 +133,13 @@ def test_what_only_fine_levels_have_is_known_from_those():
     case = griffith(mesh={"pattern": "structured", "cells": [[n, n] for n in (2, 16, 32, 64)]})
     body, law = body_of(case), hooke(case.material)
     levels = {k: find_solver("xfem").solve(case, k, 0, tip="inside") for k in range(4)}
-    reference = conforming_reference(case, levels, body, law, Rules(body, 0.5, 1))
+    reference = conforming_reference(case, levels, body, law, Rules(body, 0.5))
     values = reference.record.metrics["K_I at the end"]["values"]
     assert values[0] is None
     assert None not in values[1:]
     assert reference.record.missing is None
     fewer = conforming_reference(
-        case, {k: levels[k] for k in (0, 1, 2)}, body, law, Rules(body, 0.5, 1)
+        case, {k: levels[k] for k in (0, 1, 2)}, body, law, Rules(body, 0.5)
     )
     assert "K_I at the end" not in fewer.quantities
     assert "does not fit" in fewer.record.missing["K_I at the end"]

@@ -8,7 +8,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut
-from verify.compare.error_norm import cut_rules
+from verify.compare.error_norm import cut_rule_of
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver
@@ -75,7 +75,7 @@ def test_an_end_inside_an_element_is_reported_with_how_far_it_moved(tmp_path):
     on_edge, past = scene(tmp_path), scene(tmp_path, ("[0.01, 0.05]", "[0.012, 0.05]"))
     for one, left in ((on_edge, 0.0), (past, 0.002)):
         body, found = body_of(one), XfemSolver().solve(one, 0, tip="inside")
-        cut = realised_cut(found, body, cut_rules(body, found.size, 1)[0]).record
+        cut = realised_cut(found, body, cut_rule_of(body, found.size)).record
         assert cut.missing == pytest.approx(left, abs=5e-5)  # between points
         assert max(cut.surplus, cut.lateral) < 1e-12
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from verify.compare.body import AnyBody, body_of
 from verify.compare.cut_profile import cut_place
 from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import cut_rules, displacement_jump
+from verify.compare.error_norm import cut_rule_of, displacement_jump
 from verify.compare.hooke import Law, difference_energy, short_wave_energy
 from verify.compare.locate import Field
 from verify.compare.mass import density_of
@@ -185,7 +185,7 @@ def swept_area(scene: Scene, paths: Sequence[ToolPathCut], start: float, end: fl
         except UnsupportedSceneError:
             return 0.0
         if body.has_cuts:
-            total += float(cut_rules(body, body.size / 20, 1)[0].weights.sum())
+            total += float(cut_rule_of(body, body.size / 20).weights.sum())
     return total
 
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import cut_rules
+from verify.compare.error_norm import cut_rule_of
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody
@@ -119,7 +119,7 @@ def continued_where(
     """Where a field is continued across its realised cut, of which the record is known."""
     if record is None or record.continued:
         return True
-    return realised_cut(solution, body, cut_rules(body, record.element, 1)[0])
+    return realised_cut(solution, body, cut_rule_of(body, record.element))
 
 
 def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:

@@ -175,9 +175,12 @@ _FAMILY = (1.0, 1.31, 1.73)
 # error of the energy norm there three to ten times smaller for twice the points.
 _GRADING = 0.3
 _MOST = 150_000  # cells in space before grading: bounds memory and time
-# In space the rules are coarser, and their errors have a common part, which falls at least like
-# the spacing: then it is at most 1 / (1.73 − 1) of the largest difference.
-_SAFETY = {2: 1.0, 3: 1.5}
+# What the largest difference of two or three rules is multiplied with. In space the rules are
+# coarser, and their errors have a common part, which falls at least like the spacing: of three it
+# is at most 1 / (1.73 − 1) of the largest difference, of the two coarser 1.31 / (1.73 − 1.31). In
+# the plane it falls at least like the square: 1.31² / (1.73² − 1.31²); what is left is by chance,
+# of which two rules are a smaller sample.
+_SAFETY = {2: (0.0, 2.0, 1.0), 3: (0.0, 3.2, 1.5)}
 
 
 @dataclass(frozen=True)
@@ -188,30 +191,31 @@ class MeasuredNorm:
     integration_error: float
 
 
+def rule_of(body: AnyBody, size: float, k: int) -> Rule:
+    """Rule `k` of a body for fields on elements of size `size` m; the finest is 0."""
+    factor = _FAMILY[k]
+    if isinstance(body, Body):
+        return area_rule(body, factor * size / 3, slab_angles(body)[k], grading=_GRADING)
+    d = body.cell_dimension
+    spacing = max(size / 3, (factorial(d) * body.measure / _MOST) ** (1 / d))
+    # a front takes many more cells than a tip
+    depth, grading = (0.05, _GRADING) if d == 2 else (0.25, 1.0)
+    return body_rule(body, factor * spacing, k, depth=depth, grading=grading)
+
+
 def rules(body: AnyBody, size: float, count: int = 3) -> list[Rule]:
     """Rules of a body for fields on elements of size `size` m, the finest first."""
-    if isinstance(body, Body):
-        return [
-            area_rule(body, factor * size / 3, angle, grading=_GRADING)
-            for factor, angle in list(zip(_FAMILY, slab_angles(body), strict=True))[:count]
-        ]
-    k = body.cell_dimension
-    spacing = max(size / 3, (factorial(k) * body.measure / _MOST) ** (1 / k))
-    # a front takes many more cells than a tip
-    depth, grading = (0.05, _GRADING) if k == 2 else (0.25, 1.0)
-    return [
-        body_rule(body, factor * spacing, seed, depth=depth, grading=grading)
-        for seed, factor in enumerate(_FAMILY[:count])
-    ]
+    return [rule_of(body, size, k) for k in range(count)]
 
 
-def cut_rules(body: AnyBody, size: float, count: int = 3) -> list[CutRule]:
-    """Rules on the cuts for fields on elements of size `size` m, the finest first."""
+def cut_rule_of(body: AnyBody, size: float, k: int = 0) -> CutRule:
+    """Rule `k` on the cuts for fields on elements of size `size` m; the finest is 0."""
+    factor = _FAMILY[k]
     if isinstance(body, Body):
-        return [cut_rule(body, factor * size / 8) for factor in _FAMILY[:count]]
+        return cut_rule(body, factor * size / 8)
     if isinstance(body, MembraneBody):
-        return [membrane_cut_rule(body, factor * size / 8) for factor in _FAMILY[:count]]
-    return [surface_rule(body, factor * size / 3) for factor in _FAMILY[:count]]
+        return membrane_cut_rule(body, factor * size / 8)
+    return surface_rule(body, factor * size / 3)
 
 
 def integrate_norm[R: (Rule, CutRule)](
@@ -225,4 +229,4 @@ def spread_of(norms: Sequence[ErrorNorm], dimension: int) -> MeasuredNorm:
     """Take the norm by the finest rule, with the largest difference of the others from it."""
     values = [norm.relative for norm in norms]
     spread = max(abs(value - values[0]) for value in values) if values[0] < float("inf") else 0.0
-    return MeasuredNorm(norms[0], _SAFETY[dimension] * spread)
+    return MeasuredNorm(norms[0], _SAFETY[dimension][len(norms) - 1] * spread)

@@ -5,6 +5,7 @@ For pictures there is the error of a solution at its own nodes as well.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,12 +18,12 @@ from verify.compare.cut_rule import surface_rule
 from verify.compare.error_norm import (
     ErrorNorm,
     Squares,
-    cut_rules,
+    cut_rule_of,
     displacement_squares,
     energy_squares,
     jump_squares,
     opening_squares,
-    rules,
+    rule_of,
 )
 from verify.compare.hooke import Law
 from verify.compare.locate import Field, SolutionField
@@ -106,6 +107,11 @@ class ErrorMetric:
     beyond: int
     largest: bool = False
 
+    @property
+    def place(self) -> str:
+        """Whose rule it is measured by, "body" or "cut"."""
+        return "cut" if self.where == "cut" else "body"
+
 
 ERRORS: dict[str, ErrorMetric] = {
     "displacement_l2": ErrorMetric(displacement_squares, "body", 1),
@@ -124,63 +130,74 @@ ERRORS: dict[str, ErrorMetric] = {
 OVER_TIME = ("displacement_l2", "energy_norm", "jump_l2")
 
 
+# Places in the family of rules: what is measured first, and where that is too coarse.
+COARSER, FINEST = (1, 2), (0,)
+
+
 class Rules:
     """The rules of a body for one element size: families of three, the finest first.
+
+    Each is made when it is first asked for.
 
     Parameters
     ----------
     body : Body or SolidBody
     size : float
         Element size, m.
-    count : int
-        How many rules of each family.
     """
 
-    def __init__(self, body: AnyBody, size: float, count: int = 3) -> None:
-        self.radius = near_radius(body)
-        self._rules: dict[str, list[Any]] = {"body": rules(body, size, count), "cut": []}
-        self._weights = {"body": [rule.weights for rule in self._rules["body"]]}
-        if self.radius:
-            near = [near_tip(body, rule.points, self.radius) for rule in self._rules["body"]]
-            whole = list(zip(near, self._weights["body"], strict=True))
-            self._weights["near"] = [np.where(here, weights, 0.0) for here, weights in whole]
-            self._weights["far"] = [np.where(here, 0.0, weights) for here, weights in whole]
-        cuts = cut_rules(body, size, count) if body.has_cuts else []
-        self._rules["cut"] = [rule for rule in cuts if len(rule.weights)]
-        if self._rules["cut"]:
-            self._weights["cut"] = [rule.weights for rule in self._rules["cut"]]
+    def __init__(self, body: AnyBody, size: float) -> None:
+        self._body, self._size, self.radius = body, size, near_radius(body)
+        self._made: dict[tuple[str, int], Any] = {}
+        self._has_cuts = body.has_cuts and bool(len(self.one("cut", 0).weights))
 
     def measured(self) -> list[str]:
         """Names of the errors that mean something on this body."""
-        return [name for name, metric in ERRORS.items() if metric.where in self._weights]
+        there = {"body": True, "near": self.radius, "far": self.radius, "cut": self._has_cuts}
+        return [name for name, metric in ERRORS.items() if there[metric.where]]
 
-    def finest(self, place: Literal["body", "cut"]) -> Any:
-        """Finest rule of the body, or on its cuts; None if it has none."""
-        return next(iter(self._rules[place]), None)
+    def one(self, place: str, k: int) -> Any:
+        """Rule of the body, or on its cuts, at a place in its family: the finest is 0."""
+        if (place, k) not in self._made:
+            make = cut_rule_of if place == "cut" else rule_of
+            self._made[place, k] = make(self._body, self._size, k)
+        return self._made[place, k]
+
+    def on_cuts(self) -> Any:
+        """Finest rule on the cuts; None without any."""
+        return self.one("cut", 0) if self._has_cuts else None
+
+    def _weights(self, where: Where, rule: Any) -> Array:
+        """Weights (n,) of the points of a rule at what counts; 0 of others."""
+        if where in ("body", "cut"):
+            return np.asarray(rule.weights)
+        if (where, id(rule)) not in self._made:
+            near = near_tip(self._body, rule.points, self.radius)
+            here = near if where == "near" else ~near
+            self._made[where, id(rule)] = np.where(here, rule.weights, 0.0)
+        return np.asarray(self._made[where, id(rule)])
 
     def norms(
         self, names: Iterable[str], field: Field, reference: Field, law: Law,
-        count: int | None = None,
+        which: Sequence[int] = (0, 1, 2),
     ) -> dict[str, list[ErrorNorm]]:  # fmt: skip
-        """Error norms by name and by rule of the family, or by the `count` finest of it.
+        """Error norms by name and by rule, of `which` of the family, in that order.
 
         What is measured near a tip or far from it is held against the norm of the reference
         over the whole body: the squares of both add up to the square of the whole. All three
         have the same integrands, which are evaluated once.
         """
         found: dict[str, list[ErrorNorm]] = {name: [] for name in names}
-        measures = dict.fromkeys((m.measure, m.where == "cut") for m in map(ERRORS.get, found) if m)
-        for place, family in self._rules.items():
-            for k, rule in enumerate(family[:count]):
-                for measure in (one for one, on_cut in measures if on_cut == (place == "cut")):
-                    squares = measure(field, reference, rule, law)
-                    for name in found:
-                        metric = ERRORS[name]
-                        if metric.measure is measure:
-                            found[name].append(
-                                squares.largest() if metric.largest
-                                else squares.norm(self._weights[metric.where][k], rule.weights)
-                            )  # fmt: skip
+        measures = dict.fromkeys((ERRORS[n].measure, ERRORS[n].place) for n in found)
+        for (measure, place), k in product(measures, which):
+            rule = self.one(place, k)
+            squares = measure(field, reference, rule, law)
+            for name in found:
+                if (metric := ERRORS[name]).measure is measure:
+                    found[name].append(
+                        squares.largest() if metric.largest
+                        else squares.norm(self._weights(metric.where, rule), rule.weights)
+                    )  # fmt: skip
         return found
 
 
@@ -205,6 +222,16 @@ class History:
 
     times: list[float | None]
     norms: dict[str, list[list[ErrorNorm]]]
+
+    def after(self, finer: "History") -> "History":
+        """Return both: first what is measured by finer rules, as far as it is."""
+        rows = {
+            name: [[*first, *row] for first, row in zip(finer.norms[name], own, strict=True)]
+            if name in finer.norms
+            else own
+            for name, own in self.norms.items()
+        }
+        return History(self.times, rows)
 
     def reported(self) -> dict[str, list[ErrorNorm]]:
         """Error norms by name and rule.
@@ -256,14 +283,15 @@ def compared_times(scene: Scene, solution: Solution) -> list[float | None]:
 
 def error_history(
     field: Motion, reference: Motion, times: Iterable[float | None], rules: Rules, law: Law,
-    count: int | None = None,
+    which: Sequence[int] = (0, 1, 2), names: Iterable[str] | None = None,
 ) -> History:  # fmt: skip
-    """Measure all errors of a field at all times, by all rules or the `count` finest."""
+    """Measure all errors of a field, or those of some `names`, at all times, by some rules."""
     times = list(times)
-    norms: dict[str, list[list[ErrorNorm]]] = {name: [] for name in rules.measured()}
+    asked = rules.measured() if names is None else names
+    norms: dict[str, list[list[ErrorNorm]]] = {name: [] for name in asked}
     for time in times:
         one, other = field.at(time), reference.at(time)
-        for name, row in rules.norms(norms, one, other, law, count).items():
+        for name, row in rules.norms(norms, one, other, law, which).items():
             norms[name].append(row)
     return History(times, norms)
 

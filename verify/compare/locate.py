@@ -57,66 +57,71 @@ def _evaluate_linear(points, found, origins, values, slopes, axes, result):
             result[i, c] = value
 
 
+def bends_of(values: Floats) -> Floats:
+    """Give P2 fields (m, n, d) at the nodes of m cells as polynomials in their coordinates λ.
+
+    Returns (m, d, k, 1 + k) arrays (b, B): u = u_0 + b·λ + ½ λ·Bλ, with the k coordinates λ that
+    are 0 at the first corner, of value u_0. Straight edges.
+    """
+    corners = {3: 2, 6: 3, 10: 4}[values.shape[1]]
+    first, others = values[:, 0], values[:, 1:corners]
+    middle = {}  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
+    for number, edge in enumerate([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]):
+        if corners + number < values.shape[1]:
+            middle[edge] = values[:, corners + number]
+    found = np.empty((len(values), values.shape[2], corners - 1, corners))
+    for k in range(1, corners):
+        found[:, :, k - 1, 0] = 4.0 * middle[0, k] - others[:, k - 1] - 3.0 * first
+        found[:, :, k - 1, k] = 4.0 * (first + others[:, k - 1] - 2.0 * middle[0, k])
+        for j in range(1, k):
+            bend = 4.0 * (first + middle[j, k] - middle[0, j] - middle[0, k])
+            found[:, :, k - 1, j] = found[:, :, j - 1, k] = bend
+    return found
+
+
 def evaluate_quadratic(
-    points: Floats, found: Ints, nodes: Ints, values: Floats, corners: Floats, gradients: Floats
+    points: Floats, found: Ints, origins: Floats, first: Floats, bends: Floats, slopes: Floats
 ) -> tuple[Floats, Floats]:
-    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
+    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices.
+
+    `bends` are as `bends_of` gives them; `slopes` (m, k, d) are the gradients of the coordinates,
+    `origins` and `first` (m, d) place and value of the first corners.
+    """
     n, d = points.shape
     if not COMPILED:
-        return _quadratic_in_numpy(points, values[nodes[found]], corners[found], gradients[found])
+        place = np.einsum("nka,na->nk", slopes[found], points - origins[found])
+        linear, bend = bends[found, ..., 0], np.einsum("nckl,nl->nck", bends[found, ..., 1:], place)
+        u = first[found] + np.einsum("nck,nk->nc", linear + 0.5 * bend, place)
+        return u, np.einsum("nck,nka->nca", linear + bend, slopes[found])
     u, grad = np.empty((n, d)), np.empty((n, d, d))
-    axes, vertices = axes_of(d), axes_of(corners.shape[1])  # a triangle in space has three of each
-    _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad)
+    across = axes_of(slopes.shape[1])  # of a triangle in space there are two
+    _evaluate_quadratic(points, found, origins, first, bends, slopes, axes_of(d), across, u, grad)
     return u, grad
 
 
 @njit(cache=True)
-def _evaluate_quadratic(points, found, nodes, values, corners, gradients, axes, vertices, u, grad):
-    d, count = len(axes), len(vertices)
-    weight, slope = np.empty(count), np.empty(d)
-    for i in range(points.shape[0]):
+def _evaluate_quadratic(points, found, origins, first, bends, slopes, axes, across, u, grad):
+    place, rate = np.empty(len(across)), np.empty(len(across))
+    for i in range(len(points)):
         cell = found[i]
-        for k in range(count):
-            weight[k] = 0.0
-            for a in range(d):
-                from_facet = points[i, a] - corners[cell, (k + 1) % count, a]
-                weight[k] += gradients[cell, k, a] * from_facet
-        for c in range(d):
-            u[i, c] = 0.0
-            for a in range(d):
-                grad[i, c, a] = 0.0
-        for k in range(count * (count + 1) // 2):
-            if k < count:
-                shape, factor = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
-                for a in range(d):
-                    slope[a] = factor * gradients[cell, k, a]
-            else:  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
-                edge = k - count
-                p = edge if edge < 3 else edge - 3
-                q = (edge + 1) % 3 if edge < 3 else 3
-                shape = 4.0 * weight[p] * weight[q]
-                for a in range(d):
-                    both = weight[p] * gradients[cell, q, a] + weight[q] * gradients[cell, p, a]
-                    slope[a] = 4.0 * both
-            for c in range(d):
-                value = values[nodes[cell, k], c]
-                u[i, c] += shape * value
-                for a in range(d):
-                    grad[i, c, a] += slope[a] * value
-
-
-def _quadratic_in_numpy(
-    points: Floats, values: Floats, corners: Floats, gradients: Floats
-) -> tuple[Floats, Floats]:
-    """Do as `_evaluate_quadratic`, of nodal values, corners and gradients by point."""
-    from_facet = points[:, None] - np.roll(corners, -1, axis=1)
-    weight = np.einsum("nka,nka->nk", gradients, from_facet)
-    edges = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: values.shape[1] - weight.shape[1]]
-    p, q = np.transpose(edges)
-    shape = np.hstack([weight * (2.0 * weight - 1.0), 4.0 * weight[:, p] * weight[:, q]])
-    both = weight[:, p, None] * gradients[:, q] + weight[:, q, None] * gradients[:, p]
-    slope = np.hstack([(4.0 * weight - 1.0)[..., None] * gradients, 4.0 * both])
-    return np.einsum("nk,nkc->nc", shape, values), np.einsum("nka,nkc->nca", slope, values)
+        for k in across:
+            place[k] = 0.0
+            for a in axes:
+                place[k] += slopes[cell, k, a] * (points[i, a] - origins[cell, a])
+        for c in axes:
+            value = first[cell, c]
+            for k in across:
+                bend = 0.0
+                for j in across:
+                    bend += bends[cell, c, k, 1 + j] * place[j]
+                value += (bends[cell, c, k, 0] + 0.5 * bend) * place[k]
+                rate[k] = bends[cell, c, k, 0] + bend
+            u[i, c] = value
+            for a in axes:
+                slope = 0.0
+                for k in across:
+                    slope += rate[k] * slopes[cell, k, a]
+                grad[i, c, a] = slope
 
 
 def squares(values: Floats) -> Floats:
@@ -249,12 +254,13 @@ class SolutionField:
 
     def _set_nodal(self, displacement: Array) -> None:
         self._nodal = np.ascontiguousarray(displacement)
-        if self.solution.order == 1:
-            values = self._nodal[self._cells]
-            self._first = np.ascontiguousarray(values[:, 0])
-            self._slope = np.einsum(
-                "mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:]
-            )
+        values = self._nodal[self._cells]
+        self._first = np.ascontiguousarray(values[:, 0])
+        self._slope = (
+            np.einsum("mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:])
+            if self.solution.order == 1
+            else bends_of(values)
+        )
 
     @property
     def _searched(self) -> SearchedCells:
@@ -321,10 +327,8 @@ class SolutionField:
         if self.solution.order == 1:
             u = evaluate_linear(points, cells, self._origin, self._first, self._slope)
             return u, self._slope.take(cells, axis=0)
-        u, gradient = evaluate_quadratic(
-            points, cells, self._cells, self._nodal, self.shape.corners, self.shape.gradients
-        )
-        return u, gradient
+        slopes = self.shape.gradients[:, 1:]
+        return evaluate_quadratic(points, cells, self._origin, self._first, self._slope, slopes)
 
     def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
         """Displacement (n, d) and gradient (n, d, d) at `points` (n, d)."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut, welded
-from verify.compare.error_norm import cut_rules
+from verify.compare.error_norm import cut_rule_of
 from verify.compare.hooke import hooke, nodal_strain_energy
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices
@@ -197,7 +197,7 @@ def parting_record(scene: Scene, solution: Solution) -> CutRecord:
     """Measure where the displacement of a unit body jumps, beside its cuts as asked."""
     own = replace(solution, cut_facets=_parting_facets(solution))
     body, size = body_of(scene), _element(scene)
-    (rule,) = cut_rules(body, size, 1)
+    rule = cut_rule_of(body, size)
     return realised_cut(own, body, rule).record
 
 

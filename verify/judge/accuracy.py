@@ -13,8 +13,18 @@ import numpy as np
 
 from verify.compare.blade import blade_forces, released_metrics
 from verify.compare.body import AnyBody, body_of
-from verify.compare.error_norm import spread_of
-from verify.compare.errors import ERROR_NAMES, History, Rules, compared_times, error_history
+from verify.compare.error_norm import ErrorNorm, spread_of
+from verify.compare.errors import (
+    COARSER,
+    ERROR_NAMES,
+    ERRORS,
+    FINEST,
+    History,
+    Rules,
+    base_of,
+    compared_times,
+    error_history,
+)
 from verify.compare.hooke import Law, law_of
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import SolutionMotion
@@ -61,13 +71,16 @@ from verify.result import (
     SolveRecord,
     Status,
 )
-from verify.scene import Scene
+from verify.scene import BoundCheck, Scene
 from verify.solution import Solution
 
 # A solver may drop slivers; a mesh that misses more of the body than this is another body.
 _COVERED = 0.01
 _ON_SURFACE = 0.01  # of the size of a membrane: so far apart two triangulations of it may be
 _SAME_TIME = 1e-6  # of the duration
+# Integration errors that do not count: as shares of what the reference leaves open, of errors that
+# are judged, and of those that are only shown.
+_COUNTS, _JUDGED, _SHOWN = 0.2, 0.02, 0.05
 
 
 class Kept(Protocol):
@@ -157,7 +170,7 @@ class _HeldAgainst:
     reference: Reference | None
     missing: str  # why there is no reference
     exact: ExactField | None
-    rules_for: Callable[[float, int], Rules]
+    rules_for: Callable[[float], Rules]
     announce: Callable[[SolveRecord], None]
     kept: Kept | None
 
@@ -171,8 +184,7 @@ def _measure_level(
     At the same points for all of them: their errors are compared.
     """
     reference, finest = held.reference, min(compared_size(one, body) for one in own.values())
-    alone = not scene.judged_by_exact and all(measured[i].solver == REFERENCE for i in own)
-    rules = held.rules_for(finest, 3 if reference and not alone else 1)
+    rules = held.rules_for(finest)
     if reference and rules is not reference.rules:
         held = replace(held, reference=replace(reference, motion=reference.motion.afresh()))
     for i, solution in own.items():
@@ -206,7 +218,7 @@ def _reference(
     exact: ExactField | None,
     body: AnyBody,
     law: Law,
-    rules_for: Callable[[float, int], Rules],
+    rules_for: Callable[[float], Rules],
 ) -> tuple[Reference | None, str]:
     """Find the reference, or say why there is none."""
     try:
@@ -218,8 +230,7 @@ def _reference(
         sizes = (compared_size(s, body) for s in judged or levels.values())
         finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
-        rules = rules_for(finest, 3 if judged else 1)
-        return conforming_reference(scene, levels, body, law, rules, others), ""
+        return conforming_reference(scene, levels, body, law, rules_for(finest), others), ""
     except InputError as problem:
         return None, str(problem)
 
@@ -364,10 +375,14 @@ def _errors(
     record: SolveRecord,
     other: SolutionMotion | None,
 ) -> tuple[list[Metric], dict[str, str], SolveRecord]:
+    """Measure the errors by the coarser rules, then by the finest what these leave too open."""
     assert one.scene is not None
     times = compared_times(one.scene, one.solution)
+    measure = partial(error_history, one.motion, reference.motion, times, rules, one.law)
     try:
-        history = error_history(one.motion, reference.motion, times, rules, one.law)
+        history = measure(COARSER)
+        if again := _too_open(one.scene, history, reference, one.body.dimension):
+            history = history.after(measure(FINEST, again))
     except InputError as problem:  # the reference does not reach that far in time
         return [], _named(one.scene, str(problem)), record
     metrics, notes = [], _time_note(history, reference)
@@ -380,12 +395,43 @@ def _errors(
         if name not in reference.norms:
             notes[name] = "the reference's own error in this norm is not known"
             continue
-        known = reference.norms[name] / found.norm.scale if found.norm.scale else 0.0
-        # the scale is as uncertain as the reference: (1 + value), to first order
-        width = known * (1 + value) + found.integration_error
+        width = _known_to(name, found.norm, reference) + found.integration_error
         metrics.append(Metric(name, value, "1", None, width, reference.source))
     record = with_other_errors(record, other, reference.motion, times, rules, one.law)
     return metrics, notes, replace(record, series=history.series())
+
+
+def _known_to(name: str, norm: ErrorNorm, reference: Reference) -> float:
+    """Half-width of a relative error by that of the reference alone."""
+    known = reference.norms[name] / norm.scale if norm.scale else 0.0
+    # the scale is as uncertain as the reference: (1 + value), to first order
+    return known * (1 + norm.relative)
+
+
+def _too_open(scene: Scene, history: History, reference: Reference, dimension: int) -> list[str]:
+    """Errors that the rules so far leave open: in an interval of any account, or in a verdict.
+
+    The integration error counts if it is more than a fifth of what the reference leaves open and
+    more than a small share of the error, or if a limit lies within. With one all of its place are
+    measured again: they have the same points.
+    """
+    places = set()
+    for name, norms in history.reported().items():
+        found, checks = (
+            spread_of(norms, dimension),
+            [c for c in scene.acceptance if c.metric == name],
+        )
+        value, off = found.norm.relative, found.integration_error
+        if not np.isfinite(value) or name not in reference.norms:
+            continue
+        known = _known_to(name, found.norm, reference)
+        limits = [c.at_most for c in checks if isinstance(c, BoundCheck)]
+        if (
+            off > max(_COUNTS * known, (_JUDGED if checks else _SHOWN) * value)
+            or any(abs(limit - value) <= known + off for limit in limits)
+        ):  # fmt: skip
+            places.add(ERRORS[base_of(name)].place)
+    return [name for name in history.norms if ERRORS[name].place in places]
 
 
 def _time_note(history: History, reference: Reference) -> dict[str, str]:

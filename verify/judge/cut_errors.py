@@ -7,7 +7,7 @@ import numpy as np
 
 from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut, realised_cut
-from verify.compare.errors import Rules, error_history
+from verify.compare.errors import COARSER, Rules, error_history
 from verify.compare.hooke import Law
 from verify.compare.locate import ROUND_OFF
 from verify.compare.motion import Motion, SolutionMotion
@@ -20,7 +20,7 @@ MIXED = "mixed: some levels are judged without continuation across parts of the 
 
 def measured_cut(solution: Solution, body: AnyBody, rules: Rules) -> RealisedCut | None:
     """Measure the realised cut of a solution; None if nothing is cut."""
-    rule = rules.finest("cut")
+    rule = rules.on_cuts()
     return None if rule is None else realised_cut(solution, body, rule)
 
 
@@ -34,13 +34,14 @@ def with_cut(
     """
     if one.cut is None:
         return record, None
-    cut, rule, other = one.cut.record, rules.finest("body"), None
+    cut, other = one.cut.record, None
     same = ROUND_OFF * one.body.size
     if cut.lateral > same:
         plain, whole = one.continued(False), one.motion
         other = plain
         if not cut.continued:
             other = whole = one.continued(True)
+        rule = rules.one("body", COARSER[0])
         swept = rule.weights[whole.differs(plain, rule.points)].sum()
         cut = replace(cut, swept=float(swept))
     said, done = _said(cut, same)
@@ -53,10 +54,10 @@ def with_other_errors(
     record: SolveRecord, other: SolutionMotion | None, reference: Motion,
     times: Sequence[float | None], rules: Rules, law: Law,
 ) -> SolveRecord:  # fmt: skip
-    """Enter the errors of the field that is not judged, by the finest rule."""
+    """Enter the errors of the field that is not judged, by the first rule that is asked."""
     if record.cut is None or other is None:
         return record
-    found = error_history(other, reference, times, rules, law, 1).reported()
+    found = error_history(other, reference, times, rules, law, COARSER[:1]).reported()
     errors = {name: norms[0].relative for name, norms in found.items()}
     kept = {name: value for name, value in errors.items() if np.isfinite(value)}
     return replace(record, cut=replace(record.cut, errors=kept))

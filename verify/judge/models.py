@@ -248,7 +248,7 @@ def _differences(
     other = other_scene(scene, model)
     body = body_of(other)
     size = min((compared_size(one, body) for one in solutions.values()), default=body.size / 50)
-    rules = Rules(body, size, 1)
+    rules = Rules(body, size)
     known = conforming_reference(other, solutions, body, law_of(other), rules).quantities
     found = []
     for asked in scene.quantities:

@@ -12,6 +12,7 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.errors import (
+    COARSER,
     ERROR_NAMES,
     ERRORS,
     NEAR,
@@ -247,7 +248,10 @@ def conforming_reference(
     falls = error_fall(scene, solutions, sizes, body)
     times = compared_times(scene, solutions[-1])
     motions = [one.motion.afresh() for one in measured]  # the middle one is asked twice
-    steps = [error_history(one, other, times, rules, law, 1) for one, other in pairwise(motions)]
+    first = COARSER[:1]  # the rule by which solutions are measured first
+    steps = [
+        error_history(one, other, times, rules, law, first) for one, other in pairwise(motions)
+    ]
     norms, entries = _field_norms([step.reported() for step in steps], sizes, order, falls)
     # functionals of a Galerkin solution converge with twice the order of its field
     doubled = 2 * (entries["energy_norm"]["order"] or 0.0)

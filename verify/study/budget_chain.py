@@ -192,7 +192,7 @@ class References:
 
     def _measured(self, solved: Solved) -> Reference:
         levels = solved.solutions.get(REFERENCE, {})
-        law, rules = law_of(solved.scene), Rules(self._body, self._size, 1)
+        law, rules = law_of(solved.scene), Rules(self._body, self._size)
         try:
             return conforming_reference(self._scene, levels, self._body, law, rules)
         except InputError as problem:

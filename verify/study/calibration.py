@@ -73,13 +73,13 @@ def _judged(
 ) -> list[Trial]:
     finest = levels[max(levels)]
     size = size_of(finest) * (1 if scene.dimension == 2 else 2)  # of the quadrature
-    stated = conforming_reference(scene, levels, body, law, Rules(body, size, 1))
+    stated = conforming_reference(scene, levels, body, law, Rules(body, size))
     found = []
     if exact is not None:
         own = Measured(finest, body, law, scene).field
         exact = exact.at(scene.analysis.duration) if scene.analysis.duration else exact
         known_norms = [name for name in NORMS if name in stated.norms]
-        norms = Rules(body, size, count=2).norms(known_norms, own, exact, law)
+        norms = Rules(body, size).norms(known_norms, own, exact, law, (0, 1))
         for name, (fine, check) in norms.items():
             known = abs(fine.absolute - check.absolute) / fine.scale
             half = stated.norms[name] / fine.scale
