@@ -1,13 +1,13 @@
 """Surfaces of a played body: that of the material itself, one to see, one to touch.
 
 Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
-A tool is asked against the boxes of all facets at once, and touches each side of a cut; only
-facets whose boxes it comes near are looked at.
+A tool touches each side of a cut; only facets whose boxes it comes near are looked at.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from verify.simulator.embedded_surface import EmbeddedSurface
@@ -173,7 +173,6 @@ class SurfaceCollider:
         if not np.isfinite(positions).all():
             raise XfemError("positions of a surface that are not finite")
         self.positions = positions
-        self._boxes: tuple[Ints, Floats, Floats, Floats] | None = None
 
     def touched(self, start: ArrayLike, end: ArrayLike, radius: float) -> Contacts:
         """Facets within the radius of a tool's axis from start to end (a capsule).
@@ -189,78 +188,106 @@ class SurfaceCollider:
         if axis.shape != (2, 3) or not np.isfinite(axis).all():
             raise XfemError(f"axis of a tool {axis.tolist()}; expected two finite points in space")
         reach = radius + _ROUND_OFF * float(np.abs(axis).max())
-        numbers, corners, low, high = self._facets()
-        beyond = (low > axis.max(axis=0) + reach) | (high < axis.min(axis=0) - reach)
-        near = np.flatnonzero(~beyond.any(axis=1))
-        distance, at = _segment_to_facets(axis[0], axis[1], corners[near])
-        found = np.flatnonzero(distance <= reach)
-        return Contacts(numbers[near[found]], np.minimum(distance[found], radius), at[found])
-
-    def _facets(self) -> tuple[Ints, Floats, Floats, Floats]:
-        """Numbers of the facets in use, their corners, and the corners of their boxes."""
-        if self._boxes is None:
-            used = self.surface.used
-            corners = self.positions[self.surface.facets.rows[used]]
-            self._boxes = used, corners, corners.min(axis=1), corners.max(axis=1)
-        return self._boxes
+        facets = self.surface.facets.rows
+        found, distance = np.empty(len(facets), dtype=np.int64), np.empty(len(facets))
+        at = np.empty((len(facets), 3))
+        count = _touched(*axis, self.positions, facets, reach, found, distance, at)
+        return Contacts(found[:count], np.minimum(distance[:count], radius), at[:count])
 
 
-def _volumes(edges: Floats) -> Floats:
-    """Find the determinants (q,) of rows (q, 3, 3)."""
-    return np.einsum("qi,qi->q", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))
+@njit(cache=True)
+def _touched(start, end, positions, facets, reach, found, distance, at):
+    """Write facets within `reach` of a segment, distances and weights (q, 3); how many there are.
+
+    The nearest points of a segment and of a triangle that it does not pierce are an end of the
+    segment and a point of the triangle, or on an edge of it.
+    """
+    corners, ends = np.empty((3, 3)), np.stack((start, end))
+    weights, count = np.empty(3), 0
+    for f in range(len(facets)):
+        if facets[f, 0] < 0:
+            continue
+        apart = False
+        for i in range(3):
+            low = high = positions[facets[f, 0], i]
+            for k in range(3):
+                x = positions[facets[f, k], i]
+                corners[k, i] = x
+                low, high = min(low, x), max(high, x)
+            apart |= low > max(start[i], end[i]) + reach or high < min(start[i], end[i]) - reach
+        if apart:
+            continue
+        best = _pierced(start, end, corners, weights)
+        at[count] = weights
+        for k in range(5):
+            if best == 0.0:
+                break
+            if k < 2:
+                nearest_on_facet(ends[k], corners, weights)
+                off = ends[k] - weights[0] * corners[0]
+                off -= weights[1] * corners[1] + weights[2] * corners[2]
+                away = np.sqrt(_dot(off, off))
+            else:
+                away = _from_edge(start, end, corners, k - 2, weights)
+            if away < best:
+                best = away
+                at[count] = weights
+        if best <= reach:
+            found[count], distance[count] = f, best
+            count += 1
+    return count
 
 
-def _pierced(start: Floats, end: Floats, corners: Floats) -> tuple[Floats, Floats]:
-    """Distance (q,) of a segment from each facet that it pierces, that is 0, else ∞; weights."""
-    before, behind = _volumes(corners - start), _volumes(corners - end)
-    apart = ((before > 0.0) == (behind > 0.0)) & (before != 0.0) & (behind != 0.0)
-    weights = np.empty(corners.shape[:2])
+@njit(inline="always")
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(inline="always")
+def _volume(a, b, c):
+    return (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )
+
+
+@njit(cache=True)
+def _pierced(start, end, corners, weights):
+    """Distance of a segment from a facet that it pierces, that is 0, else ∞; weights there."""
+    before = _volume(corners[0] - start, corners[1] - start, corners[2] - start)
+    behind = _volume(corners[0] - end, corners[1] - end, corners[2] - end)
+    if before == behind or (before != 0.0 and behind != 0.0 and (before > 0.0) == (behind > 0.0)):
+        return np.inf
+    total, along = 0.0, end - start
+    for k in range(3):  # each corner's weight is the volume that the segment spans with the others
+        one, other = corners[(k + 1) % 3] - start, corners[(k + 2) % 3] - start
+        weights[k] = _volume(along, one, other)
+        total += weights[k]
+    if total == 0.0:  # the facet lies along the segment
+        return np.inf
     for k in range(3):
-        # each corner's weight is the volume that the segment spans with the others
-        edges = corners - start
-        edges[:, k] = end - start
-        weights[:, k] = _volumes(edges)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        weights /= weights.sum(axis=1)[:, None]
-        inside = (weights >= 0.0).all(axis=1)  # never where a facet lies along the segment: NaN
-    return np.where(inside & ~apart & (before != behind), 0.0, np.inf), weights
+        weights[k] /= total
+    return 0.0 if weights.min() >= 0.0 else np.inf
 
 
-def _segment_to_facets(start: Floats, end: Floats, corners: Floats) -> tuple[Floats, Floats]:
-    """Distance (q,) of a segment from each facet (q, 3, 3), weights (q, 3) of the nearest point."""
-    found = [_pierced(start, end, corners)]
-    for x in (start, end):
-        at = np.empty(corners.shape[:2])
-        for facet, weights in zip(corners, at, strict=True):
-            nearest_on_facet(x, facet, weights)
-        foot = np.einsum("qk,qki->qi", at, corners)
-        found.append((np.linalg.norm(foot - x, axis=1), at))
-    for k in range(3):
-        a, b = corners[:, k], corners[:, (k + 1) % 3]
-        s, t = _nearest_of_segments(start, end, a, b)
-        at = np.zeros(corners.shape[:2])
-        at[:, k], at[:, (k + 1) % 3] = 1.0 - t, t
-        away = start + s[:, None] * (end - start) - a - t[:, None] * (b - a)
-        found.append((np.linalg.norm(away, axis=1), at))
-    distance, weights = (np.array(rows) for rows in zip(*found, strict=True))
-    best, every = distance.argmin(axis=0), np.arange(len(corners))
-    return distance[best, every], weights[best, every]
-
-
-def _nearest_of_segments(p: Floats, q: Floats, a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Shares (s on pq, t on each ab) of the nearest points of a segment and some others.
+@njit(cache=True)
+def _from_edge(p, q, corners, k, weights):
+    """Distance of a segment pq from an edge of a facet, and the weights of the point there.
 
     Ericson, Real-Time Collision Detection, section 5.1.9.
     """
-    u, v, w = q - p, b - a, p - a
-    uu, vv, uv = float(u @ u), (v * v).sum(axis=1), v @ u
-    uw, vw = w @ u, (v * w).sum(axis=1)
-
-    def share(top: Floats, bottom: Floats | float) -> Floats:
-        bottom = np.broadcast_to(bottom, top.shape)
-        return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0.0)
-
-    s = np.clip(share(uv * vw - uw * vv, uu * vv - uv * uv), 0.0, 1.0)
-    t = share(uv * s + vw, vv)
-    held = np.clip(t, 0.0, 1.0)
-    return np.where(held != t, np.clip(share(uv * held - uw, uu), 0.0, 1.0), s), held
+    j = (k + 1) % 3
+    u, v, w = q - p, corners[j] - corners[k], p - corners[k]
+    uu, vv, uv, uw, vw = _dot(u, u), _dot(v, v), _dot(u, v), _dot(u, w), _dot(v, w)
+    s, bottom = 0.0, uu * vv - uv * uv
+    if bottom > 0.0:
+        s = min(max((uv * vw - uw * vv) / bottom, 0.0), 1.0)
+    t = (uv * s + vw) / vv if vv > 0.0 else 0.0
+    if not 0.0 <= t <= 1.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((uv * t - uw) / uu, 0.0), 1.0) if uu > 0.0 else 0.0
+    weights[:] = 0.0
+    weights[k], weights[j] = 1.0 - t, t
+    w = w + s * u - t * v
+    return np.sqrt(_dot(w, w))
