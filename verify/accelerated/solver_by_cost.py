@@ -22,7 +22,6 @@ from verify.xfem.linear_solvers import LinearSolver, SparseLU
 # measured on one core (AVX-512): in ns, per operation and entry of the factor of a
 # factorisation with its solution, and per node and iteration of conjugate gradients
 _OPERATION, _ENTRY, _ITERATION = 0.035, 6.0, 50.0
-_FEW_NODES = 500  # nodes, up to which a factorisation takes less than a millisecond
 _LARGE = 2000  # nodes of a solid, from which it is not even analysed ...
 _MANY, _ACROSS = 100, 12.0  # ... before so many iterations were not enough, or of its nodes across
 _MOST = 10_000  # iterations where there is no memory for a factor
@@ -60,14 +59,12 @@ class SolverByCost(LinearSolver):
         self._pattern, self._block, self._held = pattern, block, held
         self._direct: Cholesky | None = None
         self._blocks: Floats | None = None
-        self.is_iterative = pattern.node_count > _FEW_NODES
+        self.is_iterative = True
         self._waits = solid and pattern.node_count >= _LARGE
         # a cube at rest takes 10 N^⅓ to a residual of 1e-13
         many = int(_ACROSS * pattern.node_count ** (1 / 3)) if self._waits else 0
         self._iterative = ConjugateGradients(pattern, block, tolerance, max(_MANY, many))
         self._matrices, self._is_analysed = 0, False
-        if not self.is_iterative:
-            self._analyse()
 
     def learn(self, former: LinearSolver) -> None:
         """Iterate as often as a former one was allowed to, or factorise at once if it did so."""
