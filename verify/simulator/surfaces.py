@@ -191,7 +191,7 @@ class SurfaceCollider:
         facets = self.surface.facets.rows
         found, distance = np.empty(len(facets), dtype=np.int64), np.empty(len(facets))
         at = np.empty((len(facets), 3))
-        count = _touched(*axis, self.positions, facets, reach, found, distance, at)
+        count = _touched(axis[0], axis[1], self.positions, facets, reach, found, distance, at)
         return Contacts(found[:count], np.minimum(distance[:count], radius), at[:count])
 
 
