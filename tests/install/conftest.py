@@ -28,7 +28,7 @@ esac
 """
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def root():
     return ROOT
 

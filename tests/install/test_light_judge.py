@@ -2,56 +2,74 @@
 
 import json
 import os
+import re
+import resource
+import shutil
 import subprocess
 import sys
 import venv
 from dataclasses import replace
-from pathlib import Path
-from time import perf_counter
+from types import SimpleNamespace
 
 import pytest
+from stranger_solver import Stranger
 
 from verify.runner.directory import Job
 from verify.runner.references import BESIDE, bundle_of_case
+from verify.runner.selection import select_cases
 from verify.scene import case_folder, load_scene
 from verify.solution import read_solution, write_solution
 
 FORBIDDEN = ("numba", "llvmlite", "pyvista", "vtkmodules", "gmsh", "dolfinx", "petsc4py", "mpi4py")
-CASES = [
+WITH_BUNDLE = [
     str((path.parent.parent / path.stem).relative_to(case_folder()))
     for path in sorted(case_folder().rglob(f"{BESIDE}/*.zip"))
 ]
 
 
-def answers_of_another(case, folder, factor=1.0):
-    """Write what another program could have answered: the coarse levels of the reference."""
-    scene = load_scene(case)
-    bundle = bundle_of_case(scene)
+def answers_of_another(scene, folder, factor=1.0):
+    """Write what another program could have answered: the coarse levels of the reference.
+
+    Of a scene without a bundle those of another solver, or none if that does not take it.
+    """
+    bundle, own = bundle_of_case(scene), Stranger()
+    if bundle is None and own.refuses(scene):
+        return
     for level in range(scene.mesh.count):
         place = folder / f"level-{level}"
         place.mkdir(parents=True)
-        bundle.take(scene, Job(scene.name, "reference", level, 1, "any", place))
-        answer = read_solution(place / "solution")
-        write_solution(
-            replace(answer, displacement=factor * answer.displacement), place / "solution"
-        )
+        if bundle is None:
+            answer = own.solve(scene, level)
+        else:
+            bundle.take(scene, Job(scene.name, "reference", level, 1, "any", place))
+            answer = read_solution(place / "solution")
+        answer = replace(answer, displacement=factor * answer.displacement)
+        write_solution(answer, place / "solution")
 
 
-def verdicts(python, environment, case, answers, out):
-    asked = [python, "-m", "verify", "import", case, answers]
+def said(python, place, *command, environment=None):
+    """Run a command of `verify` in an environment; return its answer and seconds of processor."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        [*asked, "--solver", "mine", "--out", out, "--json"],
-        env={**os.environ, **environment, "VERIFY_CACHE": str(out.parent / "cache")},
-        cwd=out.parent,
+        [python, "-m", "verify", *map(str, command)],
+        env={**os.environ, "PYTHONPATH": "", **(environment or {})}
+        | {"VERIFY_CACHE": str(place / "cache")},
+        cwd=place,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.stdout, done.stderr
-    answer = json.loads(done.stdout)
-    return {one["metric"]: one["verdict"] for one in answer["cases"][0]["verdicts"]}, answer[
-        "report"
-    ]
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = sum(getattr(after, name) - getattr(before, name) for name in ("ru_utime", "ru_stime"))
+    return SimpleNamespace(code=done.returncode, out=done.stdout, err=done.stderr, seconds=spent)
+
+
+def verdicts(answer):
+    """Return verdicts by case and metric."""
+    return {
+        case["case"]: {one["metric"]: one["verdict"] for one in case["verdicts"]}
+        for case in json.loads(answer.out)["cases"]
+    }
 
 
 def test_a_folder_of_answers_is_judged_where_only_numpy_and_scipy_are(tmp_path, root):
@@ -62,37 +80,128 @@ def test_a_folder_of_answers_is_judged_where_only_numpy_and_scipy_are(tmp_path, 
     environment = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
     case, found = "cutting/plate_crossed_quick", {}
     for name, factor in (("right", 1.0), ("wrong", 1.3)):
-        answers_of_another(case, tmp_path / name, factor)
-        found[name], report = verdicts(
-            sys.executable, environment, case, tmp_path / name, tmp_path / f"out-{name}"
-        )
-        assert "<svg" in Path(report).read_text()
-    assert found["right"]["displacement_l2"] == "PASS"
-    assert found["wrong"]["displacement_l2"] == "FAIL"
+        answers_of_another(load_scene(case), tmp_path / name, factor)
+        asked = ["import", case, tmp_path / name, "--solver", "mine", "--out", f"out-{name}"]
+        answer = said(sys.executable, tmp_path, *asked, "--json", environment=environment)
+        found[name] = verdicts(answer)[case]["displacement_l2"]
+        assert "<svg" in (tmp_path / json.loads(answer.out)["report"]).read_text()
+    assert found == {"right": "PASS", "wrong": "FAIL"}
+
+
+@pytest.fixture(scope="session")
+def light(tmp_path_factory, root):
+    """Python of an environment of `pip install .` without extras, in the versions of the lock."""
+    place = tmp_path_factory.mktemp("light")
+    venv.create(place / "venv", with_pip=True)
+    python = str(place / "venv" / "bin" / "python")
+    locked = re.findall(r"^[A-Za-z0-9._-]+==[^\s;\\]+", lock_of(root), re.MULTILINE)
+    (place / "versions.txt").write_text("\n".join(locked))
+    pip = [python, "-m", "pip", "install", "-q", "--no-compile", "-c", place / "versions.txt"]
+    subprocess.run([*pip, root], check=True)
+    subprocess.run([*pip, "--target", place / "pytest", "pytest"], check=True)
+    return SimpleNamespace(python=python, venv=place / "venv", pytest=place / "pytest")
+
+
+def lock_of(root):
+    return (root / ".ci/requirements.lock").read_text()
 
 
 @pytest.mark.heavy
-def test_an_environment_of_pip_install_is_small_and_judges_every_bundle(tmp_path, root):
-    """At most 350 MB with pip itself and what its use has compiled, and 60 s for each scene."""
-    place = tmp_path / "venv"
-    venv.create(place, with_pip=True)
-    python = str(place / "bin" / "python")
-    subprocess.run([python, "-m", "pip", "install", "-q", "--no-compile", str(root)], check=True)
+def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_path, light):
+    """At most 350 MB with pip itself and what its use has compiled; 60 s on each of two cores."""
     for name in FORBIDDEN:
-        assert subprocess.run([python, "-c", f"import {name}"], capture_output=True).returncode
-    for case in CASES:
-        folder = tmp_path / case.replace("/", "__")
-        answers_of_another(case, folder / "answers")
-        start = perf_counter()
-        found, _ = verdicts(python, {"PYTHONPATH": ""}, case, folder / "answers", folder / "out")
-        print(f"{case}: {perf_counter() - start:.1f} s, {found}")
-        assert "ERROR" not in found.values()
-        assert perf_counter() - start < 60.0
-    size = size_of(place)
+        code = f"import {name}"
+        assert subprocess.run([light.python, "-c", code], capture_output=True).returncode
+    for scene in select_cases(["benchmark"], weight="heavy"):
+        answers_of_another(scene, tmp_path / "answers" / scene.name)
+    asked = ["import", "benchmark", "answers", "--solver", "mine", "--out", "out", "-j", 2]
+    answer = said(light.python, tmp_path, *asked, "--json")
+    found = verdicts(answer)
+    print(f"{len(found)} scenes: {answer.seconds:.0f} s of processor")
+    assert {verdict for one in found.values() for verdict in one.values()} <= {"PASS", "UNDECIDED"}
+    assert answer.seconds < 2 * 60.0
+    size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())
     print(f"{size / 1e6:.0f} MB")
     assert size < 350e6
 
 
-def size_of(folder):
-    """Bytes of all files in a folder."""
-    return sum(path.lstat().st_size for path in folder.rglob("*") if path.is_file())
+@pytest.mark.heavy
+@pytest.mark.parametrize("case", WITH_BUNDLE)
+def test_every_bundle_judges_in_a_minute(tmp_path, light, case):
+    answers_of_another(load_scene(case), tmp_path / "answers")
+    asked = ["import", case, "answers", "--solver", "mine", "--out", "out", "--json"]
+    answer = said(light.python, tmp_path, *asked)
+    print(f"{case}: {answer.seconds:.1f} s, {verdicts(answer)}")
+    assert "ERROR" not in verdicts(answer)[case].values()
+    assert answer.seconds < 60.0
+
+
+REST, SLIVER, MOTION = (
+    "benchmark/c1_slit", "benchmark/c8_slivers[epsilon=1e-06]", "cutting/plate_crossed_quick",
+)  # fmt: skip
+REPOSITORY = {
+    "pytest.ini": "[pytest]\nverify_solvers = stranger_solver:Stranger\n",
+    "test_cuts.py": f"""
+import pytest
+
+@pytest.mark.verify("{REST}")
+def test_slit(): ...
+
+@pytest.mark.verify("{SLIVER}")
+def test_sliver(): ...
+
+@pytest.mark.verify("{MOTION}")
+def test_motion(): ...
+""",
+}
+# a loss: the scene in which it shows, the metric that says so, a line of the solver, and what
+# somebody puts before it
+LOSSES = {
+    "lumping that lets each copy of a node keep the mass of both": (
+        MOTION, "displacement_l2", "        step = scene.analysis.time_step\n",
+        "        for pair in self._twins():\n"
+        "            mass.reshape(-1, 2)[pair] = mass.reshape(-1, 2)[pair].sum(axis=0)\n",
+    ),
+    "a step 10 % too long": (
+        MOTION, "displacement_l2", "            u = u + ahead", "            ahead *= 1.1\n",
+    ),
+    "0.3 % of the energy": (
+        REST, "strain_energy", "        energy = 0.5 * u", "        u = u * 0.997**0.5\n",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.heavy
+def test_a_repository_of_a_stranger_is_green_and_red_after_each_planted_loss(tmp_path, light, root):
+    """The message names the scene, the number and the limit."""
+    source = (root / "tests/install/stranger_solver.py").read_text()
+    (tmp_path / "stranger_solver.py").write_text(source)
+    for name, text in REPOSITORY.items():
+        (tmp_path / name).write_text(text)
+    green = subprocess.run(
+        [light.python, "-m", "pytest", "-q", "-rs", "--verify-out", "runs"],
+        env={**os.environ, "PYTHONPATH": f"{light.pytest}{os.pathsep}{tmp_path}"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    print(green.stdout)
+    assert green.returncode == 0, green.stdout
+    for run in sorted((tmp_path / "runs").iterdir()):
+        saved = said(light.python, tmp_path, "baseline", "save", run, "--file", "baseline.json")
+        assert saved.code == 0, saved.out
+    for loss, (scene, metric, line, planted) in LOSSES.items():
+        assert source.count(line) == 1, loss
+        (tmp_path / "stranger_solver.py").write_text(source.replace(line, planted + line))
+        asked = ["run", scene, "--solver", "stranger_solver:Stranger", "--repetitions", 1]
+        ran = said(light.python, tmp_path, *asked, "--no-report", "--no-conform", "--out", "red")
+        assert ran.code in (0, 1), ran.err
+        checked = said(light.python, tmp_path, "baseline", "check", "red", "--partial")
+        said_so = [row for row in checked.out.splitlines() if row.startswith("FAIL")]
+        print(loss, *said_so[:3], sep="\n    ")
+        assert checked.code == 1, loss
+        (row,) = [row for row in said_so if f"/{metric}:" in row]
+        assert scene in row
+        assert "stored" in row
+        assert "allowed" in row
+        shutil.rmtree(tmp_path / "red")
