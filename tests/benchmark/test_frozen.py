@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,8 +37,7 @@ def complaints(values, frozen, page):
         if frozen[version].get(name) != mark
     ]
     found += [f"{name} is gone" for name in frozen[version].keys() - own.keys()]
-    versions = list(frozen)
-    for before, after in zip(versions, versions[1:], strict=False):
+    for before, after in pairwise(frozen):
         entry = re.search(rf"^.*\b{re.escape(after)}: (.*)$", page, re.MULTILINE)
         found += [
             f"{name} changed with version {after}, which its entry does not say"
