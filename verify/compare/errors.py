@@ -201,7 +201,12 @@ class Rules:
         return found
 
 
-ERROR_NAMES = (*ERRORS, *(f"{name}_{how}" for name in OVER_TIME for how in ("max", "mean")))
+CONTACT_ERRORS = ("contact_pressure", "contact_oscillation")  # see `verify.compare.contact`
+ERROR_NAMES = (
+    *ERRORS,
+    *(f"{name}_{how}" for name in OVER_TIME for how in ("max", "mean")),
+    *CONTACT_ERRORS,
+)
 
 
 def base_of(name: str) -> str:

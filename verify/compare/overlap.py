@@ -1,6 +1,6 @@
 """Overlap of the faces of cuts in the deformed body: how deep, and where.
 
-There is no contact model, so that an answer may put two parts of a body into one place. Faces that
+Without contact an answer may put two parts of a body into one place. Faces that
 slide along each other at a finite rotation have no opposite points left; therefore points of all
 faces are looked for in the deformed cells of whatever is there: the other side of their cut, or
 another part of the body.

@@ -13,6 +13,12 @@ import numpy as np
 
 from verify.compare.blade import blade_forces, released_metrics
 from verify.compare.body import AnyBody, body_of
+from verify.compare.contact import (
+    ContactTruth,
+    contact_metrics,
+    exact_pressure,
+    stated_pressure,
+)
 from verify.compare.error_norm import ErrorNorm, MeasuredNorm, spread_of
 from verify.compare.errors import (
     COARSER,
@@ -231,7 +237,10 @@ def _reference(
         sizes = (compared_size(s, body) for s in judged or levels.values())
         finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
-        return conforming_reference(scene, levels, body, law, rules_for(finest), others), ""
+        found = conforming_reference(scene, levels, body, law, rules_for(finest), others)
+        stated = [stated_pressure(levels[k]) for k in sorted(levels, reverse=True)
+                  if levels[k].contact is not None]  # fmt: skip
+        return replace(found, contact=stated), ""
     except InputError as problem:
         return None, str(problem)
 
@@ -308,6 +317,9 @@ def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rule
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)
+    if scene.contact.closed:
+        kept, why = _contact(one, None if own else reference, rules, held.exact)
+        metrics, notes = metrics + kept, notes | why
     if scene.analysis.kind == "dynamic":
         account = motion_account(scene, one.solution, one.law)
         parts = part_records(scene, one.solution, account)
@@ -367,6 +379,22 @@ def _quantities(
         unit = unit_of(asked, scene.dimension)
         metrics.append(Metric(asked.name, value, unit, known, width, source))
     return metrics, notes
+
+
+def _contact(
+    one: Measured, reference: Reference | None, rules: Rules, exact: ExactField | None
+) -> tuple[list[Metric], dict[str, str]]:
+    """Measure the contact of the faces of cuts."""
+    rule, truth = rules.finest("cut"), None
+    assert one.scene is not None
+    if rule is None:
+        return [], {"contact_pressure": "no cut lies inside the body"}
+    if reference is not None:
+        judged = one.scene.judged_by_exact
+        known = [exact_pressure(exact, one.law, rule)] if judged else reference.contact
+        truth = ContactTruth(known, reference.source) if known else None
+    size = compared_size(one.solution, one.body)
+    return contact_metrics(one.solution, one.field, rule, truth, size)
 
 
 def _errors(

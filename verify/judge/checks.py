@@ -150,6 +150,8 @@ def limit_text(check: Any) -> str:
             return f"order {check.equals:g} ± {check.within:g}"
         case BoundCheck(metric="overlap_depth"):
             return f"overlap ≤ {check.at_most:g} m"
+        case BoundCheck(metric="contact_overlap"):
+            return f"overlap ≤ {check.at_most:g} p h/E"
         case BoundCheck():
             return f"relative error ≤ {check.at_most:g}"
         case RatioCheck(at_most=float(most)):

@@ -56,7 +56,7 @@ def error_interval(metric: Metric) -> Interval:
     NotMeasuredError
         If the metric is a quantity without a reference, or with one that is 0.
     """
-    if metric.name in ERROR_METRICS or metric.name == OVERLAP:
+    if metric.name in ERROR_METRICS or metric.name in (OVERLAP, "contact_overlap"):
         error, width = metric.value, metric.uncertainty
         return Interval(error, max(0.0, error - width), error + width)
     if metric.reference is None:  # never take the quantity itself for an error

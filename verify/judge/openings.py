@@ -227,7 +227,7 @@ def with_openings(
             why = one_line(f"{COMPARISON_FAILED}: {type(problem).__name__}: {problem}")
             solves.append(_without(record, why))
         else:
-            solves.append(_recorded(record, own))
+            solves.append(_recorded(record, own, _depth_of_pressure(scene, solution, record.size)))
     result = replace(result, solves=solves)
     shown = _contestants(scene, body, result, solutions, exact)
     judge = shown[0] if shown and shown[0].name == REFERENCE else None
@@ -237,7 +237,8 @@ def with_openings(
         result = replace(result, reference=_with_overlap(result.reference, finest[REFERENCE]))
     times = _times(scene, body, shown, solutions, finest)
     openings = opening_profiles(body, shown, times)
-    warned = [] if scene.contact.expected == "overlap" else _warnings(scene, finest, openings)
+    meant = scene.contact.expected != "none"  # or judged as an error of contact
+    warned = [] if meant else _warnings(scene, finest, openings)
     return replace(result, openings=openings, notices=[*result.notices, *warned])
 
 
@@ -254,10 +255,19 @@ def _deepest(solution: Solution) -> _Found:
     return _Found(overlaps[worst], float(times[steps[worst]]), looked)
 
 
-def _recorded(record: SolveRecord, found: _Found) -> SolveRecord:
-    """Add what was found to the record of a solve."""
+def _depth_of_pressure(scene: Scene, solution: Solution, size: float | None) -> float:
+    """Return p h/E of the largest pressure of contact, m; zero without any."""
+    if solution.contact is None or not size:
+        return 0.0
+    return float(solution.contact.pressure.max(initial=0.0)) * size / scene.material.young
+
+
+def _recorded(record: SolveRecord, found: _Found, pressed: float) -> SolveRecord:
+    """Add what was found to the record of a solve; `pressed` is p h/E, m."""
     overlap = found.overlap
     metrics = [*record.metrics, Metric(OVERLAP, overlap.depth, "m")]
+    if pressed:
+        metrics.append(Metric("contact_overlap", overlap.depth / pressed, "1"))
     said = [_place(found)] if overlap.depth > 0.0 else []
     said += [found.looked] if found.looked else []
     if overlap.inside_out:
@@ -352,7 +362,7 @@ def _warnings(
         )
         text = (
             f"faces overlap by up to {overlap.depth:.4g} m at {_place(found)}; {beside}. "
-            "There is no contact model: this is no answer to a cut that closes"
+            "Without contact this is no answer to a cut that closes: [contact] expected = 'closed'"
         )
         warned.append(Notice(NoticeKind.WARNING, "overlap of faces", name, text))
     return warned

@@ -10,6 +10,7 @@ import numpy as np
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
+from verify.compare.contact import Pressure
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.errors import (
     COARSER,
@@ -91,6 +92,8 @@ class Reference:
         Value and half-width per quantity of interest that it has.
     record : ReferenceRecord
         What the result says about it.
+    contact : sequence of Pressure
+        On the faces of cuts, of its levels, the finest first; of an exact field known otherwise.
     rules : Rules, optional
         At the points of which the motion was asked before, and remembers what it was.
     """
@@ -101,6 +104,7 @@ class Reference:
     quantities: dict[str, tuple[float, float]]
     record: ReferenceRecord
     rules: Rules | None = None
+    contact: Sequence[Pressure] = ()
 
 
 def size_of(solution: Solution) -> float:

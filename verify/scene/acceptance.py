@@ -22,6 +22,10 @@ from verify.scene.strict import (
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
 OVERLAP = "overlap_depth"  # m, largest over time: of itself the error of faces that must not meet
 OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean", OVERLAP)
+# of a scene with contact; contact_overlap: its depth over p h/E
+OF_CONTACT = (
+    "contact_pressure", "contact_oscillation", "contact_extent", "contact_force", "contact_overlap",
+)  # fmt: skip
 # max and mean: over time; the last nine need no reference
 OF_MOTION = (
     "displacement_l2_max", "displacement_l2_mean", "energy_norm_max", "energy_norm_mean",
@@ -34,7 +38,7 @@ OF_MOTION = (
 METRICS = tuple(dict.fromkeys((
     "displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_l2", "opening_max",
     "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
-    OVERLAP, *OF_MOTION,
+    OVERLAP, *OF_CONTACT, *OF_MOTION,
 )))  # fmt: skip
 OF_MOVING_PARTS = ("linear_momentum", "angular_momentum", "kinetic_energy")
 _DIRECTED = ("inertia", "linear_momentum", "angular_momentum")  # of a part, along an axis

@@ -16,7 +16,14 @@ import numpy as np
 from pydantic import model_validator
 
 from verify.geometry.simplices import feet
-from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, OF_MOVING_PARTS, OVERLAP
+from verify.scene.acceptance import (
+    METRICS,
+    OF_CONTACT,
+    OF_CUTS,
+    OF_MOTION,
+    OF_MOVING_PARTS,
+    OVERLAP,
+)
 from verify.scene.cuts import DiscCut, PolygonCut
 from verify.scene.geometry import GROUP, MeshFile, Polygon, Skin
 from verify.scene.placement import (
@@ -376,6 +383,8 @@ RULES: Rules = (
     ("acceptance[*].metric", lambda s, p: _unknown_metric(s, p.metric), "no '{}'{}"),
     ("acceptance[*].metric", lambda s, p: p.metric in OF_CUTS and not s.cuts and p.metric,
      "{} needs a cut"),
+    ("acceptance[*].metric", lambda s, p: p.metric in OF_CONTACT and not s.contact.closed
+     and p.metric, "{} belongs to contact.expected = 'closed'"),
     ("acceptance[*].metric", lambda s, p: p.metric == OVERLAP and p.check in ("rate", "ratio")
      and (OVERLAP, p.check), "{} has no {}; expected a check 'error' (at most, m) or 'value'"),
     ("acceptance[*].metric", lambda s, p: p.metric in OF_MOTION and _is_static(s) and p.metric,

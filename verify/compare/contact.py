@@ -1,0 +1,168 @@
+"""Contact of the faces of cuts: errors of the pressure, its extent, its force, and the slip.
+
+A solver states its pressure at points of its realised cut, with the length or area of each. It is
+compared there with p = −n·σn of the exact field, or with the pressure of the reference. Errors are
+in L2 over the cut, and over the output times of a motion; the oscillation is the part of the error
+that is left of it without its mean over two elements to all sides.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from verify.compare.cut_rule import CutRule
+from verify.compare.error_norm import displacement_jump
+from verify.compare.errors import CONTACT_ERRORS
+from verify.compare.hooke import Law
+from verify.compare.locate import Field
+from verify.compare.motion import field_at
+from verify.result import Metric
+from verify.solution import ContactPressure, Solution
+
+Array = NDArray[np.float64]
+Pressure = Callable[[Array, float], Array]  # at points (n, d) and a time, Pa
+_PRESSED = 1e-3  # of the largest pressure: faces are together where it is more
+_AROUND = 2.0  # elements over which the oscillation is told from the error
+_MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
+
+
+@dataclass(frozen=True)
+class ContactTruth:
+    """Pressures that are known, the best first, and what they are.
+
+    A second one says by its distance how well the first is known.
+    """
+
+    pressures: Sequence[Pressure]
+    source: str
+
+
+def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
+    """Pressure of an exact field on the faces of the cuts of a rule, zero where they are drawn."""
+    tree = cKDTree(rule.points)
+
+    def at(points: Array, time: float) -> Array:
+        nearest = tree.query(points)[1]
+        normals = rule.normals[nearest]
+        beside = points + rule.positive[nearest] - rule.points[nearest]
+        gradient = field_at(exact, time).gradient(points, beside)
+        stress = law.at(points).piola(gradient)
+        drawn = np.einsum("ni,nij,nj->n", normals, stress, normals)
+        return np.maximum(-np.nan_to_num(drawn), 0.0)
+
+    return at
+
+
+def stated_pressure(solution: Solution) -> Pressure:
+    """Pressure that a solution states, between its points by the inverse of the distances."""
+    contact = solution.contact
+    assert contact is not None
+    count = min(solution.dimension, len(contact.points))
+    tree = cKDTree(contact.points)
+
+    def at(points: Array, time: float) -> Array:
+        step = int(np.argmin(np.abs(solution.times - time)))
+        away, which = tree.query(points, k=list(range(1, count + 1)))
+        shares = 1.0 / np.maximum(away, 1e-12 * max(float(away.max(initial=0.0)), 1e-300))
+        found = (shares * contact.pressure[step][which]).sum(axis=1) / shares.sum(axis=1)
+        return np.asarray(found)
+
+    return at
+
+
+def contact_metrics(
+    solution: Solution, field: Field, rule: CutRule, truth: ContactTruth | None, size: float
+) -> tuple[list[Metric], dict[str, str]]:
+    """Measure what a solution says of the contact of its faces.
+
+    Parameters
+    ----------
+    solution : Solution
+    field : Field
+        Its field at the last output time.
+    rule : CutRule
+        On the cuts.
+    truth : ContactTruth or None
+    size : float
+        Of its elements, m.
+
+    Returns
+    -------
+    metrics : list of Metric
+        Relative errors ``contact_pressure`` and ``contact_oscillation``; at the last output time
+        ``contact_extent`` (m, in space m²), ``contact_force`` (N) and ``contact_slip`` of faces
+        that are together, the largest in elements.
+    notes : dict of str to str
+        By what is not measured, why.
+    """
+    contact = solution.contact
+    if contact is None or not len(contact.weights):
+        return [], {CONTACT_ERRORS[0]: "the solver states no pressure of contact"}
+    slip = _slip(contact, field, rule) / size
+    metrics = [Metric("contact_slip", slip, "1")]
+    if slip >= _MOST_SLIP:
+        why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
+        return metrics, dict.fromkeys((*CONTACT_ERRORS, "contact_extent", "contact_force"), why)
+    known = truth.pressures if truth else ()
+    last, source = float(solution.times[-1]), truth.source if truth else ""
+    own = _resultants(contact.pressure[-1], contact.weights)
+    others = [_resultants(one(rule.points, last), rule.weights) for one in known]
+    unit = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
+    for i, name in enumerate(("contact_extent", "contact_force")):
+        values = [other[i] for other in others]
+        width = abs(values[0] - values[1]) if len(values) > 1 else 0.0
+        metrics.append(Metric(name, own[i], unit[i], next(iter(values), None), width, source))
+    if not known:
+        return metrics, {}
+    errors, notes = _errors(solution, contact, truth, size)
+    return metrics + errors, notes
+
+
+def _errors(
+    solution: Solution, contact: ContactPressure, truth: ContactTruth, size: float
+) -> tuple[list[Metric], dict[str, str]]:
+    times, weights = solution.times, contact.weights
+    spans = np.gradient(times) if len(times) > 1 else np.ones(1)
+    known = [np.array([one(contact.points, t) for t in times]) for one in truth.pressures]
+
+    def norm(values: Array) -> float:
+        return float(np.sqrt(spans @ (values**2 @ weights)))
+
+    scale, error = norm(known[0]), contact.pressure - known[0]
+    if scale == 0.0:
+        return [], dict.fromkeys(CONTACT_ERRORS, "no face is pressed in the reference")
+    width = norm(known[0] - known[1]) / scale if len(known) > 1 else 0.0
+    around = cKDTree(contact.points).sparse_distance_matrix(
+        cKDTree(contact.points), _AROUND * size, output_type="coo_matrix"
+    )
+    mean, total = np.zeros_like(error), np.zeros(len(weights))
+    np.add.at(mean.T, around.row, (weights * error)[:, around.col].T)
+    np.add.at(total, around.row, weights[around.col])
+    shares = (norm(error), norm(error - mean / total))
+    rows = zip(CONTACT_ERRORS, shares, strict=True)
+    return [Metric(n, v / scale, "1", None, width, truth.source) for n, v in rows], {}
+
+
+def _resultants(pressure: Array, weights: Array) -> tuple[float, float]:
+    """Length or area of the faces that are together, and the force between them."""
+    pressed = pressure > _PRESSED * pressure.max(initial=0.0)
+    return float(weights[pressed].sum()), float(weights @ pressure)
+
+
+def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
+    """Largest displacement along each other of faces that are together, m."""
+    pressure = contact.pressure[-1]
+    points = contact.points[pressure > _PRESSED * pressure.max()]
+    if not len(points):
+        return 0.0
+    nearest = cKDTree(rule.points).query(points)[1]
+    shift = rule.positive[nearest] - rule.points[nearest]
+    normals = rule.normals[nearest]
+    beside = CutRule(points, np.ones(len(points)), normals, points + shift, points - shift)
+    jump = displacement_jump(field, beside)
+    jump -= np.sum(jump * normals, axis=1)[:, None] * normals
+    return float(np.linalg.norm(jump, axis=1).max())
