@@ -116,7 +116,7 @@ def contact_metrics(
         values = [other[i] for other in others]
         width = abs(values[0] - values[1]) if len(values) > 1 else 0.0
         metrics.append(Metric(name, own[i], unit[i], next(iter(values), None), width, source))
-    if not known:
+    if truth is None:
         return metrics, {}
     errors, notes = _errors(solution, contact, truth, size)
     return metrics + errors, notes

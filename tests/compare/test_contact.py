@@ -1,0 +1,98 @@
+"""Errors of a stated pressure of contact, on pressures whose errors are known in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scenes
+
+from reference.exact import exact_of
+from verify.compare.body import body_of
+from verify.compare.contact import (
+    ContactTruth,
+    contact_metrics,
+    exact_pressure,
+    stated_pressure,
+)
+from verify.compare.errors import Rules
+from verify.compare.hooke import law_of
+from verify.compare.motion import SolutionMotion
+from verify.solution import ContactPressure, Solution
+
+LINE = {"kind": "polyline", "points": [[-0.1, 0.3], [1.1, 0.7]]}
+STRAIN = [[-1e-3, 0.0], [0.0, -1e-3]]
+UNIFORM = 1e-3 / (1.3 * 0.4)  # E ε / ((1+ν)(1−2ν))
+
+
+def measured(pressure, truth=True, points=None, slide=0.0):
+    """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain."""
+    scene = scenes.scene(
+        [LINE], contact={"expected": "closed"},
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        exact={"solution": "linear", "parameters": {"matrix": STRAIN, "shift": [0.0, 0.0]}},
+    )  # fmt: skip
+    x = np.linspace(0.0, 1.0, 401)[:-1] + 1 / 800 if points is None else points
+    places = np.column_stack([x, 1 / 3 + x / 3])
+    contact = ContactPressure(
+        places, np.full(len(x), np.hypot(1, 1 / 3) / len(x)), pressure(x)[None]
+    )
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 1 / 3], [1, 2 / 3]], dtype=float)
+    corners = np.concatenate([corners, corners[4:]])
+    cells = np.array([[0, 1, 4], [1, 5, 4], [6, 7, 3], [7, 2, 3]])
+    moved = corners @ np.array(STRAIN)
+    moved[[2, 3, 6, 7]] += slide * np.array([3.0, 1.0]) / np.sqrt(10.0)
+    solution = Solution(corners, cells, moved[None], size=0.1, contact=contact,
+                        cut_facets=corners[None, [4, 5]])  # fmt: skip
+    body, law = body_of(scene), law_of(scene)
+    rule = Rules(body, 0.1).finest("cut")
+    known = ContactTruth([exact_pressure(exact_of(scene), law, rule)], "exact") if truth else None
+    field = SolutionMotion(solution, body).at()
+    found, notes = contact_metrics(solution, field, rule, known, 0.1)
+    return {one.name: one for one in found}, notes, solution
+
+
+def test_a_true_pressure_has_no_error_and_its_extent_and_force_are_those_of_the_cut():
+    found, notes, _ = measured(lambda x: np.full_like(x, UNIFORM))
+    assert not notes
+    assert found["contact_pressure"].value < 1e-12
+    length = np.hypot(1.0, 1 / 3)
+    for name, wanted in (("contact_extent", length), ("contact_force", UNIFORM * length)):
+        assert found[name].value == pytest.approx(wanted, rel=1e-12)
+        assert found[name].reference == pytest.approx(wanted, rel=1e-9)
+    assert found["contact_slip"].value < 1e-12
+
+
+def test_a_wave_shorter_than_elements_is_oscillation_and_an_offset_is_none():
+    """A sine of half an element is all oscillation: its mean over two elements is small."""
+    wave, _, _ = measured(lambda x: UNIFORM * (1 + 0.2 * np.sin(2 * np.pi * x / 0.05)))
+    offset, _, _ = measured(lambda x: np.full_like(x, 1.1 * UNIFORM))
+    assert wave["contact_pressure"].value == pytest.approx(0.2 / np.sqrt(2), rel=1e-3)
+    assert wave["contact_oscillation"].value == pytest.approx(0.2 / np.sqrt(2), rel=0.05)
+    assert offset["contact_pressure"].value == pytest.approx(0.1, rel=1e-9)
+    assert offset["contact_oscillation"].value < 1e-12
+
+
+def test_faces_that_slide_by_more_than_half_an_element_are_not_judged():
+    slid, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.07)
+    assert list(slid) == ["contact_slip"]
+    assert slid["contact_slip"].value == pytest.approx(0.7, rel=1e-9)
+    assert notes["contact_pressure"].startswith("faces slide by 0.7 elements")
+    little, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.03)
+    assert little["contact_pressure"].value < 1e-12
+
+
+def test_half_of_the_faces_together_is_half_the_extent_and_a_stated_pressure_is_a_truth():
+    half, _, solution = measured(lambda x: np.where(x < 0.5, UNIFORM, 0.0))
+    length = np.hypot(1.0, 1 / 3)
+    assert half["contact_extent"].value == pytest.approx(0.5 * length, rel=1e-9)
+    assert half["contact_pressure"].value == pytest.approx(np.sqrt(0.5), rel=1e-9)
+    stated = stated_pressure(solution)
+    at = np.array([[0.2, 0.4], [0.9, 1 / 3 + 0.3]])
+    np.testing.assert_allclose(stated(at, 0.0), [UNIFORM, 0.0], rtol=1e-12)
+
+
+def test_without_a_stated_pressure_nothing_is_measured_and_why():
+    _, _, solution = measured(lambda x: x)
+    found, notes = contact_metrics(replace(solution, contact=None), None, None, None, 0.1)
+    assert not found
+    assert notes == {"contact_pressure": "the solver states no pressure of contact"}
