@@ -12,6 +12,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.element import Elements
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import StepEnds, averaged_moduli, averaged_stress
+from verify.xfem.hyperelastic import Law, averages, moduli_of_averages
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh, box_mesh
@@ -62,6 +63,57 @@ def _pairs(kind, size, seed=3):
     for _ in range(20):
         F0, F1 = (np.eye(dim) + size * rng.normal(size=(dim, dim)) for _ in range(2))
         yield F0 @ (np.eye(dim) - across), F1 @ (np.eye(dim) - across), normal
+
+
+def _hyperelastic(stable, dim):
+    """Energy density of one piece, and its law."""
+    law = Law(np.array([LAM]), np.array([MU]), stable)
+
+    def energy(F):
+        J = np.linalg.det(F)
+        volume = (LAM + MU) / 2 * (J - 1) ** 2 - MU * (J - 1)
+        if not stable:
+            volume = LAM / 2 * np.log(J) ** 2 - MU * np.log(J)
+        return MU / 2 * (np.sum(F**2) - dim) + volume
+
+    return law, energy
+
+
+@pytest.mark.parametrize("stable", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_averaged_stress_of_neo_hookean_pieces_keeps_energy_and_angular_momentum(dim, stable):
+    law, energy = _hyperelastic(stable, dim)
+    turn, sound = _rotation(np.random.default_rng(7).normal(size=(dim, dim))), 0
+    for F0, F1, _ in _pairs("plane" if dim == 2 else "solid", 0.35):
+        if min(np.linalg.det(F0), np.linalg.det(F1)) <= 0.0:
+            if stable:  # inside out: the energy is kept all the same
+                P = averages(law, F0[None], F1[None]).stress[0]
+                assert np.sum(P * (F1 - F0)) == pytest.approx(energy(F1) - energy(F0), abs=1e-12)
+            continue
+        sound += 1
+        for start, end in ((F0, F1), (turn @ F0, turn @ F1), (F0, turn @ F0)):
+            P = averages(law, start[None], end[None]).stress[0]
+            change = energy(end) - energy(start)
+            assert np.sum(P * (end - start)) == pytest.approx(change, abs=1e-12)
+            torque = P @ (start + end).T
+            assert torque == pytest.approx(torque.T, abs=1e-12 * np.abs(torque).max())
+    assert sound >= 10
+
+
+@pytest.mark.parametrize("stable", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("size", [0.3, 1e-4])
+def test_the_averaged_moduli_of_neo_hookean_pieces_are_the_derivative(dim, stable, size):
+    law, _ = _hyperelastic(stable, dim)
+    for F0, F1, _ in _pairs("plane" if dim == 2 else "solid", size):
+        if min(np.linalg.det(F0), np.linalg.det(F1)) <= 0.1:
+            continue
+        found = moduli_of_averages(law, F0[None], F1[None])[0]
+        step, way = 1e-5, np.random.default_rng(5).normal(size=F1.shape)
+        ends = (F1 + sign * step * way for sign in (1.0, -1.0))
+        more, less = (averages(law, F0[None], end[None]).stress[0] for end in ends)
+        slope = np.einsum("knlm,lm->kn", found, way)
+        assert slope == pytest.approx((more - less) / (2 * step), abs=1e-6 * np.abs(slope).max())
 
 
 KINDS = ("plane", "membrane", "solid")

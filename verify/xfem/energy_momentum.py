@@ -26,6 +26,8 @@ T = R₁ stands in where t₀ + t₁ is not positive, and nothing is kept.
 The derivative by the end of the step, with c = λ(½(t₀ + t₁) − d) − 2μ, is
 
     dP = μ dF + ½λ (R₁ : dF) T + c dT,   dT = (dF − T dU₁) A⁻¹,   dU₁ = R₁ᵀdF + dR₁ᵀF₁.
+
+That is Hooke's law at finite rotation; `verify.xfem.hyperelastic` averages the others.
 """
 
 from functools import cached_property
@@ -36,6 +38,7 @@ import numpy as np
 from verify.xfem.arrays import Bools, Floats, XfemError
 from verify.xfem.body import DynamicBody, StepForces
 from verify.xfem.element import Elements, add_moduli, polar_slope, restricted
+from verify.xfem.hyperelastic import Law, averages, moduli_of_averages
 from verify.xfem.implicit import NewtonIntegrator, Resistance
 from verify.xfem.internal_force import Configuration, TangentKind
 from verify.xfem.linear_solvers import LinearSolver, OnePass
@@ -234,13 +237,11 @@ class EnergyMomentum(NewtonIntegrator):
     def __init__(self, body: DynamicBody, step_size: float) -> None:
         if not body.force.has_stress:
             raise XfemError("springs have no stress field; expected an integrator that needs none")
-        if body.force.law != "hooke":
-            raise XfemError(
-                f"the energy-momentum scheme averages Hooke's stress; the law is "
-                f"'{body.force.law}', expected another integrator"
-            )
         super().__init__(body, step_size)
         self._before: Configuration | None = None  # at the start, once it is needed
+        elements = body.force.elements
+        lam, mu = (x[elements.parent] for x in (elements.lam, elements.mu))
+        self._law = Law(lam, mu, body.force.law == "stable_neo_hookean")
         self._evaluations = 0
         self._takes_all = False  # of the derivative of the force
         self.substituted = np.zeros(len(body.force.phantom.cells), dtype=bool)
@@ -266,7 +267,11 @@ class EnergyMomentum(NewtonIntegrator):
         if force.has_one_pass:
             return self._by_one_pass(displacement, self._averaged_in_one_pass(displacement))
         at = force.configuration(displacement)
-        P = averaged_stress(force.elements, self._ends(at), self.substituted)
+        ends = self._ends(at)
+        if force.law == "hooke":
+            P = averaged_stress(force.elements, ends, self.substituted)
+        else:
+            P = averages(self._law, ends.F0, ends.F1).stress
         P *= force.elements.volumes[:, None, None]
         gradients = force.elements.gradients[force.elements.parent]
         found += force.nodal_force(gradients @ P.transpose(0, 2, 1))  # f_i = w P b_i
@@ -318,7 +323,10 @@ class EnergyMomentum(NewtonIntegrator):
             return
         force, pattern = self.body.force, self.body.pattern
         added, ends = pattern.unfold(self._blocks), self._ends(self._configuration(end))
-        moduli = averaged_moduli(force.elements, ends, self.substituted)
+        if force.law == "hooke":
+            moduli = averaged_moduli(force.elements, ends, self.substituted)
+        else:
+            moduli = moduli_of_averages(self._law, ends.F0, ends.F1)
         add_moduli(force.elements, moduli, 1.0, pattern.targets[: len(moduli)], added)
         pattern.fold(added, self._blocks)
         if force.ghost is not None:

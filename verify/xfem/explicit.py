@@ -30,6 +30,7 @@ from verify.xfem.body import (
     couples_supports,
 )
 from verify.xfem.element import Material
+from verify.xfem.internal_force import inside_out
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.mesh import SimplexMesh
 
@@ -61,9 +62,10 @@ class _Explicit:
         self, state: MotionState, displacement: Floats, velocity: Floats, time: float
     ) -> None:
         if not (np.isfinite(displacement).all() and np.isfinite(velocity).all()):
+            inverted = np.isfinite(displacement).all() and inside_out(self.body.force, displacement)
             raise StepFailedError(
                 f"{type(self).__name__}: not finite at t = {time:.6g} s with a step of "
-                f"{self.step_size:.6g} s; beyond the critical step?"
+                f"{self.step_size:.6g} s; {inverted or 'beyond the critical step?'}"
             )
         fixed = self.body.fixed
         where, speed = self.body.prescribed(time)

@@ -12,11 +12,23 @@ without the term that keeps ‖F‖ = 0 stable, as Macklin & Müller (MIG 2021) 
 cells that are inside out. The first is not: its energy is infinite where J ≤ 0.
 
 In the plane (strain) the stretch across is 1, and ‖F‖² − d and J are those of the two axes.
+
+The stress averaged over a step, of which the work is the change of the energy, is
+
+    P = μ Fₘ + (H₁ − H₀)/(J₁ − J₀) C,   C : (F₁ − F₀) = J₁ − J₀,   C Fₘᵀ symmetric,
+
+so that angular momentum is kept (Gonzalez, CMAME 190, 2000), Fₘ = (F₀ + F₁)/2. In the plane J is
+quadratic, and C = cof Fₘ. In space det C is cubic in C = FᵀF, so that with Simpson's mean K of
+cof C from C₀ to C₁, J₁² − J₀² = K : (C₁ − C₀) exactly, and C = 2 Fₘ K/(J₀ + J₁). For a piece that
+is inside out at an end Simpson's mean of cof F itself stands in: it keeps the energy alone.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from verify.compiled import njit
+from verify.xfem.arrays import Floats
 
 
 @njit(cache=True)
@@ -37,7 +49,7 @@ def _cofactors(F, C):
 def add_hyperelastic_force(elements, stable, F, force):
     """Add the internal forces of F (p, d, d) to those of the corners (N, d); return the energy.
 
-    It is infinite, and so are no forces of such a cell added, where the law knows no J ≤ 0.
+    It is infinite, and the forces are no numbers, where the law knows no J ≤ 0.
     """
     cells, parent, gradients, volumes, _, lam, mu, axes, corners, _ = elements
     d, c = len(axes), len(corners)
@@ -48,6 +60,7 @@ def add_hyperelastic_force(elements, stable, F, force):
         J = _cofactors(F[p], C)
         if J <= 0.0 and not stable:
             energy = np.inf
+            force[cells[p]] = np.nan
             continue
         l, m, w = lam[cell], mu[cell], volumes[p]
         # ½μ(‖F‖² − d) − μ(J − 1) without cancellation at rest: H = F − I leaves ½μ‖H‖² and minors
@@ -103,3 +116,117 @@ def hyperelastic_moduli(elements, stable, F):
                             value += sign * h * rest
                         A[p, k, n, q, r] = value
     return A
+
+
+class Law(NamedTuple):
+    """λ and μ (p,) of pieces, Pa, and whether their energy is the stable one."""
+
+    lam: Floats
+    mu: Floats
+    stable: bool
+
+
+class Averages(NamedTuple):
+    """Stress averaged over a step, and what its derivative needs, of pieces (p,).
+
+    Attributes
+    ----------
+    stress : (p, d, d) float array
+        P, Pa.
+    C : (p, d, d) float array
+    h, rate : (p,) float arrays
+        (H₁ − H₀)/(J₁ − J₀), Pa, and its derivative by J₁.
+    K : (p, d, d) float array
+        Simpson's mean of cof C; 0 where it does not count.
+    J : (p,) float array
+        J₀ + J₁.
+    """
+
+    stress: Floats
+    C: Floats
+    h: Floats
+    rate: Floats
+    K: Floats
+    J: Floats
+
+
+def averages(law: Law, F0: Floats, F1: Floats) -> Averages:
+    """Average the stress over a step from F0 to F1, each (p, d, d)."""
+    total = F0 + F1
+    J0, J1 = np.linalg.det(F0), np.linalg.det(F1)
+    h, rate = _volume_slopes(law, J0, J1)
+    K = np.zeros(F0.shape)
+    if F0.shape[1] == 2:
+        C = _cofactors_of(0.5 * total)
+    else:
+        C = (_cofactors_of(F0) + 4.0 * _cofactors_of(0.5 * total) + _cofactors_of(F1)) / 6.0
+        sound = (J0 > 0.0) & (J1 > 0.0)
+        C0, C1 = (F[sound].transpose(0, 2, 1) @ F[sound] for F in (F0, F1))
+        middle = _cofactors_of(0.5 * (C0 + C1))
+        K[sound] = (_cofactors_of(C0) + 4.0 * middle + _cofactors_of(C1)) / 6.0
+        C[sound] = total[sound] @ K[sound] / (J0 + J1)[sound, None, None]
+    stress = 0.5 * law.mu[:, None, None] * total + h[:, None, None] * C
+    return Averages(stress, C, h, rate, K, J0 + J1)
+
+
+def moduli_of_averages(law: Law, F0: Floats, F1: Floats) -> Floats:
+    """∂P/∂F₁ (p, d, d, d, d) of the stress of `averages`, the last two those of F₁."""
+    _, C, h, rate, K, J = averages(law, F0, F1)
+    identity = np.eye(F0.shape[1])
+    last = _cofactors_of(F1)
+    if len(identity) == 2:
+        dC = np.broadcast_to(0.5 * _MINORS[2], (len(C), 2, 2, 2, 2)).copy()
+    else:
+        dC = _cofactor_slopes((F0 + 2.0 * F1) / 6.0)
+        sound = K.any(axis=(1, 2))
+        one, other, total = F0[sound], F1[sound], (F0 + F1)[sound]
+        metric = one.transpose(0, 2, 1) @ one + 2.0 * other.transpose(0, 2, 1) @ other
+        slope = _cofactor_slopes(metric / 6.0)  # ∂K/∂C₁, and ∂C₁ = ∂FᵀF₁ + F₁ᵀ∂F
+        dK = np.einsum("panmb,plb->panlm", slope, other)
+        dK += np.einsum("panbm,plb->panlm", slope, other)
+        dC[sound] = np.einsum("kl,pmn->pknlm", identity, K[sound])
+        dC[sound] += np.einsum("pka,panlm->pknlm", total, dK)
+        dC[sound] -= np.einsum("pkn,plm->pknlm", C[sound], last[sound])
+        dC[sound] /= J[sound, None, None, None, None]
+    found = h[:, None, None, None, None] * dC
+    found += np.einsum("p,pkn,plm->pknlm", rate, C, last)
+    shear = 0.5 * law.mu[:, None, None, None, None]
+    return found + shear * np.einsum("kl,nm->knlm", identity, identity)
+
+
+def _volume_slopes(law: Law, J0: Floats, J1: Floats) -> tuple[Floats, Floats]:
+    """(H₁ − H₀)/(J₁ − J₀) and its derivative by J₁; no numbers where ln J is none."""
+    (lam, mu, stable), total = law, J0 + J1
+    if stable:
+        return (lam + mu) * (0.5 * total - 1.0) - mu, 0.5 * (lam + mu)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # ln J₁ − ln J₀ = 2 artanh x, x = (J₁ − J₀)/(J₁ + J₀): q = artanh(x)/x is even and smooth
+        x, logs = (J1 - J0) / total, np.log(J0) + np.log(J1)
+        near = np.abs(x) < _CLOSE
+        apart = np.where(near, 1.0, x)
+        q = np.where(near, 1.0 + x**2 / 3.0 + x**4 / 5.0 + x**6 / 7.0, np.arctanh(x) / apart)
+        slope = (1.0 / (1.0 - x**2) - q) / apart
+        slope = np.where(near, 2.0 * x / 3.0 + 4.0 * x**3 / 5.0 + 6.0 * x**5 / 7.0, slope)
+        mean, bulk = 2.0 * q / total, 0.5 * lam * logs - mu
+        change = (4.0 * J0 * slope / total - 2.0 * q) / total**2
+        return mean * bulk, change * bulk + 0.5 * mean * lam / J1
+
+
+_CLOSE = 0.01  # of x: below it what the series leaves out is round-off
+# ∂cof F/∂F in the plane; in space its derivative by F
+_EVEN = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.cross(np.eye(3)[:, None], np.eye(3))
+_MINORS = {
+    2: np.einsum("kl,nm->knlm", _EVEN[0], _EVEN[0]),
+    3: np.einsum("kab,ncd->knacbd", _EVEN[1], _EVEN[1]),
+}
+
+
+def _cofactor_slopes(A: Floats) -> Floats:
+    """∂cof A/∂A (p, 3, 3, 3, 3)."""
+    return np.einsum("knacbd,pac->pknbd", _MINORS[3], A)
+
+
+def _cofactors_of(A: Floats) -> Floats:
+    if A.shape[1] == 2:
+        return np.einsum("knlm,plm->pkn", _MINORS[2], A)
+    return 0.5 * np.einsum("pknbd,pbd->pkn", _cofactor_slopes(A), A)

@@ -16,7 +16,7 @@ from verify.xfem.body import (
     check_state,
     check_step,
 )
-from verify.xfem.internal_force import Configuration, TangentKind, inverted_cells
+from verify.xfem.internal_force import Configuration, TangentKind, inside_out
 from verify.xfem.linear_solvers import LinearSolver
 
 _HALVINGS = 10
@@ -255,6 +255,8 @@ class NewtonIntegrator(ABC):
         left: list[float] = []
         leaps = 0
         for number in range(self.iterations):
+            if np.isnan(now.norm):  # inside out, where the energy is infinite
+                break
             # round-off of positions, seen through the stiffness
             reach = np.abs(body.force.phantom.node_points + now.displacement).max()
             noise = reach * self._noise
@@ -322,13 +324,8 @@ class NewtonIntegrator(ABC):
             return "The iterates left the finite numbers: the step is far too long"
         force = self.body.force
         found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
-        if not force.is_membrane:
-            inverted = inverted_cells(force, displacement)
-            if len(inverted) > 0:
-                found.append(
-                    f"{len(inverted)} of {len(force.phantom.cells)} pieces are inside out, the "
-                    f"first number {inverted[0]}, where the force has no continuous stiffness"
-                )
+        if inverted := inside_out(force, displacement):
+            found.append(inverted)
         return f"{'; '.join(found)}. A shorter step may help"
 
     def _correction(

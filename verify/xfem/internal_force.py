@@ -494,3 +494,19 @@ def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:
     if force.is_membrane:
         raise XfemError("inversion of a membrane in space is not defined")
     return np.flatnonzero(np.linalg.det(force.deformation(displacement)) < 0.0)
+
+
+def inside_out(force: InternalForce, displacement: Floats) -> str:
+    """Say how many pieces are inside out and where the first is, undeformed; or nothing."""
+    inverted = [] if force.is_membrane else inverted_cells(force, displacement)
+    if not len(inverted):
+        return ""
+    mesh, first = force.phantom.mesh, force.elements.parent[inverted[0]]
+    place = ", ".join(f"{x:.4g}" for x in mesh.points[mesh.cells[first]].mean(axis=0))
+    effect = "the energy with ln J is infinite"
+    if force.law != "neo_hookean":
+        effect = "the force has no continuous stiffness"
+    return (
+        f"{len(inverted)} of {len(force.phantom.cells)} pieces are inside out, the first around "
+        f"({place}), where {effect}"
+    )

@@ -24,7 +24,7 @@ from verify.xfem.arrays import (
 )
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, held_entries
 from verify.xfem.element import Material
-from verify.xfem.internal_force import InternalForce, Penalty, inverted_cells
+from verify.xfem.internal_force import InternalForce, Penalty, inside_out
 from verify.xfem.linear_solvers import PLAIN, Kernels, LinearSolver
 from verify.xfem.loads_and_supports import Supports, check_bodies
 from verify.xfem.phantom import PhantomMesh
@@ -316,13 +316,9 @@ class Newton:
     def _why(self, place: Place) -> str:
         """Explain why the iterations failed, where cells that have collapsed are the reason."""
         if self.force.law == "neo_hookean":
-            inverted = inverted_cells(self.force, place.displacement)
-            if len(inverted):
-                return (
-                    f"{len(inverted)} of {len(self.force.phantom.cells)} pieces are inside out, "
-                    f"the first number {inverted[0]}, where the energy with ln J is infinite. More "
-                    "load steps may help"
-                )
+            inverted = inside_out(self.force, place.displacement)
+            if inverted:
+                return f"{inverted}. More load steps may help"
         collapsed = collapsed_cells(self.force, place.displacement)
         if len(collapsed) == 0:
             return "More load steps may help"
