@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.dynamics_body import MovingBody
+from reference.inside_out import OrientationCheck, place_text
+from reference.large_strain import quadrature_points
 from reference.nodal_algebra import NodalSolver, TiedSolver
 from verify.errors import InputError
 
@@ -29,6 +31,7 @@ _MOST_ITERATIONS = 40
 _SHORTEST = 1e-2  # share of a correction
 _MOST_LEAPS = 3
 _SLOW = 0.1  # a factorisation that contracts the residual by less is made anew
+_NUDGE = 1e-4  # of the way of a step: a difference quotient
 _JUST = 1e-12  # of the step: loads are taken that much inside of it, on their side of a jump
 
 
@@ -172,7 +175,7 @@ class Stepper:
         right[self.body.held] = 0.0
         state.acceleration = (1 - self.scheme.alpha_m) * self._solver.solve(right)
 
-    def _first(self, start: State) -> Array:
+    def _first(self, start: State, share: float = 1.0) -> Array:
         """Acceleration at which Newton's method starts: the body travels on as in the last step.
 
         Not by Δt v: what is stiff rings, its velocity changes sign with every step and cancels in
@@ -184,7 +187,33 @@ class Stepper:
         still = self._end(start, 0.0 * start.acceleration)[0]
         guess = start.displacement + far
         guess[self.body.held] = self.body.prescribed(start.time + h)[0]
+        guess = start.displacement + share * (guess - start.displacement)
         return np.asarray((guess - still) / (h**2 * scheme.beta))
+
+    def _spread(self, start: State) -> Array:
+        """Acceleration at which Newton's method starts where `_first` leads inside out.
+
+        What the supports move by is spread over the body by the tangent at the start.
+        """
+        (_, still, _), (_, nudged, _) = (
+            self._residual(start, self._first(start, share)) for share in (0.0, _NUDGE)
+        )
+        self._factorise(start.displacement, start.displacement)
+        assert self._solver is not None
+        return self._first(start) + self._solver.solve(still + (nudged - still) / _NUDGE)
+
+    def _inside_out(self, start: State, a: Array) -> str:
+        """Say where the end of a step is inside out, so that it has no energy."""
+        body = self.body
+        body.law.energy(self._end(start, a)[0])
+        points = quadrature_points(body.space)
+        held = np.asarray(body.held, dtype=np.int32)
+        found = OrientationCheck(body.space, held, body.law.state.J, points)()
+        return (
+            f"the step from {start.time:.6g} s by {self.size:.6g} s is not solved: it would end "
+            f"with det F = {found.least:.2g} at {place_text(found.place)}, inside out, where "
+            "the energy is not defined; a smaller analysis.time_step may help"
+        )
 
     def _end(self, start: State, a: Array) -> tuple[Array, Array]:
         """Displacement and velocity at the end of a step that ends with an acceleration."""
@@ -197,9 +226,14 @@ class Stepper:
         """Newton's method for the acceleration at the end, with factorisations kept while good."""
         body = self.body
         forces, residual, norm = self._residual(start, a)
+        if np.isnan(norm):  # what the supports have moved by has turned elements inside out
+            a = self._spread(start)
+            forces, residual, norm = self._residual(start, a)
         last, leaps = np.inf, 0
         for _ in range(_MOST_ITERATIONS):
             scale = self._scale(forces)
+            if np.isnan(norm):
+                break
             stuck = norm > 0.1 * last
             if norm <= _TOLERANCE * scale or (stuck and norm <= _GOOD_ENOUGH * scale):
                 return a, forces
@@ -211,16 +245,19 @@ class Stepper:
             self.solves += 1
             best = self._residual(start, a + correction)
             share = 1.0
-            while fresh and not best[2] < last and share > _SHORTEST:
+            search = fresh or np.isnan(best[2])
+            while search and not best[2] < last and share > _SHORTEST:
                 share *= 0.5
                 best = self._residual(start, a + share * correction)
             if fresh and not best[2] < last:  # a dead end, and not a root: leap over it
                 share, leaps = 1.0, leaps + 1
                 best = self._residual(start, a + correction)
-            if not np.isfinite(best[2]) or leaps > _MOST_LEAPS:
-                break
             a = a + share * correction
             forces, residual, norm = best
+            if not np.isfinite(norm) or leaps > _MOST_LEAPS:
+                break
+        if np.isnan(norm):
+            raise RuntimeError(self._inside_out(start, a))
         worst = int(np.argmax(np.abs(np.nan_to_num(residual, nan=np.inf))))
         node = body.space.node_points[worst // body.space.dimension]
         raise RuntimeError(

@@ -312,3 +312,31 @@ def test_two_ranks_keep_the_account_of_one(answers):
         for name, column in ledger.items():
             size = np.abs(column).max() if "momentum" in name else energy
             assert two[motion][0][name] == pytest.approx(column, abs=1e-10 * size), (motion, name)
+
+
+def pressed(by, time_step, cells=16):
+    """Tissue with ln J, whose top is pressed down within the first step."""
+    tissue = {"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0}
+    supports = [
+        {"where": "bottom", "displacement": [0.0, 0.0]},
+        {"where": "top", "displacement": [0.0, -by], "history": [(0.0, 0.0), (time_step, 1.0)]},
+    ]
+    return moving(
+        kinematics="corotational", duration=time_step, outputs=2, time_step=time_step,
+        material=tissue | {"model": "neo_hookean"}, supports=supports,
+        mesh={"cells": [[cells, cells]]},
+    )  # fmt: skip
+
+
+def test_supports_may_move_by_more_than_an_element_in_a_step():
+    """A wave goes through a third of the body in it: by the step's end the strain is there."""
+    found = solved(pressed(0.1, 0.1))
+    height = found.points[:, 1] + found.displacement[-1][:, 1]
+    beside = np.abs(found.points[:, 0] - 0.5) < 1e-9
+    order = np.argsort(found.points[beside, 1])
+    assert np.diff(height[beside][order]).min() > 0.5 / 16
+
+
+def test_a_body_that_its_supports_press_inside_out_is_an_error_that_names_place_and_time():
+    with pytest.raises(RuntimeError, match=r"step from 0 s by 0\.1 s .* det F = .* at \(.*inside"):
+        solved(pressed(1.1, 0.1, 4))

@@ -14,6 +14,8 @@ from reference.law import Law
 from verify.compare.hooke import law_of
 from verify.errors import InputError
 from verify.scene import Material, Scene, load_scene
+from verify.xfem import hyperelastic
+from verify.xfem.hyperelastic import averages
 
 pytestmark = needs_fenicsx
 
@@ -48,6 +50,45 @@ def test_energy_and_forces_are_those_of_other_elements_and_of_the_comparison(mod
     density = law_of(scene_of(model, 3)).energy_density(slope)
     assert body.volumes @ density == pytest.approx(energy, rel=1e-12)
     assert len(mesh.points) == len(x)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_mean_force_of_a_step_does_the_change_of_energy_and_turns_nothing(model, d):
+    """And it is that of the elements of `verify.xfem`, which average on their own."""
+    space = space_of(1, (2, 2) if d == 2 else (1, 1, 1))
+    law = Law(tissue(model, plane="strain" if d == 2 else None), space, model)
+    x, rng = space.node_points, np.random.default_rng(3)
+    u, later = 0.07 * rng.standard_normal((2, *x.shape))
+    force = law.averaged(u.ravel(), later.ravel()).reshape(x.shape)
+    change = law.energy(later.ravel()) - law.energy(u.ravel())
+    assert np.sum(force * (later - u)) == pytest.approx(change, rel=1e-12)
+    torque = (x + (u + later) / 2).T @ force
+    assert torque == pytest.approx(torque.T, abs=1e-13 * np.abs(torque).max())
+    assert np.abs(force.sum(axis=0)).max() < 1e-13 * np.abs(force).max()
+    body = xfem.cut_mesh(xfem.SimplexMesh(x, space.cell_nodes), [])
+    kind = "plane strain" if d == 2 else "solid"
+    elements = xfem.InternalForce(body, replace(xfem.isotropic(1.0, 0.3, kind), law=model)).elements
+    F0, F1 = (
+        np.eye(d) + np.einsum("mci,mcj->mij", one[body.mesh.cells], body.mesh.gradients)
+        for one in (u, later)
+    )
+    lam, mu = (np.full(len(F0), value[0]) for value in (elements.lam, elements.mu))
+    P = averages(hyperelastic.Law(lam, mu, model == "stable_neo_hookean"), F0, F1).stress
+    other = np.zeros(x.shape)
+    shares = np.einsum("m,mij,mcj->mci", body.volumes, P, body.mesh.gradients)
+    np.add.at(other, body.mesh.cells, shares)
+    assert other == pytest.approx(force, abs=1e-12 * np.abs(force).max())
+    # its tangent, by a difference
+    step, way = 1e-5, rng.standard_normal(later.size)
+    ends = (law.averaged(u.ravel(), later.ravel() + sign * step * way) for sign in (1.0, -1.0))
+    slope = np.subtract(*ends) / (2 * step)
+    tangent = law.averaged_tangent(u.ravel(), later.ravel())
+    vector = tangent.createVecRight()
+    vector.array[:] = space.own_part(way)
+    found = space.everywhere((tangent * vector).array).ravel()
+    assert found == pytest.approx(slope, abs=1e-7 * np.abs(slope).max())
+    tangent.destroy()
 
 
 @pytest.mark.parametrize("model", MODELS)

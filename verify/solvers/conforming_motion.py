@@ -23,7 +23,6 @@ from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places
 from reference.nodal_algebra import facing_nodes, lasting_ties
 from reference.space import ConformingSpace, conforming_space
-from verify.errors import UnsupportedSceneError
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.tables import starts_open
@@ -141,8 +140,6 @@ class TiedMotion:
         self.openings = 0
         self.begun = False  # whether something has jumped since the last step
         self.scheme, self.averaged = marching.scheme()
-        if self.averaged and scene.material.model != "hooke":
-            raise UnsupportedSceneError("energy_momentum averages the stress of Hooke's law alone")
         # of others the old acceleration has no part in the step, or only with the forces of then
         self.softly = scene.analysis.damping[1] > 0.0 and (
             self.scheme.alpha_m != self.scheme.alpha_f

@@ -498,8 +498,7 @@ def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:
 
 def inside_out(force: InternalForce, displacement: Floats) -> str:
     """Say how many pieces are inside out and where the first is, undeformed; or nothing."""
-    inverted = [] if force.is_membrane else inverted_cells(force, displacement)
-    if not len(inverted):
+    if force.is_membrane or not len(inverted := inverted_cells(force, displacement)):
         return ""
     mesh, first = force.phantom.mesh, force.elements.parent[inverted[0]]
     place = ", ".join(f"{x:.4g}" for x in mesh.points[mesh.cells[first]].mean(axis=0))
