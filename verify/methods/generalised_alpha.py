@@ -9,7 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from verify.xfem.arrays import Floats, XfemError
-from verify.xfem.body import DynamicBody, FreeMass, MotionState, RayleighDamping, StepForces
+from verify.xfem.body import (
+    DynamicBody,
+    FreeMass,
+    MotionState,
+    RayleighDamping,
+    StepForces,
+    check_no_contact,
+)
 from verify.xfem.implicit import NewtonIntegrator, Resistance
 from verify.xfem.linear_solvers import LinearSolver
 
@@ -68,6 +75,7 @@ class GeneralisedAlpha(NewtonIntegrator):
         self.gamma = 0.5 - self.alpha_m + self.alpha_f
         self.rate, self.share = self.gamma / self.beta, 1.0 - self.alpha_f
         self.weight = (1.0 - self.alpha_m) / self.beta
+        check_no_contact(body, "generalised-α")
         super().__init__(body, step_size, solver)
         self._mass = FreeMass(body)
         self.acceleration = np.zeros(body.shape)

@@ -15,6 +15,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError, check_floats, finite_array
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.internal_force import Configuration, InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.loads_and_supports import Supports, check_fixed
@@ -101,6 +102,43 @@ class MovingSupports:
         return displacement, velocity
 
 
+class Contact(Protocol):
+    """Faces of a body that touch; see `verify.xfem.closing.ClosingFaces`.
+
+    Attributes
+    ----------
+    couplings : (k, 2) int array
+        Dof nodes that contact couples.
+    """
+
+    @property
+    def couplings(self) -> Ints: ...  # noqa: D102
+
+    def energy(self, displacement: Floats) -> float:
+        """Energy in joules at a displacement (N, d)."""
+        ...
+
+    def force(self, displacement: Floats) -> Floats:
+        """Slope (N, d) of the energy, in newtons."""
+        ...
+
+    def force_over(self, start: Floats, end: Floats) -> Floats:
+        """Force (N, d) over a step whose work is the change of the energy."""
+        ...
+
+    def add_stiffness(
+        self, pattern: BlockPattern, blocks: Floats, touching: Floats | float, scale: float
+    ) -> None:
+        """Add a share of the stiffness of faces that touch, and a scale of the rest."""
+        ...
+
+    def add_stiffness_over(
+        self, pattern: BlockPattern, blocks: Floats, start: Floats, end: Floats, share: float
+    ) -> None:
+        """Add 2 `share` times the derivative of `force_over` by the end to nodal blocks."""
+        ...
+
+
 @dataclass
 class DynamicBody:
     """M ü + C u̇ + f_int(u) = weight + load(t), with supports.
@@ -119,6 +157,8 @@ class DynamicBody:
     tie : callable, optional
         Nodal forces (N, d) at a time that still hold what a cut has parted; see
         `verify.xfem.release`. Their work has an entry of its own.
+    contact : Contact, optional
+        Of linear kinematics; its energy counts as strain energy.
 
     Attributes
     ----------
@@ -155,6 +195,7 @@ class DynamicBody:
     supports: Supports | MovingSupports | None = None
     damping: RayleighDamping = field(default_factory=RayleighDamping)
     tie: Callable[[float], Floats] | None = None
+    contact: Contact | None = None
 
     def __post_init__(self) -> None:
         phantom = self.force.phantom
@@ -173,7 +214,12 @@ class DynamicBody:
             raise XfemError(f"damping {self.damping!r}; expected RayleighDamping")
         if self.supports is None:
             self.supports = Supports.none(phantom)
-        self.pattern = self.mass.pattern(phantom, self.force.couplings)
+        pairs = self.force.couplings
+        if self.contact is not None:
+            if self.force.is_corotational or pairs is not None:
+                raise XfemError("contact at finite rotation or with a penalty; expected neither")
+            pairs = self.contact.couplings
+        self.pattern = self.mass.pattern(phantom, pairs)
         self._hold(self.supports)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -312,6 +358,21 @@ class Integrator(Protocol):
             If the state is not one of the body.
         """
         ...
+
+
+def check_no_contact(body: DynamicBody, scheme: str) -> None:
+    """Check that a body has no contact, for a scheme that has none.
+
+    Raises
+    ------
+    XfemError
+        If it has.
+    """
+    if body.contact is not None:
+        raise XfemError(
+            f"{scheme} has no contact of the faces of cuts; expected the trapezoidal rule, the "
+            "energy-momentum scheme or implicit Euler"
+        )
 
 
 def check_step(step_size: float) -> float:

@@ -175,13 +175,16 @@ class ClosingFaces:
         mean = 0.5 * (m0 + m1) * np.where(mixed, (m1 - m0) / change, 1.0)
         return self._force(0.5 * (start + end), mean)
 
-    def slope_over(self, start: Floats, end: Floats) -> Floats:
-        """Share (f, q) of the stiffness of closed faces in the derivative of `force_over`."""
+    def add_stiffness_over(
+        self, pattern: BlockPattern, blocks: Floats, start: Floats, end: Floats, share: float
+    ) -> None:
+        """Add 2 `share` times the derivative of `force_over` by the end to nodal blocks."""
         s0, s1 = self.trial_stress(start), self.trial_stress(end)
         mixed = (s0 < 0.0) != (s1 < 0.0)
         change = np.where(mixed, s1 - s0, 1.0)
         a, b = np.minimum(s1, 0.0) / change, np.minimum(s0, 0.0) / change
-        return np.where(mixed, a - 0.5 * (a**2 - b**2), 0.5 * (s1 < 0.0))
+        slope = np.where(mixed, a - 0.5 * (a**2 - b**2), 0.5 * (s1 < 0.0))
+        self.add_stiffness(pattern, blocks, 2.0 * share * slope, share)
 
     def _force(self, displacement: Floats, traction: Floats) -> Floats:
         """Sum of [t (σ + γ g) − σ σ]/γ by the displacements of the nodes, t (f, q) the traction."""
@@ -197,7 +200,11 @@ class ClosingFaces:
         return self.weights / self.stiffness[:, None]
 
     def add_stiffness(
-        self, pattern: BlockPattern, blocks: Floats, touching: Floats | Bools, scale: float = 1.0
+        self,
+        pattern: BlockPattern,
+        blocks: Floats,
+        touching: Floats | Bools | float,
+        scale: float = 1.0,
     ) -> None:
         """Add the second derivative of the energy to the nodal blocks (B, d, d).
 
@@ -206,7 +213,7 @@ class ClosingFaces:
         pattern : BlockPattern
             Of the body, with the `couplings`.
         blocks : (B, d, d) float array
-        touching : (f, q) array
+        touching : (f, q) array or float
             Share of the stiffness of a closed face: 1 where faces touch, 0 where they are apart.
         scale : float
             Share of −∫ σ²/γ, whether faces touch or not.

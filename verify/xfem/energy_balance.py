@@ -38,7 +38,7 @@ class EnergyBalance:
     angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
     impulse : (n + 1, d) of external, viscous and support forces since the start, in N s; by a
         scheme with an inertia p of its own the momentum differs from it by Σ (M Δv − h p)
-    penalty : share of a ghost penalty in the strain energy, in J
+    penalty : share of a ghost penalty, or of contact, in the strain energy, in J
     cut_turn : (n + 1, 1 or 3) angular impulse of the tie forces since the start, in N m s
     """
 
@@ -144,10 +144,12 @@ class BalanceRecorder:
         self._rows.append(self._row(state))
 
     def _stored(self, state: MotionState) -> tuple[float, float]:
-        """Strain energy, and the share of a ghost penalty in it."""
+        """Strain energy, and the share of a ghost penalty or of contact in it."""
         force = self.body.force
         _, strain = force.evaluate(state.displacement)
-        return strain, force.penalty_energy(state.displacement)
+        penalty, contact = force.penalty_energy(state.displacement), self.body.contact
+        pressed = 0.0 if contact is None else contact.energy(state.displacement)
+        return strain + pressed, penalty + pressed
 
     def _row(self, state: MotionState) -> Floats:
         body = self.body

@@ -25,6 +25,7 @@ from verify.xfem.body import (
     RayleighDamping,
     StepFailedError,
     StepForces,
+    check_no_contact,
     check_state,
     check_step,
     couples_supports,
@@ -38,8 +39,11 @@ from verify.xfem.mesh import SimplexMesh
 class _Explicit:
     """Base of the schemes: accelerations of a body, and the end of a step."""
 
-    def __init__(self, body: DynamicBody, step_size: float) -> None:
-        """Prepare a body and a step in seconds."""
+    def __init__(self, body: DynamicBody, step_size: float, at_once: bool = False) -> None:
+        """Prepare a body and a step in seconds; or, at once, no step but an acceleration."""
+        # the stiffness of contact over the mass of a sliver ε grows like 1/ε: no step is stable
+        if not at_once:
+            check_no_contact(body, type(self).__name__)
         self.body = body
         self.step_size = check_step(step_size)
         if body.moving and couples_supports(body):
@@ -55,6 +59,8 @@ class _Explicit:
         body = self.body
         at = body.force.configuration(displacement)
         internal, _ = body.force.evaluate_at(at)
+        if body.contact is not None:
+            internal += body.contact.force(displacement)
         forces = StepForces(internal, body.external(time), body.viscous(velocity, at))
         return self._mass.solve(forces.external - forces.internal - forces.viscous), forces
 
@@ -83,7 +89,9 @@ def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
         the body.
     """
     check_state(state, body.shape)
-    return _Explicit(body, 1.0)._acceleration(state.displacement, state.velocity, state.time)[0]
+    return _Explicit(body, 1.0, at_once=True)._acceleration(
+        state.displacement, state.velocity, state.time
+    )[0]
 
 
 class CentralDifferences(_Explicit):

@@ -1,6 +1,7 @@
 """Implicit schemes whose step Newton's method solves to a tolerance: Euler, trapezoidal rule."""
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -227,6 +228,9 @@ class NewtonIntegrator(ABC):
         """
         velocity, end = self._velocity(displacement), self._resistance(displacement)
         forces = self._forces(end, velocity, self._start.time + self.step_size)
+        if self.body.contact is not None:
+            pressed = self.body.contact.force_over(self._contact_from(displacement), displacement)
+            forces = replace(forces, internal=forces.internal + pressed)
         inertia = forces.inertia
         if inertia is None:
             inertia = self.body.mass.apply(velocity - self._start.velocity) / self.step_size
@@ -235,6 +239,10 @@ class NewtonIntegrator(ABC):
         parts = (forces.external, forces.internal, forces.viscous, inertia)
         scale = max(self._size(part) for part in parts)
         return Iterate(end, velocity, forces, residual, self._size(residual), scale)
+
+    def _contact_from(self, displacement: Floats) -> Floats:
+        """Displacement from which the contact force is averaged, by schemes of the middle."""
+        return self._start.displacement if self.share < 1.0 else displacement
 
     @property
     def _weight(self) -> float:
@@ -310,6 +318,8 @@ class NewtonIntegrator(ABC):
         self._blocks[:] = 0.0
         rest = body.force.configuration(np.zeros(body.shape))
         body.force.add_stiffness(rest, body.pattern, self._blocks, self.share)
+        if body.contact is not None:
+            body.contact.add_stiffness(body.pattern, self._blocks, self.share, 0.0)
         stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
@@ -362,7 +372,8 @@ class NewtonIntegrator(ABC):
     def _linear_solve(
         self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
     ) -> Floats:
-        given = None if self.body.force.is_corotational else (self.step_size, self.body.damping)
+        changes = self.body.force.is_corotational or self.body.contact is not None
+        given = None if changes else (self.step_size, self.body.damping)
         if given is None or given != self._factorised:  # K of linear kinematics is constant
             self._factorised = None
             self._assemble(end, kind)
@@ -380,6 +391,9 @@ class NewtonIntegrator(ABC):
             if body.damping.stiffness > 0.0:
                 scale, at = per_velocity * body.damping.stiffness, self._configuration(end)
                 body.force.add_stiffness(at, body.pattern, self._blocks, scale)
+        if body.contact is not None:
+            start, now = self._contact_from(end.displacement), end.displacement
+            body.contact.add_stiffness_over(body.pattern, self._blocks, start, now, self.share)
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern, body.fixed, self._blocks, self._held)

@@ -14,6 +14,7 @@ from verify.xfem.body import (
     MotionState,
     StepFailedError,
     StepForces,
+    check_no_contact,
     check_state,
     check_step,
 )
@@ -46,6 +47,7 @@ class RealTimeEuler:
     def __init__(
         self, body: DynamicBody, step_size: float, solver: LinearSolver | None = None
     ) -> None:
+        check_no_contact(body, "the real-time step")
         self.body = body
         self.step_size = check_step(step_size)
         space = body.shape[1]
