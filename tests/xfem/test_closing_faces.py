@@ -7,9 +7,14 @@ from scipy.optimize import minimize
 
 import verify.xfem as xfem
 from tests.xfem.xfem_bodies import boundary_nodes, sparse_stiffness
+from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.closing import STABILITY, ClosingFaces, solve_closed
+from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.explicit import SymplecticEuler
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.loads_and_supports import UnsupportedBodyError
+from verify.xfem.real_time import RealTimeEuler
 
 NU, P = 0.3, 0.01
 SHEAR = 0.5 / (1.0 + NU)
@@ -146,7 +151,7 @@ def test_the_stress_on_faces_is_bounded_by_the_energy(seed):
     faces = ClosingFaces(phantom, material(dim))
     pattern = body_pattern(phantom, faces.couplings)
     blocks = np.zeros((len(pattern.columns), dim, dim))
-    faces.add_stiffness(pattern, blocks, np.zeros(faces.weights.shape))
+    faces.add_stiffness(pattern, blocks, False)
     K, own = sparse_stiffness(phantom).toarray(), pattern.matrix(blocks).toarray()
     scale = 1.0 / np.sqrt(np.diag(K))
     K, own = (scale[:, None] * one * scale for one in (K, own))
@@ -328,3 +333,84 @@ def test_what_nothing_holds_is_named():
     force, faces, supports, load = wedge([0.0, P])
     with pytest.raises(xfem.XfemError, match="faces or supports that hold"):
         solve_closed(force, faces, supports, load)
+
+
+def impact(n, dim=2, gap=0.0, tilt=0.0, scheme=xfem.EnergyMomentum, step=1.0):
+    """Halves of a bar, of length, wave speed and density 1, that meet; in time steps of h."""
+    v0, across = 0.01, (3,) * (dim - 1)
+    make = xfem.rectangle_mesh if dim == 2 else xfem.box_mesh
+    mesh = make((n, *across), (-1.0, *[0.0] * (dim - 1)), (1.0, *[6.0 / n] * (dim - 1)))
+    plane = xfem.Plane([0.003, *[3.0 / n] * (dim - 1)], [1.0, *[tilt] * (dim - 1)])
+    phantom = xfem.cut_mesh(mesh, [plane])
+    elastic = xfem.isotropic(1.0, 0.0, "plane strain" if dim == 2 else "solid")
+    force, mass = xfem.InternalForce(phantom, elastic, "linear"), xfem.side_wise_mass(phantom, 1.0)
+    faces = ClosingFaces(phantom, elastic, moving=True)
+    fixed = np.zeros((phantom.node_count, dim), dtype=bool)
+    fixed[:, 1:] = True
+    held = xfem.Supports(fixed, np.zeros(fixed.shape))
+    body = xfem.DynamicBody(force, mass, supports=held, contact=faces)
+    state, side = body.rest(), phantom.node_side[:, 0]
+    state.velocity[:, 0], state.displacement[:, 0] = -v0 * side, 0.5 * gap * side
+    recorder, integrator = BalanceRecorder(body, state), scheme(body, 2.0 / n * step)
+    above = side > 0
+    means, pressures, depth = [], [], 0.0
+    while state.time < 2.3 + 0.5 * gap / v0:
+        recorder.record(state, integrator.step(state))
+        means.append([state.time, mass.weights[above] @ state.velocity[above, 0]])
+        pressed = (faces.weights * faces.pressure(state.displacement)).sum()
+        pressures.append(pressed / faces.weights.sum())
+        depth = max(depth, overlap(faces, state.displacement))
+    balance, means = recorder.close(), np.array(means)
+    means[:, 1] /= v0 * mass.weights[above].sum()
+    own = (balance.kinetic + balance.strain - balance.penalty) / balance.kinetic[0]
+    return means, np.array(pressures) / v0, own, depth / (v0 * 2.0 / n)
+
+
+@pytest.mark.parametrize("gap", [0.0, pytest.param(1e-3, marks=pytest.mark.heavy)])
+def test_halves_that_collide_exchange_velocities_and_gain_no_energy(gap):
+    lost, wrong = [], []
+    for n in (20, 40, 80, 160):
+        means, pressure, own, depth = impact(n, gap=gap)
+        assert own.max() < 1.0 + 1e-12
+        assert depth < 0.1
+        lost.append(1.0 - own[-1])
+        wrong.append(1.0 - means[-1, 1])
+        # waves run through each half and back: together for 2L/c under ρ c v₀
+        since = means[:, 0] - 0.5 * gap / 0.01
+        assert np.abs(means[:, 1] - np.clip(since - 1.0, -1.0, 1.0)).max() < 0.15
+        together = (since > 0.6) & (since < 1.4)
+        assert pressure[-1] == 0.0
+    assert np.abs(pressure[together] - 1.0).max() < 0.02
+    assert lost[-1] < 0.02
+    assert wrong[-1] < 0.02
+    assert np.log2(lost[0] / lost[-1]) / 3.0 > 0.8  # first order
+    assert np.log2(wrong[0] / wrong[-1]) / 3.0 > 0.6
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"dim": 3, "tilt": 0.4},
+        {"tilt": 0.5, "scheme": Trapezoidal},
+        {"scheme": ImplicitEuler, "gap": 1e-3},
+        {"step": 8.0, "tilt": 0.3},
+    ],
+)
+def test_no_impact_gains_energy(given):
+    _, _, own, _ = impact(20, **given)
+    assert own.max() < 1.0 + 1e-10
+    assert own[-1] > 0.4
+
+
+def test_schemes_without_contact_refuse_by_name():
+    phantom = xfem.cut_mesh(xfem.rectangle_mesh((3, 3)), [xfem.Plane([0.4, 0.0], [1.0, 0.0])])
+    mass = xfem.side_wise_mass(phantom, 1.0)
+    faces = ClosingFaces(phantom, material(2), moving=True)
+    linear = xfem.InternalForce(phantom, material(2), "linear")
+    body = xfem.DynamicBody(linear, mass, contact=faces)
+    for scheme in (xfem.CentralDifferences, SymplecticEuler, RealTimeEuler, GeneralisedAlpha):
+        with pytest.raises(xfem.XfemError, match="no contact of the faces"):
+            scheme(body, 1e-3)
+    turning = xfem.InternalForce(phantom, material(2))
+    with pytest.raises(xfem.XfemError, match="finite rotation"):
+        xfem.DynamicBody(turning, mass, contact=faces)

@@ -366,7 +366,7 @@ class MethodSolver:
         record = Record(timings=dict(body.seconds))
         fields = solve_equilibrium(
             scene, body.phantom, exact_of(scene), record, resisting=body.resisting, law=self._law,
-            load_steps=load_steps, shown=body.conforming,
+            load_steps=load_steps,
         )  # fmt: skip
         self._say(record, body)
         return solution_on(scene, record, body.phantom, fields, size, body.conforming)

@@ -23,7 +23,14 @@ from verify.solvers.runs import (
     timeline_of,
     work_of_blades,
 )
-from verify.solvers.xfem_system import SCHEMES, body_in_motion, initial_state, largest_step
+from verify.solvers.xfem_system import (
+    SCHEMES,
+    body_in_motion,
+    contact_of,
+    faces_of,
+    initial_state,
+    largest_step,
+)
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, Integrator, MotionState
@@ -400,9 +407,13 @@ class CutMotion:
             pairs = zip(outputs, values, strict=True)
             return np.array([o.phantom.extend(value)[sources[id(o.phantom)]] for o, value in pairs])
 
+        displacement = carried("displacement")
+        assert displacement is not None  # every state has one
+        faces = faces_of(self.scene, phantom.corners, moving=True)
         return {
             "times": self.timeline.outputs[: len(outputs)],
-            "displacement": carried("displacement"),
+            "contact": None if faces is None else contact_of(faces, displacement),
+            "displacement": displacement,
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),
             "mass": self._mass(phantom),

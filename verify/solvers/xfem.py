@@ -224,7 +224,7 @@ class XfemSolver:
     """
 
     name = "xfem"
-    contact = ("static",)
+    contact = ("static", "dynamic")
     choices = _CHOICES
     parameters = tuple(one.name for one in fields(_Parameters))
 

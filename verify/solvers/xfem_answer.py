@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.accelerated import FAST
-from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
-from verify.solution import ContactPressure, Regularisation, Solution
+from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import material_of
 from verify.solvers.boundary_conditions import loads_of, path_of_supports, support_ends
 from verify.solvers.runs import Record, across_interfaces, at_rest
+from verify.solvers.xfem_system import contact_of, faces_of
 from verify.xfem.clip import ROUND_OFF_SHARE
-from verify.xfem.closing import ClosingFaces, solve_closed
-from verify.xfem.element import Material
+from verify.xfem.closing import solve_closed
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
@@ -163,7 +162,6 @@ def solve_equilibrium(
     load_steps: int = 0,
     penalise: bool = False,
     kernels: Kernels = FAST,
-    shown: Subdivision | None = None,
 ) -> dict[str, Any]:
     """Solve a static scene on a cut mesh.
 
@@ -185,8 +183,6 @@ def solve_equilibrium(
     penalise : bool
         Whether with a ghost penalty (linear only).
     kernels : Kernels
-    shown : Subdivision, optional
-        As of `solution_on`; whose faces touch.
 
     Returns
     -------
@@ -204,7 +200,7 @@ def solve_equilibrium(
         load = loads_of(scene, phantom, exact)
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
-    faces = faces_of(scene, body, material, penalise, shown)
+    faces = faces_of(scene, phantom, penalise)
     if faces is not None:
         with record.timed("solve"):
             elastic = InternalForce(body, material, "linear", kernels)
@@ -237,38 +233,6 @@ def solve_equilibrium(
     }
     record.regularisations += [_dismissed(found.check.dismissed), springs_left_out(force)]
     return at_rest(found.displacement, found.energy)
-
-
-def faces_of(
-    scene: Scene,
-    phantom: PhantomMesh,
-    material: Material,
-    penalise: bool = False,
-    shown: Subdivision | None = None,
-) -> ClosingFaces | None:
-    """Find the faces of cuts that touch, where a scene asks for contact.
-
-    Raises
-    ------
-    UnsupportedSceneError
-        If slivers follow others or have a penalty.
-    """
-    if not scene.contact.closed:
-        return None
-    if phantom.aggregation is not None or penalise:
-        raise UnsupportedSceneError(
-            "contact of the faces of a cut is for slivers = 'keep' or 'drop': it needs no others"
-        )
-    return ClosingFaces(phantom, material, shown)
-
-
-def contact_of(
-    faces: ClosingFaces, displacements: Sequence[NDArray[np.float64]]
-) -> ContactPressure:
-    """Return the pressure between faces at displacements (N, d), one per output time."""
-    pressure = np.array([faces.pressure(one).ravel() for one in displacements])
-    points = faces.points.reshape(-1, faces.points.shape[2])
-    return ContactPressure(points, faces.weights.ravel(), pressure)
 
 
 def _solver_text(solver: str, kernels: Kernels) -> str:

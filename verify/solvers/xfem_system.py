@@ -1,6 +1,6 @@
 """Elasticity, mass, loads, supports and time steps of a scene for the compact library."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from verify.methods.mass_variants import (
 )
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
 from verify.scene.physics import factor_at, first_factor
+from verify.solution import ContactPressure
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.boundary_conditions import (
     forces_of,
@@ -30,6 +31,7 @@ from verify.system import System
 from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
+from verify.xfem.closing import ClosingFaces, solve_closed
 from verify.xfem.element import Material
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
@@ -79,6 +81,32 @@ def mass_of(scene: Scene, phantom: PhantomMesh, mass: str, ghost: GhostPenalty |
     except XfemError as error:
         raise UnsupportedSceneError(f"mass = '{mass}': {error}") from None
     return ghost.mass(found, density) if ghost else found
+
+
+def faces_of(
+    scene: Scene, phantom: PhantomMesh, penalise: bool = False, moving: bool = False
+) -> ClosingFaces | None:
+    """Find the faces of cuts that touch, where a scene asks for contact.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If slivers follow others or have a penalty.
+    """
+    if not scene.contact.closed:
+        return None
+    if phantom.aggregation is not None or penalise:
+        raise UnsupportedSceneError(
+            "contact of the faces of a cut is for slivers = 'keep' or 'drop': it needs no others"
+        )
+    return ClosingFaces(phantom, material_of(scene, phantom.mesh), moving)
+
+
+def contact_of(faces: ClosingFaces, displacements: Iterable[_Floats]) -> ContactPressure:
+    """Return the pressure between faces at displacements (N, d), one per output time."""
+    pressure = np.array([faces.pressure(one).ravel() for one in displacements])
+    points = faces.points.reshape(-1, faces.points.shape[2])
+    return ContactPressure(points, faces.weights.ravel(), pressure)
 
 
 def system_of(
@@ -223,6 +251,7 @@ def body_in_motion(scene: Scene, force: InternalForce, mass: Mass, exact: Any) -
         load_at if driven else None,
         motion_of_supports(scene, phantom, exact),
         RayleighDamping(*scene.analysis.damping),
+        contact=faces_of(scene, phantom, force.ghost is not None, moving=True),
     )
 
 
@@ -259,6 +288,8 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
         if not isinstance(entry, Gravity):
             load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
     path = path_of_supports(scene, phantom, exact)
+    if (faces := faces_of(scene, phantom)) is not None:
+        return solve_closed(body.force, faces, path(1.0), load).displacement
     check_bodies(phantom, path(1.0))
     return static_equilibrium(
         body.force, body.fixed, lambda share: path(share).values, load

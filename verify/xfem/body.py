@@ -122,20 +122,12 @@ class Contact(Protocol):
         """Slope (N, d) of the energy, in newtons."""
         ...
 
-    def force_over(self, start: Floats, end: Floats) -> Floats:
-        """Force (N, d) over a step whose work is the change of the energy."""
+    def touching(self, displacement: Floats) -> Bools:
+        """Whether faces press on each other, (f, q)."""
         ...
 
-    def add_stiffness(
-        self, pattern: BlockPattern, blocks: Floats, touching: Floats | float, scale: float
-    ) -> None:
-        """Add a share of the stiffness of faces that touch, and a scale of the rest."""
-        ...
-
-    def add_stiffness_over(
-        self, pattern: BlockPattern, blocks: Floats, start: Floats, end: Floats, share: float
-    ) -> None:
-        """Add 2 `share` times the derivative of `force_over` by the end to nodal blocks."""
+    def add_stiffness(self, pattern: BlockPattern, blocks: Floats, touching: Bools | bool) -> None:
+        """Add the second derivative of the energy to nodal blocks."""
         ...
 
 

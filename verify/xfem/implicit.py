@@ -229,7 +229,8 @@ class NewtonIntegrator(ABC):
         velocity, end = self._velocity(displacement), self._resistance(displacement)
         forces = self._forces(end, velocity, self._start.time + self.step_size)
         if self.body.contact is not None:
-            pressed = self.body.contact.force_over(self._contact_from(displacement), displacement)
+            # at the end in every scheme: the work of that force is at least its energy
+            pressed = self.body.contact.force(displacement)
             forces = replace(forces, internal=forces.internal + pressed)
         inertia = forces.inertia
         if inertia is None:
@@ -239,10 +240,6 @@ class NewtonIntegrator(ABC):
         parts = (forces.external, forces.internal, forces.viscous, inertia)
         scale = max(self._size(part) for part in parts)
         return Iterate(end, velocity, forces, residual, self._size(residual), scale)
-
-    def _contact_from(self, displacement: Floats) -> Floats:
-        """Displacement from which the contact force is averaged, by schemes of the middle."""
-        return self._start.displacement if self.share < 1.0 else displacement
 
     @property
     def _weight(self) -> float:
@@ -319,7 +316,7 @@ class NewtonIntegrator(ABC):
         rest = body.force.configuration(np.zeros(body.shape))
         body.force.add_stiffness(rest, body.pattern, self._blocks, self.share)
         if body.contact is not None:
-            body.contact.add_stiffness(body.pattern, self._blocks, self.share, 0.0)
+            body.contact.add_stiffness(body.pattern, self._blocks, True)
         stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
@@ -392,8 +389,8 @@ class NewtonIntegrator(ABC):
                 scale, at = per_velocity * body.damping.stiffness, self._configuration(end)
                 body.force.add_stiffness(at, body.pattern, self._blocks, scale)
         if body.contact is not None:
-            start, now = self._contact_from(end.displacement), end.displacement
-            body.contact.add_stiffness_over(body.pattern, self._blocks, start, now, self.share)
+            touching = body.contact.touching(end.displacement)
+            body.contact.add_stiffness(body.pattern, self._blocks, touching)
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern, body.fixed, self._blocks, self._held)
