@@ -44,7 +44,7 @@ def measured(pressure, truth=True, points=None, slide=0.0):
     solution = Solution(corners, cells, moved[None], size=0.1, contact=contact,
                         cut_facets=corners[None, [4, 5]])  # fmt: skip
     body, law = body_of(scene), law_of(scene)
-    rule = Rules(body, 0.1).finest("cut")
+    rule = Rules(body, 0.1).on_cuts()
     known = ContactTruth([exact_pressure(exact_of(scene), law, rule)], "exact") if truth else None
     field = SolutionMotion(solution, body).at()
     found, notes = contact_metrics(solution, field, rule, known, 0.1)

@@ -385,7 +385,7 @@ def _contact(
     one: Measured, reference: Reference | None, rules: Rules, exact: ExactField | None
 ) -> tuple[list[Metric], dict[str, str]]:
     """Measure the contact of the faces of cuts."""
-    rule, truth = rules.finest("cut"), None
+    rule, truth = rules.on_cuts(), None
     assert one.scene is not None
     if rule is None:
         return [], {"contact_pressure": "no cut lies inside the body"}
