@@ -5,12 +5,13 @@ or timed-out solve is a record like any other, with its reason. First what solut
 a solver dropped, its cut, its reference), then results, the ranking of solvers, and the files.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
 from math import inf
 from pathlib import Path
+from statistics import median
 from typing import Any, Literal
 
 from verify.errors import InputError
@@ -150,6 +151,9 @@ REFERENCE = "reference"  #: solver that judges the others, where no exact soluti
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 FORECAST = "finer levels"  #: of those of a reference: what the levels to come are expected to take
+MESHING = "meshing"  #: of the phases of a solve: the first mesh that it makes
+HANDED_OVER = "mesh handed over"  #: phase of who solves on a conforming mesh that others made
+_CUTTING = ("cutting", "enrichment")  # phases that cut a mesh which does not know the cut
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 #: of the notes of a solve in motion or of slivers: of central differences, undeformed body
 CRITICAL_STEP = "critical step"
@@ -305,6 +309,18 @@ class SolveRecord:
     parts: list[PartRecord] = field(default_factory=list)
     # where the realised cut is; None of a body without cuts, or in older results
     cut: CutRecord | None = None
+    # whether its own mesh conforms to the cut, beyond faces of the background mesh; None: not known
+    conforming: bool | None = None
+
+    @property
+    def paid(self) -> dict[str, list[float]]:
+        """Wall seconds, by phase and repetition, of what each cut costs anew.
+
+        A mesh that is cut afterwards, or does not conform to the cut, is made once. One that
+        conforms to it is made for each cut.
+        """
+        once = self.conforming is False or any(name in _CUTTING for name in self.timings)
+        return {k: times for k, times in self.timings.items() if not (once and k == MESHING)}
 
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""
@@ -314,6 +330,31 @@ class SolveRecord:
     def not_compared(self) -> str:
         """Why nothing was measured of a solve that gave an answer; empty if something was."""
         return "" if self.metrics else self.notes.get("comparison", "")
+
+
+def meshes_charged(records: Sequence[SolveRecord]) -> list[SolveRecord]:
+    """Charge solves on a mesh that conforms to the cut, and that they were handed, with making it.
+
+    Its time is that of a solve of the same level that makes such a mesh (`conforming`). Without
+    one the phase is empty, and the solve has no time.
+    """
+    makers = {r.level: r for r in records if r.conforming and MESHING in r.paid}
+    return [
+        replace(record, timings={**record.timings, HANDED_OVER: _share(record, makers)})
+        if record.conforming and record.timings and not _makes_its_mesh(record)
+        else record
+        for record in records
+    ]
+
+
+def _makes_its_mesh(record: SolveRecord) -> bool:
+    return MESHING in record.timings or any(name in _CUTTING for name in record.timings)
+
+
+def _share(record: SolveRecord, makers: Mapping[int, SolveRecord]) -> list[float]:
+    if (maker := makers.get(record.level)) is None:
+        return []
+    return [median(maker.timings[MESHING])] * max(map(len, record.timings.values()))
 
 
 @_closed

@@ -11,8 +11,16 @@ from scipy.stats import binom
 from reference.exact.moving_cracks import wave
 from verify.cli import main
 from verify.errors import RunStoppedError
-from verify.judge.cost import pareto_front, time_at, work_points
-from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status, Verdict
+from verify.judge.cost import paid_times, pareto_front, time_at, work_points
+from verify.result import (
+    CaseResult,
+    Metric,
+    ReferenceRecord,
+    SolveRecord,
+    Status,
+    Verdict,
+    meshes_charged,
+)
 from verify.scene import load_scene
 from verify.study import study
 from verify.study.calibration import Trial, binomial_tail, calibration_findings, trials
@@ -23,14 +31,16 @@ from verify.study.cost import cost_study, growing_scenes
 STRIP = "statics/tissue_strip"
 
 
-def solve(solver, level, error, seconds, spread=0.0, status=Status.SOLVED, meshing=0.0):
+def solve(
+    solver, level, error, seconds, spread=0.0, status=Status.SOLVED, meshing=0.0, conforming=None
+):
     metrics = [Metric("energy_norm", error, "1")] if status is Status.SOLVED else []
     timings = {"solve": [seconds * (1 - spread), seconds, seconds * (1 + spread)]}
     if meshing:
         timings["meshing"] = [meshing] * 3
     return SolveRecord(
         "case", solver, level, status, "" if status is Status.SOLVED else "it broke",
-        metrics=metrics, timings=timings, unknowns=100 * 4**level,
+        metrics=metrics, timings=timings, unknowns=100 * 4**level, conforming=conforming,
     )  # fmt: skip
 
 
@@ -86,11 +96,32 @@ def test_what_lies_within_the_spread_is_undecided():
 
 def test_a_background_mesh_is_paid_once_and_a_conforming_one_at_every_step():
     one = result(
-        *ladder("xfem", 0.4, 0.01, meshing=1.0), *ladder("conforming", 0.4, 0.01, meshing=1.0)
+        *ladder("one", 0.4, 0.01, meshing=1.0, conforming=False),
+        *ladder("other", 0.4, 0.01, meshing=1.0, conforming=True),
     )
     study = cost_study("case", [one] * 4, "energy_norm")
-    assert study.running["xfem"][-1][0] == pytest.approx(1.0 + 4 * 0.16)
-    assert study.running["conforming"][-1][0] == pytest.approx(4 * 1.16)
+    assert study.running["one"][-1][0] == pytest.approx(1.0 + 4 * 0.16)
+    assert study.running["other"][-1][0] == pytest.approx(4 * 1.16)
+
+
+def test_who_is_handed_a_mesh_that_conforms_to_the_cut_pays_for_its_making():
+    maker = ladder("maker", 0.4, 0.01, meshing=2.0, conforming=True)
+    guest = ladder("guest", 0.4, 0.01, conforming=True)
+    others = [
+        *ladder("background", 0.4, 0.01, conforming=False),
+        *(replace(s, timings={**s.timings, "meshing": [1.0] * 3, "cutting": [0.5] * 3})
+          for s in ladder("splitter", 0.4, 0.01, conforming=True)),
+    ]  # fmt: skip
+    charged = meshes_charged([*maker, *guest, *others])
+    paid = {(r.solver, r.level): paid_times(r)[1] for r in charged}
+    for level in range(3):
+        own = 0.01 * 4.0**level
+        assert paid["maker", level] == pytest.approx(2.0 + own)
+        assert paid["guest", level] == pytest.approx(2.0 + own)
+        assert paid["background", level] == pytest.approx(own)
+        assert paid["splitter", level] == pytest.approx(0.5 + own)
+    # nobody made such a mesh in this run: what is not measured is not nothing
+    assert [paid_times(r) for r in meshes_charged(guest)] == [[]] * 3
 
 
 def test_the_pareto_front_has_only_what_nothing_beats():

@@ -12,6 +12,7 @@ from verify.result import (
     Status,
     Verdict,
     VerdictRecord,
+    meshes_charged,
 )
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck, scene_hash
 
@@ -110,7 +111,7 @@ def result_of(
         scene_hash=scene_hash(scene),
         scene=scene.model_dump(mode="json", by_alias=True),
         reference=reference,
-        solves=solves,
+        solves=meshes_charged(solves),
         row=asdict(scene.row) if scene.row else None,
         **{"rates": [], "verdicts": [], **known},
     )

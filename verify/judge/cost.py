@@ -14,15 +14,6 @@ from verify.judge.intervals import Interval, error_interval
 from verify.judge.standing import Item, compared_by_mean, item_at_equal_size
 from verify.result import CaseResult, Comparison, LeftOut, Profile, SolveRecord, Standing, Status
 
-# Phases that a solver pays once, however often the cut grows: its mesh does not know the cut. A
-# conforming mesh is made anew, and so it is for a solver that is not known here.
-ONCE: Mapping[str, tuple[str, ...]] = dict.fromkeys(
-    (
-        "xfem", "uncut", "subdivision", "snapping", "snapping_subdivision", "removal",
-        "removal_refined", "virtual_node", "virtual_node_arbitrary", "mass_spring",
-    ),
-    ("meshing",),
-)  # fmt: skip
 _METRICS = ("displacement_l2", "energy_norm")
 _SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
 _METRIC = "displacement_l2"
@@ -76,7 +67,7 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
         totals = paid_times(record)
         if not totals:
             continue
-        error, once = error_interval(measured), ONCE.get(record.solver, ())
+        error, paid = error_interval(measured), record.paid
         points.append(
             WorkPoint(
                 solver=record.solver,
@@ -88,7 +79,7 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
                 seconds=median(totals),
                 fastest=min(totals),
                 slowest=max(totals),
-                once=sum(median(record.timings[name]) for name in once if name in record.timings),
+                once=sum(median(t) for name, t in record.timings.items() if name not in paid),
                 phases={name: median(times) for name, times in record.timings.items()},
                 memory=record.peak_memory or 0.0,
             )
@@ -98,9 +89,7 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
 
 def paid_times(record: SolveRecord) -> list[float]:
     """Return the wall time of what each cut costs anew, s, by repetition."""
-    once = ONCE.get(record.solver, ())
-    paid = [times for name, times in record.timings.items() if name not in once]
-    return [sum(times) for times in zip(*paid, strict=False)]
+    return [sum(times) for times in zip(*record.paid.values(), strict=False)]
 
 
 def time_at(points: Sequence[WorkPoint], error: float) -> tuple[float, float, float] | None:

@@ -141,11 +141,11 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
 
 
 def cost(results: Sequence[CaseResult]) -> Answer:
-    """Answer what accuracy costs: the time at equal error, meshing included."""
+    """Answer what accuracy costs: the time of a cut at equal error."""
     found = dict(_ratios(results, _time_ratio))
     if found:
         found = {name: _over_cases(own) for name, own in found.items()}
-        said = _compared(found, "takes", "time of {} for an equal error, meshing included")
+        said = _compared(found, "takes", "time of {} for a cut at an equal error")
         return Answer("Cost", f"{said} {_of_times(results)}", _example(results, found))
     timed = [
         (result.case, curve)
@@ -317,13 +317,13 @@ def _time_at(points: Sequence[Point], target: float) -> Ratio | None:
 def _span(point: Point) -> Ratio:
     time = point.duration
     assert time is not None
-    return Ratio(*(t + time.meshing for t in (time.median, time.low, time.high)))
+    return Ratio(time.median, time.low, time.high)
 
 
 def _seconds(point: Point) -> float:
-    """Return the median time with meshing, in seconds; 0 if it is not known."""
+    """Return the median time of a cut, in seconds; 0 if it is not known."""
     time = point.duration
-    return time.median + time.meshing if time is not None and time.low > 0.0 else 0.0
+    return time.median if time is not None and time.low > 0.0 else 0.0
 
 
 def _resolved(point: Point) -> bool:

@@ -262,8 +262,8 @@ def _reservations(view: CaseView, curves: list[Curve], result: CaseResult) -> No
         repeated = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         view.cost_notes.append(
             f"Timed: {listed}. Median of {repeated} repetition{'s' if counts != [1] else ''} "
-            "after a first call that is not counted"
-            + ("; dotted, the time with meshing." if any(t.meshing > 0 for t in timed) else ".")
+            "after a first call that is not counted. A mesh that conforms to the cut is paid for "
+            "each cut, also by who was handed it; one that is cut afterwards is not."
         )
     notes = dict.fromkeys(s.notes["timing"] for s in result.solves if "timing" in s.notes)
     view.cost_notes += [f"Timing note: {note}." for note in notes]

@@ -9,23 +9,18 @@ from statistics import median
 from verify.report.notation import SECONDARY, solver_title
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 
-MESHING = "meshing"
 # Beyond these a number is a symptom, and powers of ten around it overflow
 _DRAWABLE = (1e-200, 1e200)
 
 
 @dataclass(frozen=True)
 class Duration:
-    """Wall seconds of a solve over its repetitions.
-
-    `median`, `low` and `high` leave meshing out; `meshing` is its median.
-    """
+    """Wall seconds of what a cut costs anew (`SolveRecord.paid`), over the repetitions."""
 
     median: float
     low: float
     high: float
     repetitions: int
-    meshing: float
     phases: tuple[str, ...]
 
 
@@ -124,9 +119,13 @@ def duration(solve: SolveRecord) -> Duration | None:
     Phases have one entry per repetition; where a phase has fewer, medians and extremes are
     added phase by phase (the spread is then an upper bound).
     """
-    timed = {name: values for name, values in solve.timings.items() if values and name != MESHING}
-    everything = [second for values in solve.timings.values() for second in values]
-    if not timed or not all(math.isfinite(second) and second >= 0 for second in everything):
+    timed = solve.paid
+    everything = [second for values in timed.values() for second in values]
+    if (
+        not all(timed.values())
+        or not everything
+        or not all(math.isfinite(second) and second >= 0 for second in everything)
+    ):
         return None
     counts = {len(values) for values in timed.values()}
     if len(counts) == 1:
@@ -136,8 +135,7 @@ def duration(solve: SolveRecord) -> Duration | None:
         middle, low, high = (
             sum(pick(values) for values in timed.values()) for pick in (median, min, max)
         )
-    meshing = solve.timings.get(MESHING) or [0.0]
-    return Duration(middle, low, high, min(counts), median(meshing), tuple(timed))
+    return Duration(middle, low, high, min(counts), tuple(timed))
 
 
 def _curve(

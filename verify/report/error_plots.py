@@ -70,8 +70,8 @@ def error_panel(
     y_range : (float, float)
     palette : Palette
     over : {"size", "unknowns", "time"}
-        Over time: the median without meshing, bars that span the repetitions, and a dotted line
-        to the time with meshing. Over the size: crosses where levels failed.
+        Over time: the median of what a cut costs anew, and bars that span the repetitions. Over the
+        size: crosses where levels failed.
     slope : (order, words), optional
         The required order of convergence.
 
@@ -88,7 +88,7 @@ def error_panel(
     values = [x for x, _ in placed] + [x for own in ends.values() for x, _ in own]
     if over == "time":
         times = [p.duration for _, p in placed if p.duration]
-        values += [t for d in times for t in (d.low, d.high, d.median + d.meshing) if t > 0]
+        values += [t for d in times for t in (d.low, d.high) if t > 0]
     with panel(title) as (figure, axes):
         log_axis(axes, "x", log_range(values))
         log_axis(axes, "y", y_range)
@@ -200,15 +200,12 @@ def _abandoned(
 
 
 def _spans(axes: Axes, points: Sequence[Point], style: Style) -> None:
-    """Draw the spread of the repetitions, and the way to the time with meshing."""
+    """Draw the spread of the repetitions."""
     for point in points:
         if (time := point.duration) is None:
             continue
         if time.high > 1.05 * time.low > 0:
             axes.hlines(point.value, time.low, time.high, color=style.colour, linewidth=1.0)
-        if time.meshing > 0:
-            axes.plot([time.median, time.median + time.meshing], [point.value] * 2, marker="|",
-                      markevery=[1], color=style.colour, linestyle=":", linewidth=1.0)  # fmt: skip
 
 
 _WIDTH, _HEIGHT = 3.35, 2.4  # inches
@@ -258,7 +255,7 @@ def _errors(
         if not over_time:
             return point.size
         time = point.duration
-        return time.median + time.meshing if time and time.median > 0.0 else None
+        return time.median if time and time.median > 0.0 else None
 
     drawn = {
         r.case: [(c, p) for c in compared_curves(r) if (p := _drawable(c, at))] for r in results
@@ -266,7 +263,7 @@ def _errors(
     if not drawn.get(example):
         return None
     every = [place for own in drawn.values() for _, places in own for place in places]
-    title = "time with meshing, s" if over_time else "element size h, m"
+    title = "time of a cut, s" if over_time else "element size h, m"
     with panel("relative L² error of the displacement", _WIDTH, _HEIGHT, legend=False) as (
         figure,
         axes,

@@ -197,7 +197,7 @@ def _times_table(result: CaseResult) -> Table | None:
         return None
     iterative = any(solve.iterations for solve in result.solves)
     stepping = any(CRITICAL_STEP in solve.notes for solve in result.solves)
-    head = ["solver", "level", *phases, "total without meshing", "process", "memory"]
+    head = ["solver", "level", *phases, "for each cut", "process", "memory"]
     head += ["iterations"] if iterative else []
     head += ["critical step"] if stepping else []
     rows = []

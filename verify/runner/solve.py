@@ -120,6 +120,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         "reason": "",
         "size": solution.size,
         "unknowns": solution.unknowns,
+        "conforming": _conforms(solution, scene, job["level"]),
         "timings": solution.timings,
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
@@ -130,6 +131,27 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
             **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
     }
+
+
+def _conforms(solution: Any, scene: Any, level: int) -> bool:
+    """Whether the unknowns are those of the answer's nodes, and its facets carry the cut.
+
+    A cut along faces of the background mesh needs no other one. Time that nobody would pay there
+    is charged to nobody.
+    """
+    import numpy as np
+
+    from verify.solvers.runs import grid_of
+
+    corners = solution.cut_facets.reshape(-1, scene.dimension)
+    if not len(corners) or solution.unknowns != solution.points.size:
+        return False
+    counts = None if scene.geometry.kind == "file" else grid_of(scene, level)[0]
+    if counts is None:
+        return True
+    lower, upper = np.asarray(scene.geometry.lower), np.asarray(scene.geometry.upper)
+    layers = (corners - lower) / (upper - lower) * counts
+    return bool(np.abs(layers - np.rint(layers)).max() > 1e-9)
 
 
 def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
