@@ -17,7 +17,7 @@ from verify.scene import load_scene
 from verify.solution import Solution
 from verify.solvers.interface import find_solver
 
-CASES = Path(__file__).parents[2] / "cases/cutting"
+CASES = Path(__file__).parents[2] / "cases"
 TIMES = np.linspace(0.0, 2.0, 401)
 
 
@@ -209,7 +209,7 @@ def test_the_driving_force_of_the_exact_strip_is_the_energy_release_rate_times_i
     are left out: what opened at the start was held by nothing, and where a way ends inside an
     element the rule opens none.
     """
-    text = (CASES / "blade_strip_03.toml").read_text(encoding="utf-8")
+    text = (CASES / "benchmark/c5_blade_03.toml").read_text(encoding="utf-8")
     text = text.replace("[99, 33, 1]", "[39, 13, 1]").replace("outputs = 3", "outputs = 9")
     (tmp_path / "strip.toml").write_text(text.replace("[51, 17, 1]", "[33, 11, 1]"))
     scene = load_scene(tmp_path / "strip.toml")

@@ -28,7 +28,7 @@ STRUCTURED = ["statics/f1_patch", "controls/hanging_bar", "cutting/hanging_block
 SCENES = {name: rows[0] for name, rows in catalogue().items()}
 
 
-@pytest.mark.parametrize("name", [*STRUCTURED, "rotation/tissue_strip"])
+@pytest.mark.parametrize("name", [*STRUCTURED, "benchmark/c3_strip"])
 def test_unknowns_are_those_of_the_uncut_mesh(name):
     scene = SCENES[name]
     for row in solver_costs(scene, "xfem"):
@@ -63,7 +63,7 @@ def test_no_blade_of_a_judged_scene_goes_farther_than_half_an_element_in_a_step(
 
 
 def test_a_reference_level_has_the_unknowns_of_halved_elements():
-    coarse, fine, finest = solver_costs(SCENES["rotation/tissue_strip"], "reference")
+    coarse, fine, finest = solver_costs(SCENES["benchmark/c3_strip"], "reference")
     assert 3.5 < fine.unknowns / coarse.unknowns < 4.0
     assert 3.5 < finest.unknowns / fine.unknowns < 4.0
 
@@ -114,7 +114,7 @@ RECORDED = {
     "meeting/parallel_tenth": [(12806, 1.17), (42684, 1.81), (140528, 3.76)],
     "meeting/three_through_a_point": [(4390, 2.25), (15594, 3.01), (56648, 4.38)],
     "rotation/stretched_halves": [(260, 0.59), (936, 0.57), (3248, 0.67)],
-    "rotation/tissue_strip": [(4802, 1.59), (19138, 2.94), (74936, 9.0)],
+    "benchmark/c3_strip": [(4802, 1.59), (19138, 2.94), (74936, 9.0)],
     "rotation/turned_apart": [(286, 0.97), (1250, 1.16), (4562, 1.54)],
     "rotation/turned_apart_solid": [(222, 1.18), (441, 1.0), (4233, 2.61)],
     "statics/griffith_edges": [(11048, 0.8), (43536, 1.28), (172608, 3.82)],

@@ -25,12 +25,12 @@ def order_of_solves(plans, options):
     return sorted(jobs, key=begun_after(plans, options))
 
 
-PLANS = [planned("statics/f1_patch"), planned("rotation/tissue_strip")]
+PLANS = [planned("statics/f1_patch"), planned("benchmark/c3_strip")]
 
 
 def test_side_by_side_the_longest_case_is_first_and_its_reference_before_further_levels():
     order = order_of_solves(PLANS, Options(jobs=2))
-    assert [job.case for job in order] == ["rotation/tissue_strip"] * 5 + ["statics/f1_patch"] * 5
+    assert [job.case for job in order] == ["benchmark/c3_strip"] * 5 + ["statics/f1_patch"] * 5
     levels = [(job.solver, job.model, job.level) for job in order[:5]]
     reference = [("reference", "", 0), ("reference", "", 1), ("reference", "kinematics", 0)]
     assert levels == [("xfem", "", 0), *reference, ("xfem", "", 1)]

@@ -330,7 +330,7 @@ def test_what_merging_projects_away_has_an_entry_of_its_own(tmp_path):
     assert np.ptp(ledger["total"]) <= 1e-12 * energy
 
 
-CASES = Path(__file__).parents[2] / "cases/cutting"
+CASES = Path(__file__).parents[2] / "cases"
 
 
 def l2_and_cut_work(solver, case, level, **parameters):
@@ -370,28 +370,28 @@ def test_on_a_conforming_mesh_the_error_is_below_that_of_facets_that_open_at_the
     radiates, 0.03 at 0.6 c (blade.md), and twice that for the ends of 10 elements of advance.
     """
     pytest.importorskip("dolfinx_solver")
-    swept = halved("conforming", "blade_strip_06", (0, 1), 0.1)
+    swept = halved("conforming", "benchmark/c5_blade_06", (0, 1), 0.1)
     half = -0.5 * 0.6 / 51 / 0.6  # s: the blade passes half an element
     asked = {"delay": half, "opening": "late"}
-    assert swept < l2_and_cut_work("conforming", "blade_strip_06", 1, **asked)[0]
+    assert swept < l2_and_cut_work("conforming", "benchmark/c5_blade_06", 1, **asked)[0]
 
 
 @pytest.mark.parametrize("solver", ["xfem", pytest.param("subdivision", marks=pytest.mark.heavy)])
 def test_on_cut_elements_the_error_is_less_than_half_of_what_late_openings_cost(solver):
     """At 0.3 c. Late is three quarters of an element and half a step; what is left is the mesh."""
-    swept = halved(solver, "blade_strip_03", (0, 1), 0.25)
-    assert swept < 0.5 * l2_and_cut_work(solver, "blade_strip_03", 1, opening="late")[0]
+    swept = halved(solver, "benchmark/c5_blade_03", (0, 1), 0.25)
+    assert swept < 0.5 * l2_and_cut_work(solver, "benchmark/c5_blade_03", 1, opening="late")[0]
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     ("solver", "case", "most", "parameters"),
     [
-        ("conforming", "blade_strip_01", 0.1, {}),
-        ("conforming", "blade_strip_03", 0.05, {}),
-        ("conforming", "blade_strip_06", 0.05, {}),
-        ("xfem", "blade_strip_06", 0.1, {"mass": "consistent"}),
-        ("xfem", "blade_strip_03", 0.15, {}),
+        ("conforming", "benchmark/c5_blade_01", 0.1, {}),
+        ("conforming", "benchmark/c5_blade_03", 0.05, {}),
+        ("conforming", "benchmark/c5_blade_06", 0.05, {}),
+        ("xfem", "benchmark/c5_blade_06", 0.1, {"mass": "consistent"}),
+        ("xfem", "benchmark/c5_blade_03", 0.15, {}),
     ],
 )
 def test_three_meshes_of_the_strip(solver, case, most, parameters):
@@ -420,7 +420,7 @@ def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass, spe
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
     own = {"mass": mass} if solver == "xfem" else {}
-    scene = load_scene(CASES / "blade_strip_06.toml")
+    scene = load_scene(CASES / "benchmark/c5_blade_06.toml")
     content = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content |= {"acceptance": [], "known_findings": []}
     content["exact"]["parameters"]["speed"] = speed

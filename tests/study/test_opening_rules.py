@@ -16,7 +16,7 @@ from verify.scene import Scene
 from verify.solvers import find_solver
 
 ELEMENTS = (8, 16, 32, 64)
-CASES = Path(__file__).parents[2] / "cases/cutting"
+CASES = Path(__file__).parents[2] / "cases"
 WINDOW = 0.21  # m: of the strip's height of 0.2; 10 and 18 elements
 SETTLED = 0.3  # of the window: the waves of the start have left the tip
 
@@ -67,7 +67,7 @@ def test_the_swept_share_is_better_than_late_on_two_coarse_meshes():
 def strip(case, speed):
     """Give a case of the catalogue another speed of the blade and a window long enough."""
     given = tomllib.loads((CASES / f"{case}.toml").read_text())
-    window = WINDOW if case == "blade_strip_06" else 0.12
+    window = WINDOW if case == "benchmark/c5_blade_06" else 0.12
     exact = given["exact"]["parameters"]
     angle = np.deg2rad(exact.get("angle", 0.0))
     tip, way = np.array(exact.get("tip", [0.0, 0.0])), np.array([np.cos(angle), np.sin(angle)])
@@ -122,7 +122,7 @@ SOLVERS = {
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", SOLVERS)
 @pytest.mark.parametrize("speed", [0.1, 0.3, 0.6, 0.8])
-@pytest.mark.parametrize("case", ["blade_strip_06", "blade_strip_inclined"])
+@pytest.mark.parametrize("case", ["benchmark/c5_blade_06", "cutting/blade_strip_inclined"])
 def test_solvers_on_the_strip(case, speed, name):
     """The swept rule has less than the error of late openings, and takes what it can of G.
 
@@ -141,5 +141,5 @@ def test_solvers_on_the_strip(case, speed, name):
     assert swept[1][0] < 0.6 * late[1][0]
     assert swept[1][0] < 0.7 * swept[0][0]
     consistent = solver == "conforming" or parameters.get("mass") == "consistent"
-    if consistent and speed in (0.3, 0.6) and case == "blade_strip_06":
+    if consistent and speed in (0.3, 0.6) and case == "benchmark/c5_blade_06":
         assert swept[1][3] == pytest.approx(1.0, abs=0.08)
