@@ -55,8 +55,10 @@ def grid(rows):
                 triangles += [[a[0, 0], a[0, 2], a[2, 2], a[0, 1], a[1, 2], a[1, 1]],
                               [a[0, 0], a[2, 2], a[2, 0], a[1, 1], a[2, 1], a[1, 0]]]  # fmt: skip
     on_cut = node[2 * below]
-    nodes = np.stack([x.ravel(), y.ravel()], axis=1)
-    return nodes, np.array(triangles), 2 * nx * below, on_cut
+    nodes, triangles = np.stack([x.ravel(), y.ravel()], axis=1), np.array(triangles)
+    for k, (first, second) in enumerate(ORDER, 3):  # a diagonal of a trapezium has its own middle
+        nodes[triangles[:, k]] = 0.5 * (nodes[triangles[:, first]] + nodes[triangles[:, second]])
+    return nodes, triangles, 2 * nx * below, on_cut
 
 
 class Body:
