@@ -121,7 +121,7 @@ class RunOptions:
 
 def run(
     cases: Annotated[
-        Sequence[str], Arg("name, pattern or file of a case (default: all)", "CASE")
+        Sequence[str], Arg("name, folder, pattern or file of a case (default: all)", "CASE")
     ] = (),
     *,
     asked: RunOptions,
