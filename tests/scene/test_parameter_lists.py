@@ -121,3 +121,5 @@ def test_the_name_of_a_folder_stands_for_its_cases_that_are_not_heavy():
     names = [scene.name for scene in select_cases(["controls"])]
     assert names
     assert names == [scene.name for scene in select_cases(["controls/*"])]
+    # values.toml lies beside them and is no case
+    assert {scene.name.split("/")[0] for scene in select_cases(["benchmark"])} == {"benchmark"}

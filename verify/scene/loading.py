@@ -32,6 +32,7 @@ from verify.scene.scene import Scene
 from verify.scene.strict import first_fault, nearest
 from verify.scene.tables import Row
 
+VALUES = "values.toml"  # beside the cases of the benchmark, and none of them
 _LARGEST = 2**23  # bytes; the longest case that comes with the project has 6 kB
 _DEEPEST, _PARTS = 20, 20
 # a dotted key takes tomllib the square of the number of its parts
@@ -58,6 +59,7 @@ def list_cases(folder: Path | None = None) -> dict[str, Path]:
     return {
         path.relative_to(root).with_suffix("").as_posix(): path
         for path in sorted(root.rglob("*.toml"))
+        if path.name != VALUES
     }
 
 
