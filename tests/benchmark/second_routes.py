@@ -8,6 +8,7 @@ largest relative difference of all quantities counts for each.
 import sys
 from pathlib import Path
 
+import c8_slivers
 import numpy as np
 import plane_cracks
 
@@ -76,19 +77,40 @@ def c2_meeting(size, grade):
     return values
 
 
-SCENES = {"c1_slit": c1_slit, "c2_meeting": c2_meeting}
+def slivers(dimension, epsilon):
+    """Both halves of C8 at one distance of the cut."""
+    return lambda cells: {"strain_energy": c8_slivers.strain_energy(dimension, epsilon, cells)}
+
+
+def corner(cells):
+    """The corner of C8 is one triangle on any mesh."""
+    return {"fall_of_the_corner": c8_slivers.fall_of_the_corner(0.5)}
+
+
+# solver of a scene, and the arguments that make its coarse and its fine mesh
+CRACKS = ((0.1, 0.5), (0.1, 0.25))
+SCENES = {
+    "c1_slit": (c1_slit, *CRACKS),
+    "c2_meeting": (c2_meeting, *CRACKS),
+    "c8_slivers[epsilon=0.5]": (slivers(2, 0.5), (16,), (32,)),
+    "c8_slivers[epsilon=0]": (slivers(2, 0.0), (16,), (32,)),
+    "c8_slivers_space[epsilon=0.5]": (slivers(3, 0.5), (4,), (6,)),
+    "c8_slivers_space[epsilon=0]": (slivers(3, 0.0), (4,), (6,)),
+    "c8_slivers_corner[epsilon=0.5]": (corner, (1,), (1,)),
+}
 
 
 def second_route(scene):
     """Give {quantity: (value, half-width)}; the size of a factor is that of both modes."""
-    coarse, fine = (SCENES[scene](0.1, grade) for grade in (0.5, 0.25))
+    solve, *meshes = SCENES[scene]
+    coarse, fine = (solve(*mesh) for mesh in meshes)
     other = {name: name.replace("K_II", "K_I") for name in fine}
     other |= {name: name.replace("K_I", "K_II") for name in fine if "K_II" not in name}
     size = {
         name: np.hypot(v, fine[other[name]] * (other[name] != name)) for name, v in fine.items()
     }
     relative = max(abs(fine[name] - coarse[name]) / size[name] for name in fine)
-    return {name: (value, relative * size[name]) for name, value in fine.items()}
+    return {name: (value, max(relative, 1e-12) * size[name]) for name, value in fine.items()}
 
 
 if __name__ == "__main__":

@@ -29,6 +29,10 @@ def parsed(text):
     return float(value), float(half_width or 0.0)
 
 
+def page_of(scene):
+    return (ROOT / f"docs/benchmark/{scene.split('_')[0]}.md").read_text("utf-8")
+
+
 def size_of(name, values):
     """What a half-width is relative to: the value; of a factor, those of both modes together."""
     other = name.replace("K_II", "K_I") if "K_II" in name else name.replace("K_I", "K_II")
@@ -48,10 +52,17 @@ def test_both_routes_agree_and_are_as_narrow_as_asked(scene):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_page_states_the_values(scene):
-    page = (ROOT / f"docs/benchmark/{scene.split('_')[0]}.md").read_text("utf-8")
+    page, number = page_of(scene), scene.split("_")[0]
     assert f"Version {VALUES['version']}" in page
-    rows = dict(re.findall(r"^\| `(\w+)` (\|.*±.*\|)$", page, flags=re.MULTILINE))
-    assert rows == {name: f"| {one} | {two} |" for name, (one, two) in SCENES[scene].items()}
+    rows = re.findall(
+        r"^\| `([^`]+)` \| ([^|]*±[^|]*|-?[\d.]+) \| ([^|]*±[^|]*) \|$", page, re.MULTILINE
+    )
+    of_page = {name: table for name, table in SCENES.items() if name.startswith(f"{number}_")}
+    assert rows == [
+        (name if len(of_page) == 1 else f"{one}: {name}", *pair)
+        for one, table in of_page.items()
+        for name, pair in table.items()
+    ]
 
 
 @pytest.mark.fenicsx
@@ -79,7 +90,7 @@ def test_the_second_route_gives_what_is_stated(scene):
 
 @pytest.mark.heavy
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["c1_slit", "c2_meeting"])
 def test_solvers_are_off_by_what_the_page_says(scene, tmp_path):
     """Two digits of the errors in L2 and in the energy norm, level by level."""
     command = ["verify", "run", f"benchmark/{scene}", "--repetitions", "1", "--no-conform"]
@@ -87,8 +98,8 @@ def test_solvers_are_off_by_what_the_page_says(scene, tmp_path):
         [sys.executable, "-m", *command, "--no-report", "--out", str(tmp_path)], check=True
     )
     solves = read_result(next(tmp_path.glob("cases/*/result.json"))).solves
-    page = (ROOT / f"docs/benchmark/{scene.split('_')[0]}.md").read_text("utf-8")
-    rows = re.findall(r"^\| `(xfem|conforming)` \| ([^|]*) \| ([^|]*) \|", page, flags=re.MULTILINE)
+    row = r"^\| `(xfem|conforming)` \| ([^|]*) \| ([^|]*) \|"
+    rows = re.findall(row, page_of(scene), flags=re.MULTILINE)
     assert len(rows) == 2
     for solver, *columns in rows:
         for metric, column in zip(("displacement_l2", "energy_norm"), columns, strict=True):
