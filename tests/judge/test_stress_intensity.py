@@ -197,7 +197,7 @@ def test_missing_quantities_are_noticed_with_their_levels_and_reason():
 
 def penny(*asked, **changes):
     """Give the inclined penny under tension and pressure, with factors asked for."""
-    content = load_scene("curved/penny").model_dump(mode="json", by_alias=True)
+    content = load_scene("benchmark/c4_disc").model_dump(mode="json", by_alias=True)
     quantities = [
         {"kind": "stress_intensity", "name": f"q{i}", "cut": "crack"} | one
         for i, one in enumerate(asked)
@@ -412,7 +412,7 @@ def test_a_front_across_a_slab_has_nodes_within_each_hat_on_the_first_level(thic
 def test_a_small_penny_has_its_factors_on_the_first_level_of_a_reference_of_default_size():
     """An eighth of the body wide; second-order elements of h/a = 0.22: a few per cent."""
     small = {"a": 0.5, "centre": [0.07, -0.04, 0.03], "normal": [0.36, -0.48, 0.8]}
-    content = load_scene("curved/penny").model_dump(mode="json", by_alias=True)
+    content = load_scene("benchmark/c4_disc").model_dump(mode="json", by_alias=True)
     content["cuts"][0]["radius"] = content["exact"]["parameters"]["a"] = small["a"]
     point = 0.5 * (np.array(front_point(90.0)) + small["centre"])
     asked = [{"mode": mode, "point": point.tolist()} for mode in ("I", "III")]
