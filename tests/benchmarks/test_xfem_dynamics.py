@@ -15,6 +15,7 @@ from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.body import DynamicBody
+from verify.xfem.closing import ClosingFaces
 from verify.xfem.cuts import Plane
 from verify.xfem.element import isotropic
 from verify.xfem.energy_momentum import EnergyMomentum
@@ -73,6 +74,30 @@ def test_a_real_time_step(benchmark, solver, step):
     benchmark.extra_info.update(_report(scheme))
     benchmark.pedantic(scheme.advance, args=(state,), rounds=STEPS)
     assert np.isfinite(state.displacement).all()
+
+
+@pytest.mark.parametrize("touching", [True, False])
+def test_a_step_with_contact(benchmark, touching):
+    """Halves of the slab that lean on each other, held at one side each and swung together."""
+    scheme, state = _slab(1e-3)
+    own = scheme.body
+    force = InternalForce(own.force.phantom, isotropic(1e4, 0.3, "solid"), "linear", FAST)
+    faces = ClosingFaces(force.phantom, isotropic(1e4, 0.3, "solid"), moving=True)
+    contact = faces if touching else None
+    body = DynamicBody(force, own.mass, own.weight, supports=own.supports, contact=contact)
+    scheme = Trapezoidal(body, 1e-3)
+    state.velocity[:, 0] = np.where(body.fixed[:, 0], 0.0, -0.05 * force.phantom.node_side[:, 0])
+    pressed = []
+
+    def step():
+        scheme.step(state)
+        pressed.append(faces.touching(state.displacement).any())
+
+    benchmark.extra_info.update(_report(scheme) | {"facets": len(faces.nodes)})
+    benchmark.pedantic(step, rounds=STEPS)
+    benchmark.extra_info["solves per step"] = scheme.solves / STEPS
+    assert np.isfinite(state.displacement).all()
+    assert np.mean(pressed) > 0.2
 
 
 @pytest.mark.parametrize("phase", ["linearise", "factorise and solve"])

@@ -323,6 +323,18 @@ def test_a_wedge_that_only_faces_hold_is_in_balance_and_at_the_least_energy():
     assert other.fun > least - 1e-12 * abs(least)
 
 
+def test_a_body_without_faces_is_solved_as_ever():
+    phantom = xfem.cut_mesh(xfem.rectangle_mesh((3, 3)), [])
+    y = phantom.mesh.points[:, 1]
+    held = (
+        xfem.Supports.none(phantom).prescribe(phantom, y == 0.0).prescribe(phantom, y == 1.0, 0.1)
+    )
+    force = xfem.InternalForce(phantom, material(2), "linear")
+    found = solve_closed(force, ClosingFaces(phantom, material(2)), held)
+    usual = xfem.solve_static(phantom, material(2), held)
+    assert np.abs(found.displacement - usual.displacement).max() < 1e-14
+
+
 def test_what_nothing_holds_is_named():
     mesh = xfem.rectangle_mesh((5, 5))
     phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.5, 0.53], [0.0, 1.0])])

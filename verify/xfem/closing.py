@@ -39,6 +39,7 @@ times its value and back from step to step.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csc_array, csr_array
 
 from verify.xfem.arrays import (
     Bools,
@@ -135,7 +136,7 @@ class ClosingFaces:
         shapes[..., 0] += 1.0
         shapes[:, :, 0] *= -1.0
         self.gap = _flat(shapes[..., None] * normal[:, None], 2)
-        self.nodes: Ints = phantom.cells[pieces].reshape(len(pieces), -1)
+        self.nodes: Ints = np.concatenate(list(phantom.cells[pieces.T]), axis=1)
         self.stiffness = (
             (FIRMNESS if moving else STABILITY)
             * _faces_of_pieces(phantom.part[pieces])
@@ -143,7 +144,20 @@ class ClosingFaces:
             / flexible.sum(axis=1)
         )
         self._rows = self.stress[:, None] + self.stiffness[:, None, None, None] * self.gap
-        self._places: tuple[BlockPattern, Ints] | None = None
+        self._per_stiffness = self.weights / self.stiffness[:, None]
+        self._trial = self._of_nodes(self._rows)
+        self._mean = self._of_nodes(self.stress[:, None])
+        self._turned = self._trial.T.tocsr(), self._mean.T.tocsr()
+        self._entries: tuple[BlockPattern, csc_array, Floats] | None = None
+
+    def _of_nodes(self, rows: Floats) -> csr_array:
+        """Matrix (k, N d) of rows (f, …, 2 (d + 1), d), by the displacements of the dof nodes."""
+        space, width = rows.shape[-1], self.nodes.shape[1] * rows.shape[-1]
+        columns = self.nodes[..., None] * space + np.arange(space)
+        columns = np.broadcast_to(columns.reshape(len(rows), 1, width), (*rows.shape[:2], width))
+        starts = np.arange(columns.shape[0] * columns.shape[1] + 1) * width
+        shape = len(starts) - 1, self.phantom.node_count * space
+        return csr_array((rows.ravel(), columns.ravel(), starts), shape=shape)
 
     @property
     def couplings(self) -> Ints:
@@ -155,7 +169,7 @@ class ClosingFaces:
 
     def trial_stress(self, displacement: Floats) -> Floats:
         """σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
-        return np.einsum("fqid,fid->fq", self._rows, displacement[self.nodes])
+        return (self._trial @ displacement.ravel()).reshape(self.weights.shape)
 
     def pressure(self, displacement: Floats) -> Floats:
         """Pressure (f, q) between the faces in pascal; zero where they are apart."""
@@ -163,30 +177,22 @@ class ClosingFaces:
 
     def energy(self, displacement: Floats) -> float:
         """Energy in joules beside the elastic one, negative where faces that are apart bear σ."""
-        own = np.einsum("fid,fid->f", self.stress, displacement[self.nodes])
+        own = self._mean @ displacement.ravel()
         squares = self.pressure(displacement) ** 2 - own[:, None] ** 2
         return float(np.sum(self._per_stiffness * squares)) / 2.0
 
-    def force(self, displacement: Floats) -> Floats:
-        """Slope (N, d) of the energy, in newtons."""
-        return self._force(displacement, -self.pressure(displacement))
+    def force(self, displacement: Floats, tied: bool = False) -> Floats:
+        """Slope (N, d) of the energy, in newtons; or with the normal jump of all faces tied."""
+        traction = self.trial_stress(displacement)
+        if not tied:
+            traction = np.minimum(traction, 0.0)
+        own = self._per_stiffness.sum(axis=1) * (self._mean @ displacement.ravel())
+        total = self._turned[0] @ (self._per_stiffness * traction).ravel() - self._turned[1] @ own
+        return total.reshape(displacement.shape)
 
     def touching(self, displacement: Floats) -> Bools:
         """Whether faces press on each other, (f, q)."""
         return self.trial_stress(displacement) < 0.0
-
-    def _force(self, displacement: Floats, traction: Floats) -> Floats:
-        """Sum of [t (σ + γ g) − σ σ]/γ by the displacements of the nodes, t (f, q) the traction."""
-        own = np.einsum("fid,fid->f", self.stress, displacement[self.nodes])
-        forces = np.einsum("fq,fqid->fid", self._per_stiffness * traction, self._rows)
-        forces -= (self._per_stiffness.sum(axis=1) * own)[:, None, None] * self.stress
-        total = np.zeros_like(displacement)
-        np.add.at(total, self.nodes, forces)
-        return total
-
-    @property
-    def _per_stiffness(self) -> Floats:
-        return self.weights / self.stiffness[:, None]
 
     def add_stiffness(self, pattern: BlockPattern, blocks: Floats, touching: Bools | bool) -> None:
         """Add the second derivative of the energy to the nodal blocks (B, d, d).
@@ -198,16 +204,28 @@ class ClosingFaces:
         blocks : (B, d, d) float array
         touching : (f, q) bool array or bool
         """
-        if self._places is None or self._places[0] is not pattern:
-            rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
-            self._places = pattern, pattern_places(pattern, rows.ravel(), columns.ravel())
-        weights = self._per_stiffness
-        added = np.einsum(
-            "fq,fqia,fqjb->fijab", weights * touching, self._rows, self._rows, optimize=True
+        if self._entries is None or self._entries[0] is not pattern:
+            self._entries = pattern, *self._stiffness_of_points(pattern, blocks.shape[1])
+        _, of_points, own = self._entries
+        closed = np.broadcast_to(touching, self.weights.shape).ravel()
+        blocks += (of_points @ closed.astype(float) - own).reshape(blocks.shape)
+
+    def _stiffness_of_points(self, pattern: BlockPattern, space: int) -> tuple[csc_array, Floats]:
+        """Entries (B d², f q) of the blocks by each point that touches, and of −∫ σ²/γ (B d²,)."""
+        rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
+        blocks = pattern_places(pattern, rows.ravel(), columns.ravel()).reshape(rows.shape)
+        axes = np.arange(space**2).reshape(space, space)
+        places = blocks[..., None, None] * space**2 + axes  # (f, i, j, a, b)
+        values = np.einsum("fq,fqia,fqjb->fqijab", self._per_stiffness, self._rows, self._rows)
+        own = self._per_stiffness.sum(axis=1)
+        own = np.einsum("f,fia,fjb->fijab", own, self.stress, self.stress)
+        size = len(pattern.columns) * space**2
+        repeated = np.broadcast_to(places[:, None], values.shape)
+        starts = np.arange(self.weights.size + 1) * (self.nodes.shape[1] * space) ** 2
+        of_points = csc_array(
+            (values.ravel(), repeated.ravel(), starts), shape=(size, self.weights.size)
         )
-        own = weights.sum(axis=1)
-        added -= np.einsum("f,fia,fjb->fijab", own, self.stress, self.stress)
-        np.add.at(blocks, self._places[1], added.reshape(-1, *blocks.shape[1:]))
+        return of_points, np.bincount(places.ravel(), own.ravel(), size)
 
 
 def _flat(values: Floats, axis: int) -> Floats:
@@ -300,7 +318,7 @@ class _Closing:
     def tied(self, values: Floats) -> Floats:
         """Displacement (N, d) with all faces tied, from the prescribed one."""
         force = self.force.evaluate(values)[0]
-        force += self.faces._force(values, self.faces.trial_stress(values))
+        force += self.faces.force(values, tied=True)
         residual = np.where(self.fixed, 0.0, self.load - force)
         return values + self.correction(residual, np.ones(self.faces.weights.shape, dtype=bool))
 

@@ -133,7 +133,7 @@ class NewtonIntegrator(ABC):
         mass = np.maximum(body.mass.matrix.diagonal(), body.mass.weights)
         self._inverse_mass = (1.0 / mass)[:, None]
         self._noise = self._round_off()
-        self._factorised: tuple[float, RayleighDamping] | None = None
+        self._factorised: tuple[float, RayleighDamping, bytes] | None = None
         self._left: list[float] = []  # of the residual by each correction of the last step
         self._end: Resistance | None = None  # of the last step
         self._speed = np.zeros(body.shape)  # of the supports at the end of the step
@@ -369,9 +369,11 @@ class NewtonIntegrator(ABC):
     def _linear_solve(
         self, end: Resistance, residual: Floats, kind: TangentKind, is_slow: bool
     ) -> Floats:
-        changes = self.body.force.is_corotational or self.body.contact is not None
-        given = None if changes else (self.step_size, self.body.damping)
-        if given is None or given != self._factorised:  # K of linear kinematics is constant
+        given, contact = None, self.body.contact
+        if not self.body.force.is_corotational:
+            closed = b"" if contact is None else contact.touching(end.displacement).tobytes()
+            given = (self.step_size, self.body.damping, closed)
+        if given is None or given != self._factorised:  # else K is the last one
             self._factorised = None
             self._assemble(end, kind)
             self._solver.factorize(self._blocks)
