@@ -13,6 +13,7 @@ with two new rims along a cut instead of inner facets.
 """
 
 from collections.abc import Callable
+from copy import copy
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -45,6 +46,8 @@ class MovingSurface:
         (f,) piece on whose surface it lies.
     inner : GrowingArray
         (f,) whether it lies on a cut.
+    owner : GrowingArray
+        (f,) to what it belongs: an element, or a facet of a surface that is given.
     retired : int
         How many facets have been taken out of use.
     """
@@ -56,6 +59,8 @@ class MovingSurface:
         self.facets = GrowingArray(np.empty((0, facet_corners), dtype=np.int64))
         self.facet_piece = GrowingArray(np.empty(0, dtype=np.int64))
         self.inner = GrowingArray(np.empty(0, dtype=bool))
+        self.owner = GrowingArray(np.empty(0, dtype=np.int64))
+        self._owners: tuple[int, int] | None = None
         self.retired: int = 0
         self._keys = RowNumbers()
 
@@ -112,6 +117,7 @@ class MovingSurface:
         self.facets.append(vertex[pair].reshape(point.shape))
         self.facet_piece.append(piece[:, 0])
         self.inner.append(inner)
+        self.owner.append(owner)
         change = np.flatnonzero(np.append(True, owner[1:] != owner[:-1]))
         bounds[owner[change], 0] = begin + change
         bounds[owner[change], 1] = begin + np.append(change[1:], len(owner))
@@ -124,7 +130,17 @@ class MovingSurface:
     @property
     def used(self) -> Ints:
         """Numbers of the facets in use."""
-        return np.flatnonzero(self.facets.rows[:, 0] >= 0)
+        is_used = self.facets.rows[:, 0] >= 0
+        if self._owners is not None:
+            begin, end = self._owners
+            is_used &= (self.owner.rows >= begin) & (self.owner.rows < end)
+        return np.flatnonzero(is_used)
+
+    def of_owners(self, begin: int, end: int) -> "MovingSurface":
+        """Return the same surface with only the facets of these owners in use, kept up to date."""
+        part = copy(self)
+        part._owners = begin, end
+        return part
 
     def positions(self, displacement: Floats) -> Floats:
         """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes, in metres.

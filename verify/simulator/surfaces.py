@@ -50,18 +50,25 @@ class Surfaces:
     ----------
     material : BodySurface
         Closed around the material; of a membrane, its triangles.
-    visual, collision : EmbeddedSurface or None
-        Where the stage has separate ones.
+    shown, touchable : MovingSurface
+        That which is seen, the faces of cuts apart, and that which tools collide with. Where the
+        stage has separate ones they are parts of one: following a cut costs calls, not facets.
     """
 
     def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
         self.material = BodySurface(cutter.body)
-        self.visual, self.collision = (
-            EmbeddedSurface(cutter, *given) if given is not None else None
-            for given in (stage.visual, stage.collision)
-        )
-        followers = (self.material, self.visual, self.collision)
-        self._followers = [surface for surface in followers if surface is not None]
+        self._followers: list[BodySurface | EmbeddedSurface] = [self.material]
+        found, given = [self.material.surface] * 2, (stage.visual, stage.collision)
+        there = [(k, *one) for k, one in enumerate(given) if one is not None]
+        if there:
+            numbers, points, facets = zip(*there, strict=True)
+            starts, begins = ([0, *np.cumsum([len(x) for x in rows])] for rows in (points, facets))
+            shifted = [rows + start for rows, start in zip(facets, starts, strict=False)]
+            embedded = EmbeddedSurface(cutter, np.concatenate(points), np.concatenate(shifted))
+            self._followers.append(embedded)
+            for k, begin, end in zip(numbers, begins, begins[1:], strict=False):
+                found[k] = embedded.surface.of_owners(begin, end)
+        self.shown, self.touchable = found
 
     def update(self, increment: Increment) -> None:
         """Let them follow a cut."""
@@ -73,19 +80,9 @@ class Surfaces:
         self._positions = [follower.surface.positions(displacement) for follower in self._followers]
 
     @property
-    def shown(self) -> MovingSurface:
-        """The surface that is seen, the faces of cuts apart."""
-        return (self.visual or self.material).surface
-
-    @property
-    def touchable(self) -> MovingSurface:
-        """The surface that tools collide with."""
-        return (self.collision or self.material).surface
-
-    @property
     def touchable_positions(self) -> Floats:
         """(v, s) vertices of that surface after the last `move`, m."""
-        return self._positions[-1 if self.collision else 0]
+        return self._positions[0 if self.touchable is self.material.surface else 1]
 
     def picture(self, phantom: PhantomMesh, displacement: Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
@@ -93,16 +90,17 @@ class Surfaces:
             return _pieces(phantom, displacement)
         inside = self.material.surface
         parts = [(inside, inside.used)]
-        if self.visual is not None:
+        if self.shown is not inside:
             shown = inside.used[inside.inner.rows[inside.used]]
             parts = [(inside, shown), (self.shown, self.shown.used)]
         points, material, triangles, inner, begin = [], [], [], [], 0
         for number, (surface, used) in enumerate(parts):
-            points.append(surface.positions(displacement))
-            material.append(surface.material.rows)
-            triangles.append(surface.facets.rows[used] + begin)
+            vertices, corners = np.unique(surface.facets.rows[used], return_inverse=True)
+            points.append(surface.positions(displacement)[vertices])
+            material.append(surface.material.rows[vertices])
+            triangles.append(corners.reshape(-1, inside.facets.rows.shape[1]) + begin)
             inner.append(surface.inner.rows[used] & (number == 0))
-            begin += len(points[-1])
+            begin += len(vertices)
         return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
 
 
@@ -188,26 +186,27 @@ class SurfaceCollider:
         if axis.shape != (2, 3) or not np.isfinite(axis).all():
             raise XfemError(f"axis of a tool {axis.tolist()}; expected two finite points in space")
         reach = radius + _ROUND_OFF * float(np.abs(axis).max())
-        facets = self.surface.facets.rows
-        found, distance = np.empty(len(facets), dtype=np.int64), np.empty(len(facets))
-        at = np.empty((len(facets), 3))
-        count = _touched(axis[0], axis[1], self.positions, facets, reach, found, distance, at)
+        used = self.surface.used
+        found, distance, at = used.copy(), np.empty(len(used)), np.empty((len(used), 3))
+        count = _touched(
+            axis[0], axis[1], self.positions, self.surface.facets.rows, reach, found, distance, at
+        )
         return Contacts(found[:count], np.minimum(distance[:count], radius), at[:count])
 
 
 @njit(cache=True)
 def _touched(start, end, positions, facets, reach, found, distance, at):
-    """Write facets within `reach` of a segment, distances and weights (q, 3); how many there are.
+    """Keep of the `found` facets those within `reach` of a segment; how many there are.
+
+    Writes their distances and the weights (q, 3) of the nearest points.
 
     The nearest points of a segment and of a triangle that it does not pierce are an end of the
     segment and a point of the triangle, or on an edge of it.
     """
     corners, ends = np.empty((3, 3)), np.stack((start, end))
     weights, count = np.empty(3), 0
-    for f in range(len(facets)):
-        if facets[f, 0] < 0:
-            continue
-        apart = False
+    for n in range(len(found)):
+        f, apart = found[n], False
         for i in range(3):
             low = high = positions[facets[f, 0], i]
             for k in range(3):
