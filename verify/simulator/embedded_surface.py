@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from verify.simulator.division import MeshPatch
@@ -93,42 +94,55 @@ def divide_facets(
     new = share[:, 1] > 0.0
     number = np.where(new, len(points) + np.cumsum(new) - 1, ends[:, 0])
     point = point.reshape(-1, 2)
-    through = is_cut(places)[point].all(axis=1)
-    crossed, turn, corners, point = (
-        crossed[through],
-        turn[through],
-        corners[through],
-        point[through],
-    )
-    mine = np.where(positive[through], 1, -1).astype(np.int8)
+    is_through = is_cut(places)[point].all(axis=1)
+    row = np.full(len(facets), -1)
+    row[crossed[is_through]] = np.flatnonzero(is_through)
+    parts = _divided(facets, row, alone, positive, number[point], share[point])
+    return DividedFacets(ends[new], places[new], *parts)
 
-    # corners a, b, c and the points u on ab, v on ac
-    ids = np.concatenate([corners, number[point]], axis=1)
-    at = np.zeros((len(ids), 5, 3))
-    rows = np.arange(len(ids))[:, None]
-    at[rows, np.arange(3), turn] = 1.0
-    own = np.where(mine[:, None] > 0, share[point, 0], share[point, 1])
-    at[:, 3:] = own[:, :, None] * at[:, :1] + (1.0 - own)[:, :, None] * at[:, 1:3]
-    # as in `verify.xfem.clip`: the diagonal begins at the corner with the lower number
-    lower = corners[:, 1] < corners[:, 2]
-    parts = np.empty((len(ids), 3, 3), dtype=np.int64)
-    parts[:] = [[0, 3, 4], [3, 1, 2], [3, 2, 4]]
-    parts[lower, 1, 2], parts[lower, 2, 0] = 4, 1
-    triangles = ids[rows[:, :, None], parts]
-    is_one = (triangles != triangles[:, :, [2, 0, 1]]).all(axis=2)
-    is_whole = np.ones(len(facets), dtype=bool)
-    is_whole[crossed] = False
-    whole = np.flatnonzero(is_whole)
-    source = np.concatenate([whole, np.repeat(crossed, 3)[is_one.ravel()]])
-    order = np.argsort(source, kind="stable")
-    side = np.stack([mine, -mine, -mine], axis=1)[is_one]
-    unit = np.broadcast_to(np.eye(3), (len(whole), 3, 3))
-    return DividedFacets(
-        ends[new], places[new],
-        np.concatenate([facets[whole], triangles[is_one]])[order],
-        np.concatenate([unit, at[rows[:, :, None], parts][is_one]])[order],
-        source[order], np.concatenate([np.zeros(len(whole), dtype=np.int8), side])[order],
-    )  # fmt: skip
+
+@njit(cache=True)
+def _divided(facets, row, alone, positive, points, shares):
+    """Write the parts of facets: corners, their coordinates, facet, side of the cut.
+
+    `row` (f,) is that of a divided facet in what follows: its corner alone on its side, whether
+    that is above the cut, the two points (r, 2) on the edges from it, and the shares (r, 2, 2) of
+    the ends of these edges in them, of that above first.
+    """
+    most = 3 * len(facets)
+    ids, at = np.empty((most, 3), dtype=np.int64), np.zeros((most, 3, 3))
+    source, side = np.empty(most, dtype=np.int64), np.zeros(most, dtype=np.int8)
+    known, where, count = np.empty(5, dtype=np.int64), np.zeros((5, 3)), 0
+    for facet in range(len(facets)):
+        r = row[facet]
+        if r < 0:
+            ids[count], source[count] = facets[facet], facet
+            for k in range(3):
+                at[count, k, k] = 1.0
+            count += 1
+            continue
+        # corners a, b, c and the points u on ab, v on ac
+        where[:] = 0.0
+        for k in range(3):
+            corner = (alone[r] + k) % 3
+            known[k], where[k, corner] = facets[facet, corner], 1.0
+        for k in range(2):
+            own = shares[r, k, 0 if positive[r] else 1]
+            known[3 + k] = points[r, k]
+            where[3 + k] = own * where[0] + (1.0 - own) * where[1 + k]
+        # as in `verify.xfem.clip`: the diagonal begins at the corner with the lower number
+        lower = known[1] < known[2]
+        parts = ((0, 3, 4), (3, 1, 4 if lower else 2), (1 if lower else 3, 2, 4))
+        for number, part in enumerate(parts):
+            one, two, three = known[part[0]], known[part[1]], known[part[2]]
+            if one == two or two == three or three == one:
+                continue
+            for k in range(3):
+                ids[count, k], at[count, k] = known[part[k]], where[part[k]]
+            source[count] = facet
+            side[count] = 1 if positive[r] == (number == 0) else -1
+            count += 1
+    return ids[:count], at[:count], source[:count], side[:count]
 
 
 class _Fragments(NamedTuple):

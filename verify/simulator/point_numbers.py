@@ -390,19 +390,25 @@ class EdgePoints:
             others = [z for z in reversed(line) if z not in (x, y)]
             if not others:
                 continue
+            a, b = self._place(x), self._place(y)
+            if key is not None and len(line) == 1 and max(x, y) < self._points.nodes:
+                return line[0], self._share(a, b, line[0])  # the only one on a whole edge
             direction = line.direction
             if key is None or direction is None:
                 direction = self._directed(line, *(key or (x, y)))
-            a, b = self._place(x), self._place(y)
             start, end = (float(a @ direction), x), (float(b @ direction), y)
             for z in others:
-                c = self._place(z)
-                here = float(c @ direction), z
+                here = float(self._place(z) @ direction), z
                 if (here > start) == (end > start) == (end > here):
-                    total = float((b - a) @ (b - a))
-                    share = float((c - a) @ (b - a)) / total if total > 0.0 else 0.5
-                    return z, min(max(share, 0.0), 1.0)
+                    return z, self._share(a, b, z)
         return None
+
+    def _share(self, a: Floats, b: Floats, z: int) -> float:
+        """Share from a to b at which a point lies between them."""
+        along = b - a
+        total = float(along @ along)
+        share = float((self._place(z) - a) @ along) / total if total > 0.0 else 0.5
+        return min(max(share, 0.0), 1.0)
 
     def _lines(self, x: int, y: int) -> Iterator[tuple[tuple[int, int] | None, _Line]]:
         """Lines on which an edge lies that may have points inside; the ends of an edge of the mesh.
