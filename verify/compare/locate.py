@@ -307,6 +307,7 @@ class SolutionField:
         """Find the triangle (n,) nearest to each of `points` (n, 3), and its distance (n,)."""
         points = np.ascontiguousarray(points, dtype=float)
         directions = np.zeros((0, 3)) if near is None else near - points
+        assert self._across is not None
         found: tuple[NDArray[np.int64], Array] = nearest_triangles(
             points, np.ascontiguousarray(directions), self._wanted(points, near),
             self._searched, self._across, self._sides, ROUND_OFF * self.scale,
