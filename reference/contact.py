@@ -99,6 +99,24 @@ class FaceContact:
         found = self.gaps @ np.hstack(columns) if columns else np.zeros((0, 0))
         return np.asarray(0.5 * (found + found.T))
 
+    def pressed(
+        self, gaps: Array, compliance: Array, leader: NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Return pressures (m,), Pa, and their nodal forces (k,), N; none where nodes are tied.
+
+        Parameters
+        ----------
+        gaps : (m,) array
+            Weighted gaps without pressures.
+        compliance : (m, m) array
+        leader : (n,) int array
+            The node that leads the group of each node.
+        """
+        apart = np.flatnonzero(leader[self.pairs[:, 0]] != leader[self.pairs[:, 1]])
+        found = np.zeros(len(self.weights))
+        found[apart] = pressures(compliance[np.ix_(apart, apart)], gaps[apart])[0]
+        return found, np.asarray(self.gaps.T @ found)
+
 
 def _shares(
     space: ConformingSpace, facing: NDArray[np.int64], moves: NDArray[np.bool_]

@@ -11,7 +11,7 @@ free unknowns is kept apart: if it is not round-off, the sum of all is not const
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-11  # of the largest force that the residual balances
 _GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
+# of the force that would stop a body within a step: of one that flies freely all forces are the
+# round-off of its displacement
+_FLIGHT = 1e-4
 _MOST_ITERATIONS = 40
 _SHORTEST = 1e-2  # share of a correction
 _MOST_LEAPS = 3
@@ -97,6 +100,7 @@ class StepForces:
     viscous: Array
     inertia: Array
     tie: Array  # (cuts, k) of the external ones, those on what each cut has released
+    contact: Array | float = 0.0  # of the external ones, those of faces that press on each other
 
     @property
     def residual(self) -> Array:
@@ -128,9 +132,11 @@ class Stepper:
         self.body, self.scheme, self.averaged, self.size = body, scheme, averaged, size
         self.solves = 0
         self._solver: NodalSolver | TiedSolver | None = None
+        self._flight = 0.0  # least force that a residual is held against, N
         self._before = np.zeros(0)  # internal and viscous force at the start of the step
         self._load = self._tie = np.zeros(0)
         self._travelled: Array | None = None  # in the last step
+        self._compliance: Array | None = None  # of the faces of cuts, by the factorisation
 
     def step(self, state: State) -> StepForces:
         """Advance a state in place; give the forces of the step.
@@ -141,15 +147,37 @@ class Stepper:
             If Newton's iteration does not converge.
         """
         start = state.copy()
+        momenta = float(np.linalg.norm(self.body.mass @ start.velocity))
+        self._flight = _FLIGHT * momenta / self.size
         if not self.averaged:
             self._before = self._resisting(start.displacement, start.velocity)
         self._load = self._over_step(self.body.external, start.time)
         self._tie = self._over_step(self.body.tie_forces.at, start.time)
         a, forces = self._solved(start, self._first(start))
+        if self.body.contact is not None:
+            a, forces = self._pressed(start, a)
         state.displacement, state.velocity = self._end(start, a)
         state.acceleration, state.time = a, start.time + self.size
         self._travelled = state.displacement - start.displacement
         return forces
+
+    def _pressed(self, start: State, a: Array) -> tuple[Array, StepForces]:
+        """Add the pressures at the end of the step that keep faces from overlapping there.
+
+        Their work over the step is p·(g₊ − g) with p·g₊ = 0, and g is not negative: contact never
+        adds energy, whatever the step (C. Kane, E. A. Repetto, M. Ortiz, J. E. Marsden, Comput.
+        Methods Appl. Mech. Engrg. 180, 1999).
+        """
+        if self._solver is None:
+            self._factorise(start.displacement, self._end(start, a)[0])
+        assert self._solver is not None
+        share = self.size**2 * self.scheme.beta
+        more, contact, self._compliance = self.body.press(
+            self._end(start, a)[0], self._solver, share, self._compliance
+        )
+        self._load = self._load + contact
+        forces, _, _ = self._residual(start, a + more)
+        return a + more, replace(forces, contact=contact)
 
     def restart(self, state: State, forces: Array) -> None:
         """Give a state, of which something has jumped, an acceleration to go on with.
@@ -277,7 +305,7 @@ class Stepper:
         """Free what PETSc holds; a step that follows factorises anew."""
         if self._solver is not None:
             self._solver.destroy()
-            self._solver = None
+            self._solver = self._compliance = None
 
     def _over_step(self, forces: Callable[[float], Array], time: float) -> Array:
         h = self.size
@@ -338,6 +366,7 @@ class Stepper:
         parts = (forces.internal, forces.viscous, forces.inertia)
         norms = [float(np.linalg.norm(self.body.ties.summed(part))) for part in parts]
         norms.append(float(np.linalg.norm(forces.external)))
+        norms.append(self._flight)
         return max(norms) or 1.0
 
 
@@ -382,7 +411,8 @@ class Ledger:
         slip = change @ forces.inertia - (kinetic - self._kinetic)
         done = self.done
         tie = forces.tie.sum(axis=0)
-        done["work_of_loads"] += float(change @ (forces.external - body.weight - tie))
+        loads = forces.external - body.weight - tie - forces.contact
+        done["work_of_loads"] += float(change @ loads)
         done["cut_work"] -= float(change @ tie)
         self.work_by_cut = self.work_by_cut - forces.tie @ change
         d = body.space.dimension
@@ -391,7 +421,8 @@ class Ledger:
         self.turned = self.turned + (state.time - before.time) * turning
         done["work_of_supports"] += float(change @ reaction)
         done["damping"] += float(change @ forces.viscous)
-        done["algorithmic"] += float(slip + change @ forces.internal - (strain - self._strain))
+        lost = slip + change @ (forces.internal - forces.contact) - (strain - self._strain)
+        done["algorithmic"] += float(lost)
         done["unbalanced"] -= float(change @ (forces.residual + reaction))
         self._kinetic, self._strain = kinetic, strain
 

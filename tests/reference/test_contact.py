@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 from reference.contact import pressures
 from reference.exact import exact_of, exact_solution
 from verify.errors import InputError
-from verify.scene import Material
+from verify.scene import Material, load_scene
 from verify.solvers.conforming import ConformingSolver, ReferenceSolver
 
 STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
@@ -210,3 +210,30 @@ def test_pressures_are_those_of_the_quadratic_program():
         wanted, _ = nnls(lower.T, np.linalg.solve(lower, -gaps))
         np.testing.assert_allclose(found, wanted, atol=1e-8 * max(wanted.max(), 1.0))
     assert pressures(np.eye(3), np.array([0.0, 1.0, 2.0]))[0].tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.fenicsx
+def test_halves_that_meet_never_gain_energy_and_exchange_their_velocities():
+    """The work of contact over a step is p·(g₊ − g) = −p·g, at any step and on any mesh."""
+    scene = load_scene("contact/impact")
+    found = ConformingSolver().solve(scene, 1, 0)
+    energy = found.ledger["kinetic"] + found.ledger["strain"]
+    assert energy.max() <= energy[0] * (1 + 1e-10)
+    assert energy[-1] >= 0.98 * energy[0]
+    right = found.points[found.cells].mean(axis=1)[:, 0] > 1.0
+    mean = found.velocity[-1][found.cells[right], 0].mean()
+    assert mean == pytest.approx(1e-3, rel=1 / 16)  # the front is as wide as an element
+    together = found.contact.pressure.max(axis=1) > 0.0
+    meets = (found.times > 0.5) & (found.times < 2.5)
+    known = np.abs(found.times - 2.5) > 0.1  # when they part
+    np.testing.assert_array_equal(together[known], meets[known])
+
+
+@pytest.mark.fenicsx
+def test_a_damped_scheme_finds_the_pressure_of_the_impact():
+    """ρ c v at the times between the first and the last two elements' passages."""
+    scene = load_scene("contact/impact")
+    found = ConformingSolver().solve(scene, 1, 0, scheme="generalised_alpha", spectral_radius=0.5)
+    steady = (found.times > 1.1) & (found.times < 2.1)
+    np.testing.assert_allclose(found.contact.pressure[steady], 1e-3, rtol=0.02)
+    assert (found.contact.pressure[(found.times < 0.45) | (found.times > 2.8)] == 0.0).all()

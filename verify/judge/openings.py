@@ -423,4 +423,4 @@ def _exact_on(mesh: Solution, motion: Motion) -> Solution:
     near[mesh.cells.ravel()] = np.repeat(centres, mesh.cells.shape[1], axis=0)
     u = motion.at().displacement(mesh.points, near)
     return replace(mesh, displacement=np.asarray(u)[None], times=np.zeros(1), velocity=None,
-                   acceleration=None, ledger={})  # fmt: skip
+                   acceleration=None, ledger={}, contact=None)  # fmt: skip

@@ -159,6 +159,7 @@ _SAME_AT_ENDS = 1e-3
 # _STEP of the body, _OFF of it from cuts: beside a tip truncation is some 100 (_STEP/_OFF)^4.
 _BALANCED, _STEP, _OFF = 1e-4, 3e-4, 0.02
 _DISTANCES = np.geomspace(1e-5, 0.1, 12)  # from cuts and their ends, of the body
+_FLIGHT = 1e-9  # of momenta over the step of the differences: round-off, where nothing is strained
 _FOURTH_ORDER = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
@@ -417,9 +418,11 @@ class _Fit:
             elif isinstance(load, BodyForce):
                 force = ForceDensity(scene, load, field, time).at(points)
                 terms[:, :, d] += factor_at(load.history, time) * force
+        level = np.abs(self._stress(field, points)).max() / self._size
         if self._exact.moves:
             terms[:, :, d + 1] = self._inertia(points, time)
-        level = np.abs(self._stress(field, points)).max() / self._size
+            momenta = float(scene.material.density or 0.0) * np.abs(field.velocity(points)).max()
+            level = max(level, _FLIGHT * momenta / (_STEP * self._times[-1]))
         bound = _BALANCED * np.maximum(np.abs(terms).max(axis=(1, 2)), level)
         off = np.abs(terms.sum(axis=2)).max(axis=1)
         k = int((off - bound).argmax())

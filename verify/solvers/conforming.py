@@ -76,7 +76,7 @@ class ConformingSolver:
     """
 
     name = "conforming"
-    contact = ("static",)
+    contact = ("static", "dynamic")
     choices: Mapping[str, Collection[Any]] = {
         "mesh": ("imprinted", "remeshed"), "degree": (1, 2), "scheme": SCHEMES,
         "opening": OPENINGS,
@@ -147,7 +147,7 @@ class ReferenceSolver:
     """
 
     name = "reference"
-    contact = ("static",)
+    contact = ("static", "dynamic")
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""

@@ -26,6 +26,7 @@ from reference.space import ConformingSpace, conforming_space
 from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.tables import starts_open
+from verify.solution import ContactPressure
 from verify.solvers.runs import (
     LedgerRows,
     Record,
@@ -137,6 +138,7 @@ class TiedMotion:
         self.waves = ShortWaves(self.body, marching.element) if blades else None
         self.steppers: dict[float, Stepper] = {}
         self.outputs: list[State] = []
+        self.pressures: list[Array] = []  # of contact, at the outputs
         self.openings = 0
         self.begun = False  # whether something has jumped since the last step
         self.scheme, self.averaged = marching.scheme()
@@ -180,7 +182,14 @@ class TiedMotion:
             "ledger": self.rows.columns(),
             "quantities": self.waves.found() if self.waves is not None else {},
             "unknowns": self.space.node_points.size,
+            "contact": self._contact(),
         }
+
+    def _contact(self) -> ContactPressure | None:
+        faces = self.body.contact
+        if faces is None:
+            return None
+        return ContactPressure(faces.points, faces.weights, np.array(self.pressures))
 
     @property
     def time(self) -> float:
@@ -221,6 +230,8 @@ class TiedMotion:
         if linear and not self.begun and self.scheme.alpha_m != self.scheme.alpha_f:
             found.acceleration = self.body.accelerations(self._unbalanced(found.time))
         self.outputs.append(found)
+        body = self.body  # undamped, pressures alternate from step to step about their mean
+        self.pressures.append(0.5 * (body.pressure_before + body.pressure))
         ledger, momenta = self.ledger, momenta_of(self.body, self.state)
         done = ledger.done | work_of_blades(self.scene.cuts, ledger.work_by_cut)
         energies = ledger.state(self.body, self.state)
@@ -249,6 +260,8 @@ class TiedMotion:
         first neither is planned.
         """
         if self.scene.analysis.kinematics != "linear" or self.body.iterates:
+            return False
+        if self.body.contact is not None:  # whose compliance changes with the ties
             return False
         lasting = lasting_ties(self.facing, self.opening.times)
         ties = lasting.size // 2 * self.space.dimension
@@ -333,6 +346,8 @@ class TiedMotion:
         law, (mass, stiffness) = body.law, self.scene.analysis.damping
         forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
+        if body.contact is not None:
+            forces += body.contact.gaps.T @ body.pressure
         if stiffness:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
         return forces
