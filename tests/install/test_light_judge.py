@@ -113,11 +113,13 @@ def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_pat
         code = f"import {name}"
         assert subprocess.run([light.python, "-c", code], capture_output=True).returncode
     for scene in select_cases(["benchmark"], weight="heavy"):
-        answers_of_another(scene, tmp_path / "answers" / scene.name)
+        if scene.judged_by_exact or bundle_of_case(scene):  # else FEniCSx has to solve it
+            answers_of_another(scene, tmp_path / "answers" / scene.name)
     asked = ["import", "benchmark", "answers", "--solver", "mine", "--out", "out", "-j", 2]
     answer = said(light.python, tmp_path, *asked, "--json")
     found = verdicts(answer)
-    print(f"{len(found)} scenes: {answer.seconds:.0f} s of processor")
+    answered = sorted(name for name in found if (tmp_path / "answers" / name).is_dir())
+    print(f"{answer.seconds:.0f} s of processor for {len(answered)} scenes: {', '.join(answered)}")
     assert {verdict for one in found.values() for verdict in one.values()} <= {"PASS", "UNDECIDED"}
     assert answer.seconds < 2 * 60.0
     size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())

@@ -34,7 +34,10 @@ from verify.conformance.scenes import (
     YOUNG,
     Array,
     Field,
+    held,
     in_space,
+    line,
+    pull,
     unit_scene,
 )
 from verify.conformance.trials import Trial
@@ -54,36 +57,36 @@ _MOTIONS = np.array([
 def two_cuts() -> tuple[Scene, Field]:
     """Move each of three parts between two cuts, held off the cuts."""
     lower, upper = [[-0.1, 0.14], [1.1, 0.23]], [[-0.1, 0.85], [1.1, 0.77]]
-    held = ["bottom", "x < 1e-9 and y > 0.3 and y < 0.7", "top"]
+    places = ["bottom", "x < 1e-9 and y > 0.3 and y < 0.7", "top"]
 
     def part(near: Array) -> Array:
         return np.sum([_left_of(near, *ends) for ends in (lower, upper)], axis=0)
 
-    return _parted("two-cuts", [lower, upper], held, part, cells=[5, 8])
+    return _parted("two-cuts", [lower, upper], places, part, cells=[5, 8])
 
 
 def crossing_cuts() -> tuple[Scene, Field]:
     """Move each quarter between two cuts that cross, held off the cuts."""
     one, two = [[-0.1, 0.326], [1.1, 0.614]], [[0.43, -0.1], [0.58, 1.1]]
-    held = [
+    places = [
         f"y {end} and x {side}" for end in ("< 1e-9", "> 0.999999") for side in ("> 0.8", "< 0.2")
     ]
 
     def part(near: Array) -> Array:
         return 2 * _left_of(near, *one) + _left_of(near, *two)
 
-    return _parted("crossing-cuts", [one, two], held, part)
+    return _parted("crossing-cuts", [one, two], places, part)
 
 
 def branched_cut() -> tuple[Scene, Field]:
     """Move each of three parts between a cut and a branch of it, held off the cuts."""
     stem, branch = [[-0.1, 0.326], [1.1, 0.614]], [[0.45, 0.458], [0.62, 1.1]]
-    held = ["bottom", "y > 0.999999 and x > 0.8", "y > 0.999999 and x < 0.2"]
+    places = ["bottom", "y > 0.999999 and x > 0.8", "y > 0.999999 and x < 0.2"]
 
     def part(near: Array) -> Array:
         return _left_of(near, *stem) * (1 + _left_of(near, *branch))
 
-    return _parted("branched-cut", [stem, branch], held, part)
+    return _parted("branched-cut", [stem, branch], places, part)
 
 
 def _left_of(points: Array, start: Sequence[float], end: Sequence[float]) -> Array:
@@ -95,7 +98,7 @@ def _left_of(points: Array, start: Sequence[float], end: Sequence[float]) -> Arr
 def _parted(
     name: str,
     cuts: Sequence[Sequence[Sequence[float]]],
-    held: Sequence[str],
+    places: Sequence[str],
     part: Callable[[Array], Array],
     cells: Sequence[int] = (5, 4),
 ) -> tuple[Scene, Field]:
@@ -104,13 +107,10 @@ def _parted(
         name,
         mesh={"cells": [list(cells), [2 * n for n in cells]]},
         supports=[
-            {"where": where, "displacement": [f"{a} - {turn} * y", f"{b} + {turn} * x"]}
-            for where, (a, b, turn) in zip(held, _MOTIONS.tolist(), strict=False)
+            held(where, [f"{a} - {turn} * y", f"{b} + {turn} * x"])
+            for where, (a, b, turn) in zip(places, _MOTIONS.tolist(), strict=False)
         ],
-        cuts=[
-            {"kind": "polyline", "name": f"cut {k}", "points": [list(end) for end in ends]}
-            for k, ends in enumerate(cuts)
-        ],
+        cuts=[line(*ends, name=f"cut {k}") for k, ends in enumerate(cuts)],
     )
 
     def field(points: Array, near: Array) -> Array:
@@ -133,7 +133,7 @@ def crossed_interface() -> tuple[Scene, Field]:
         material=material,
         cuts=[UPRIGHT],
         supports=ROLLERS,
-        loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
+        loads=[pull("top", 0.0, traction)],
     )
 
     def field(points: Array, near: Array) -> Array:
@@ -155,11 +155,10 @@ def pulled_halves_in_space() -> tuple[Scene, Field]:
     scene = unit_scene(
         "pulled-halves-3d",
         supports=[
-            {"where": f"{axis} < 1e-9", "displacement": [0.0], "components": [axis]}
-            for axis in "xyz"
-        ]
-        + [{"where": "x > 0.999999", "displacement": [0.0], "components": ["x"]}],
-        loads=[{"kind": "traction", "where": "z > 0.999999", "traction": [0.0, 0.0, traction]}],
+            *(held(f"{axis} < 1e-9", [0.0], axis) for axis in "xyz"),
+            held("x > 0.999999", [0.0], "x"),
+        ],
+        loads=[pull("z > 0.999999", 0.0, 0.0, traction)],
         **in_space([{"kind": "polygon", "points": points}]),
     )
 
@@ -179,11 +178,8 @@ def ending_cut() -> Scene:
     mouth = [-0.1, END[1] - SLOPE * (END[0] + 0.1)]
     return unit_scene(
         "ending-cut",
-        cuts=[{"kind": "polyline", "points": [mouth, list(END)]}],
-        supports=[
-            {"where": "bottom", "displacement": [0.0, 0.0]},
-            {"where": "top", "displacement": [0.0, 0.1]},
-        ],
+        cuts=[line(mouth, END)],
+        supports=[held("bottom", [0.0, 0.0]), held("top", [0.0, 0.1])],
     )
 
 
@@ -232,9 +228,9 @@ def _unexplained_field(scene: Scene, solution: Solution, field: Field) -> str:
     off = solution.displacement[-1] - interpolant
     scale = float(np.abs(interpolant).max())
     for support in scene.supports:
-        held = on_part(scene.geometry, support.where, solution.points, 1.0)
+        there = on_part(scene.geometry, support.where, solution.points, 1.0)
         axes = ["xyz".index(axis) for axis in support.components or "xyz"[:d]]
-        if np.abs(off[held][:, axes]).max(initial=0.0) > _SOLVED * scale:
+        if np.abs(off[there][:, axes]).max(initial=0.0) > _SOLVED * scale:
             return f"the support on '{support.where}' does not hold"
     law, k = hooke(scene.material), solution.cells.shape[1]
     apart = Solution(

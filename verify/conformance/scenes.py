@@ -5,7 +5,7 @@ case takes a few milliseconds. The linear answers lie in every finite element sp
 along straight lines; they are found to round-off or not at all.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,20 +23,40 @@ YOUNG, POISSON, DENSITY = 2.5, 0.3, 3.0
 
 _SQUARE = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
 _CUBE = {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]}
+
+
+def line(*points: Sequence[float], **more: Any) -> dict[str, Any]:
+    """Cut along a polyline."""
+    return {"kind": "polyline", "points": [list(point) for point in points], **more}
+
+
+def held(where: str, displacement: Any, axes: str = "") -> dict[str, Any]:
+    """Prescribe the displacement, or those of its components that are named."""
+    return {
+        "where": where, "displacement": displacement, **({"components": list(axes)} if axes else {})
+    }  # fmt: skip
+
+
+def weight(*acceleration: float) -> dict[str, Any]:
+    """Load by gravity, m/s²."""
+    return {"kind": "gravity", "acceleration": list(acceleration)}
+
+
+def pull(where: str, *traction: float) -> dict[str, Any]:
+    """Load by a traction, Pa."""
+    return {"kind": "traction", "where": where, "traction": list(traction)}
+
+
 _MIDDLE, _SLOPE = (0.5, 0.47), 0.24
-_INCLINED = {"kind": "polyline", "points": [[-0.1, 0.326], [1.1, 0.614]]}
+_INCLINED = line((-0.1, 0.326), (1.1, 0.614))
 UPRIGHT_AT = 0.37
-UPRIGHT = {"kind": "polyline", "points": [[UPRIGHT_AT, -0.1], [UPRIGHT_AT, 1.1]]}
+UPRIGHT = line((UPRIGHT_AT, -0.1), (UPRIGHT_AT, 1.1))
 _TILTED_PLANE: dict[str, Any] = {
     "kind": "polygon",
     "points": [[-0.1, -0.1, 0.37], [1.1, -0.1, 0.37], [1.1, 1.1, 0.61], [-0.1, 1.1, 0.61]],
 }
-_BOUNDARY_EXACT = [{"where": "boundary", "displacement": "exact"}]
-ROLLERS = [
-    {"where": "bottom", "displacement": [0.0], "components": ["y"]},
-    {"where": "left", "displacement": [0.0], "components": ["x"]},
-    {"where": "right", "displacement": [0.0], "components": ["x"]},
-]
+_BOUNDARY_EXACT = [held("boundary", "exact")]
+ROLLERS = [held("bottom", [0.0], "y"), held("left", [0.0], "x"), held("right", [0.0], "x")]
 
 
 def unit_scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
@@ -82,8 +102,7 @@ def rigid(kind: str, dimension: int = 2) -> tuple[Scene, Field]:
     name = f"{kind}-{dimension}d"
     if kind == "translation":
         shift = np.array([0.3, -0.2, 0.1])[:dimension]
-        supports = [{"where": "boundary", "displacement": shift.tolist()}]
-        scene = unit_scene(name, supports=supports, **parts)
+        scene = unit_scene(name, supports=[held("boundary", shift.tolist())], **parts)
         return scene, lambda points, near: np.tile(shift, (len(points), 1))
     spin = np.array([[0.0, -0.1, 0.05], [0.1, 0.0, -0.07], [-0.05, 0.07, 0.0]])
     spin = spin[:dimension, :dimension]
@@ -99,10 +118,9 @@ def turned(dimension: int) -> tuple[Scene, Field]:
     rotation = Rotation(
         angle=50.0, centre=centre, axis=(1.0, 2.0, -1.0) if dimension == 3 else None
     )
-    support = {"where": "boundary", "displacement": shift, "rotation": rotation.model_dump()}
     scene = unit_scene(
         f"turned-{dimension}d",
-        supports=[support],
+        supports=[{**held("boundary", shift), "rotation": rotation.model_dump()}],
         analysis={"kinematics": "corotational"},
         **parts,
     )
@@ -115,10 +133,7 @@ def parted_halves() -> tuple[Scene, Field]:
     lift = np.array([0.05, 0.0, 0.2])
     scene = unit_scene(
         "parted-halves",
-        supports=[
-            {"where": "bottom", "displacement": [0.0, 0.0, 0.0]},
-            {"where": "top", "displacement": lift.tolist()},
-        ],
+        supports=[held("bottom", [0.0, 0.0, 0.0]), held("top", lift.tolist())],
         **in_space([_TILTED_PLANE]),
     )
     corner, end = _TILTED_PLANE["points"][0], _TILTED_PLANE["points"][2]
@@ -137,8 +152,8 @@ def freed_half() -> tuple[Scene, Array]:
     scene = unit_scene(
         "freed-half",
         cuts=[_INCLINED],
-        supports=[{"where": "top", "displacement": [0.0, 0.0]}],
-        loads=[{"kind": "gravity", "acceleration": gravity.tolist()}],
+        supports=[held("top", [0.0, 0.0])],
+        loads=[weight(*gravity.tolist())],
         analysis={"kind": "dynamic", "duration": 0.4, "time_step": 0.01, "outputs": 5},
     )
     return scene, gravity
@@ -152,9 +167,9 @@ def swinging(shaken: bool = False) -> Scene:
     swing = "0.02 * (1 - cos(0.6 * t))"  # from rest, slower than its lowest mode
     return unit_scene(
         "shaken" if shaken else "swinging",
-        cuts=[{"kind": "polyline", "points": [[0.37, 0.41], [1.1, 0.63]]}],
-        supports=[{"where": "bottom", "displacement": [swing if shaken else 0.0, 0.0]}],
-        loads=[{"kind": "gravity", "acceleration": [0.02, -0.01]}],
+        cuts=[line((0.37, 0.41), (1.1, 0.63))],
+        supports=[held("bottom", [swing if shaken else 0.0, 0.0])],
+        loads=[weight(0.02, -0.01)],
         analysis={"kind": "dynamic", "duration": 9.0, "time_step": 0.05, "outputs": 31},
     )
 
@@ -221,7 +236,7 @@ def pulled_halves() -> tuple[Scene, Field]:
         material={"young": YOUNG, "poisson": POISSON, "plane": "stress"},
         cuts=[UPRIGHT],
         supports=ROLLERS,
-        loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
+        loads=[pull("top", 0.0, traction)],
     )
 
     def field(points: Array, near: Array) -> Array:
@@ -249,11 +264,7 @@ def two_materials() -> tuple[Scene, Field]:
         cuts=[UPRIGHT],
         supports=ROLLERS,
         loads=[
-            {
-                "kind": "traction",
-                "where": f"y > 0.999999 and x {side} {interface}",
-                "traction": [0.0, float(modulus * strain)],
-            }
+            pull(f"y > 0.999999 and x {side} {interface}", 0.0, float(modulus * strain))
             for side, modulus in zip("<>", young, strict=True)
         ],
     )
@@ -274,8 +285,8 @@ def hanging_halves() -> tuple[Scene, Array]:
     scene = unit_scene(
         "hanging-halves",
         cuts=[UPRIGHT],
-        supports=[{"where": "top", "displacement": [0.0, 0.0]}],
-        loads=[{"kind": "gravity", "acceleration": gravity.tolist()}],
+        supports=[held("top", [0.0, 0.0])],
+        loads=[weight(*gravity.tolist())],
     )
     return scene, DENSITY * gravity
 
@@ -291,12 +302,9 @@ def sheared_halves(mirrored: bool) -> Scene:
     return unit_scene(
         "mirrored" if mirrored else "sheared-halves",
         mesh={"cells": [[6, 6], [12, 12]]},
-        cuts=[{"kind": "polyline", "points": [end[order] for end in ends]}],
-        supports=[
-            {"where": lower, "displacement": [0.0, 0.0]},
-            {"where": upper, "displacement": [0.02, 0.05][order]},
-        ],
-        loads=[{"kind": "traction", "where": side, "traction": [0.1, 0.3][order]}],
+        cuts=[line(*(end[order] for end in ends))],
+        supports=[held(lower, [0.0, 0.0]), held(upper, [0.02, 0.05][order])],
+        loads=[pull(side, *[0.1, 0.3][order])],
     )
 
 
@@ -305,8 +313,8 @@ def free_piece() -> Scene:
     return unit_scene(
         "free-piece",
         cuts=[_INCLINED],
-        supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
-        loads=[{"kind": "gravity", "acceleration": [0.0, -1.0]}],
+        supports=[held("bottom", [0.0, 0.0])],
+        loads=[weight(0.0, -1.0)],
     )
 
 
@@ -338,45 +346,41 @@ def given_mesh(folder: Path, shuffled: bool) -> Scene:
         file=folder / f"{name}.toml",
         geometry={"kind": "file", "file": file.name, "dimension": 2},
         mesh={"pattern": "given"},
-        cuts=[{"kind": "polyline", "points": [[-0.1, 0.42], [0.6, 0.57]]}],
-        supports=[{"where": "y < 1e-9", "displacement": [0.0, 0.0]}],
-        loads=[{"kind": "gravity", "acceleration": [0.3, -1.0]}],
+        cuts=[line((-0.1, 0.42), (0.6, 0.57))],
+        supports=[held("y < 1e-9", [0.0, 0.0])],
+        loads=[weight(0.3, -1.0)],
     )
 
 
 def unusual() -> list[Scene]:
     """Return valid scenes that a solver may not be able to do."""
-    held: dict[str, Any] = {"supports": [{"where": "boundary", "displacement": [0.0, 0.0]}]}
-    loads = [{"kind": "gravity", "acceleration": [0.3, -1.0]}]
     arc = {"kind": "arc", "centre": [0.5, 0.5], "radius": 0.21, "start": 10.0, "sweep": 200.0}
-    inner = {"kind": "polyline", "points": [[0.23, 0.31], [0.68, 0.57]]}
-    kinked = {"kind": "polyline", "points": [[0.23, 0.31], [0.51, 0.33], [0.68, 0.77]]}
+    inner = line((0.23, 0.31), (0.68, 0.57))
     crossing = [
-        {"kind": "polyline", "name": "one", "points": [[0.13, 0.31], [0.88, 0.77]]},
-        {"kind": "polyline", "name": "two", "points": [[0.13, 0.72], [0.88, 0.24]]},
-    ]
-    dynamic = {"kind": "dynamic", "duration": 0.01, "time_step": 0.005}
-    through_nodes = {"kind": "polyline", "points": [[-0.1, 0.5], [0.6, 0.5]]}
-    space = {**held["supports"][0], "displacement": [0.0, 0.0, 0.0]}
+        line((0.13, 0.31), (0.88, 0.77), name="one"), line((0.13, 0.72), (0.88, 0.24), name="two"),
+    ]  # fmt: skip
     cases: dict[str, dict[str, Any]] = {
-        "dynamics": {"analysis": dynamic, "cuts": [inner]},
+        "dynamics": {
+            "analysis": {"kind": "dynamic", "duration": 0.01, "time_step": 0.005}, "cuts": [inner],
+        },
         "finite-rotations": {"analysis": {"kinematics": "corotational"}, "cuts": [inner]},
         "inner-cut": {"cuts": [inner]},
-        "kinked-cut": {"cuts": [kinked]},
+        "kinked-cut": {"cuts": [line((0.23, 0.31), (0.51, 0.33), (0.68, 0.77))]},
         "arc": {"cuts": [arc]},
         "crossing-cuts": {"cuts": crossing},
-        "cut-along-mesh-lines": {"cuts": [through_nodes]},
+        "cut-along-mesh-lines": {"cuts": [line((-0.1, 0.5), (0.6, 0.5))]},
         "polygon": {
             "geometry": {"kind": "polygon", "corners": [[0.0, 0.0], [1.0, 0.0], [0.4, 0.9]]},
             "mesh": {"pattern": "unstructured", "sizes": [0.2]},
-            "cuts": [{"kind": "polyline", "points": [[0.3, 0.2], [0.6, 0.3]]}],
+            "cuts": [line((0.3, 0.2), (0.6, 0.3))],
         },
         "space": {
             **in_space([_TILTED_PLANE]),
-            "supports": [space],
-            "loads": [{"kind": "gravity", "acceleration": [0.0, 0.3, -1.0]}],
+            "supports": [held("boundary", [0.0, 0.0, 0.0])],
+            "loads": [weight(0.0, 0.3, -1.0)],
         },
-    }
+    }  # fmt: skip
     if find_spec("gmsh") is None:  # a mesh generator that is not there is no fault of a solver
         del cases["polygon"]
-    return [unit_scene(name, **{**held, "loads": loads, **parts}) for name, parts in cases.items()]
+    usual = {"supports": [held("boundary", [0.0, 0.0])], "loads": [weight(0.3, -1.0)]}
+    return [unit_scene(name, **{**usual, **parts}) for name, parts in cases.items()]

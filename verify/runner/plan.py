@@ -13,7 +13,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import duration_text
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.cost import LevelCost, case_cost, coarser_reference, finer_costs
-from verify.runner.directory import Job, RunDirectory, stored_record
+from verify.runner.directory import Job, RunDirectory, load_record, stored_record
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.loading import Loaded
 from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
@@ -204,9 +204,13 @@ def plan_case(
         folder = directory.case_folder(scene.name)
         plan.models, plan.other_scenes = model_jobs(scene, folder)
     others = [job for job in plan.jobs if job.solver != REFERENCE]
-    needed = plan.refused or plan.imported or REFERENCE in _named(scene, options)
-    if others and not needed:
+    answered = any(load_record(one).status is Status.SOLVED for one in plan.imported)
+    if plan.refused or answered or REFERENCE in _named(scene, options):
+        return plan
+    if others:
         plan.held = [*(job for job in plan.jobs if job.solver == REFERENCE), *plan.models]
+    elif plan.imported:  # a program that does not take the case
+        plan.jobs, plan.models, plan.other_scenes, plan.awaited = [], [], {}, {}
     return plan
 
 
