@@ -15,6 +15,7 @@ from verify.baseline.record import (
     metric_of,
     physics_of,
     quantities_of,
+    solve_at,
     speed_of,
 )
 from verify.provenance import KERNEL, WIDTHS, changes_of
@@ -111,12 +112,9 @@ _MANY = 100.0  # of its value: beyond, a share says less than the change
 def changes_between(result: CaseResult, key: str, old: int, new: int) -> str:
     """Say what changed in the meaning of ``solver/level/metric`` of a case, or nothing."""
     place, _, metric = key.rpartition("/")
-    return "; ".join(
-        f"since revision {change.revision} {change.why}"
-        for solve in result.solves
-        if f"{solve.solver}/{solve.level}" == place
-        for change in changes_of(metric, result.scene, solve, old, new)
-    )
+    solve = solve_at(result, place)
+    changes = changes_of(metric, result.scene, solve, old, new) if solve else ()
+    return "; ".join(f"since revision {one.revision} {one.why}" for one in changes)
 
 
 def own_row(case: str, key: str, quantity: Quantity, metric: Metric) -> Row:
@@ -143,12 +141,9 @@ def independent_row(case: str, key: str, known: Independent, metric: Metric) -> 
     width = known.uncertainty if known.value else metric.uncertainty
     allowed = known.tolerance * (abs(known.value) or 1.0)
     text = f"off by {off:.3g} ± {width:.1g}, allowed {allowed:.3g}; {known.source}"
+    verdict = Verdict.FAIL if off - width > allowed else Verdict.UNDECIDED
     if off + width <= allowed:
         verdict, text = Verdict.PASS, ""
-    elif off - width > allowed:
-        verdict = Verdict.FAIL
-    else:
-        verdict = Verdict.UNDECIDED
     return Row(case, key, "independent", verdict, metric.value, known.value, text)
 
 
@@ -170,7 +165,7 @@ def _reference_rows(case: str, key: str, known: Independent, metric: Metric) -> 
 
 
 def _speed_row(case: str, key: str, stored: Speed, result: CaseResult, cpu: str) -> Row:
-    solve = next((s for s in finest(result) if f"{s.solver}/{s.level}" == key), None)
+    solve = solve_at(result, key)
     if solve is None:
         return Row(case, key, "speed", Verdict.ERROR, None, stored.ratio, "was not run")
     now = speed_of(solve)
@@ -274,11 +269,9 @@ def _checks(result: CaseResult | None) -> dict[str, VerdictRecord]:
 def _change(
     case: str, check: str, old: VerdictRecord | None, new: VerdictRecord | None
 ) -> VerdictChange:
-    if old is None or new is None:
-        direction = "new" if old is None else "gone"
-    else:
-        worse = worst([old.verdict, new.verdict]) is new.verdict
-        direction = "worse" if worse else "better"
+    direction = "new" if old is None else "gone"
+    if old is not None and new is not None:
+        direction = "worse" if worst([old.verdict, new.verdict]) is new.verdict else "better"
     return VerdictChange(
         case=case,
         check=check,

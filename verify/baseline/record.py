@@ -132,20 +132,23 @@ def finest(result: CaseResult) -> list[SolveRecord]:
     return list(finest_of(result.solves).values())
 
 
+def solve_at(result: CaseResult, place: str) -> SolveRecord | None:
+    """Find the solve ``solver/level`` in a result."""
+    return next((s for s in result.solves if f"{s.solver}/{s.level}" == place), None)
+
+
 def metric_of(result: CaseResult, name: str) -> tuple[Metric | None, str]:
     """Find ``solver/level/metric`` in a result, or say why it is not there."""
     place, _, metric_name = name.rpartition("/")
-    solver, _, level = place.rpartition("/")
-    for solve in result.solves:
-        if (solve.solver, str(solve.level)) == (solver, level):
-            metric = solve.metric(metric_name)
-            if metric is not None and isfinite(metric.value):
-                return metric, ""
-            if metric is not None:
-                return None, "it is not finite"
-            why = solve.reason or solve.notes.get(metric_name, "it was not measured")
-            return None, f"{solve.status}: {why}" if solve.status is not Status.SOLVED else why
-    return None, f"'{solver}' level {level} was not run"
+    solve = solve_at(result, place)
+    if solve is None:
+        solver, _, level = place.rpartition("/")
+        return None, f"'{solver}' level {level} was not run"
+    metric = solve.metric(metric_name)
+    if metric is not None:
+        return (metric, "") if isfinite(metric.value) else (None, "it is not finite")
+    why = solve.reason or solve.notes.get(metric_name, "it was not measured")
+    return None, f"{solve.status}: {why}" if solve.status is not Status.SOLVED else why
 
 
 def quantities_of(result: CaseResult, origin: dict[str, Any]) -> dict[str, Quantity]:

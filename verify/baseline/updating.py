@@ -18,6 +18,7 @@ from verify.baseline.record import (
     metric_of,
     physics_of,
     quantities_of,
+    solve_at,
     speed_entry,
     speed_of,
 )
@@ -137,7 +138,7 @@ def _speed_move(
     case: str, key: str, entry: Speed, result: CaseResult, run: FinishedRun, cpu: str
 ) -> tuple[Speed, Move]:
     name = f"{key}/{SPEED}"
-    solve = next((s for s in finest(result) if f"{s.solver}/{s.level}" == key), None)
+    solve = solve_at(result, key)
     if solve is None:
         return entry, Move(case, name, entry.ratio, None, "refused", "was not run")
     now = speed_of(solve)
