@@ -120,7 +120,10 @@ def solve(case):
     """Refuse what the model does not hold; solve the rest."""
     if case.content["analysis"]["kinematics"] != "linear":
         text = "finite rotation: Kratos' total Lagrangian elements have the law of St. Venant and"
-        raise RefusedError(f"{text} Kirchhoff or a neo-Hookean one, not that of the corotation")
+        raise RefusedError(
+            f"{text} Kirchhoff, not that of the corotation; a neo-Hookean one with ln J is in its "
+            "ConstitutiveLawsApplication, which is not installed with it"
+        )
     KM.ParallelUtilities.SetNumThreads(1)
     KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
     said = {"version": KM.KratosGlobals.Kernel.Version(), "scheme": "newmark", "mass": "consistent"}

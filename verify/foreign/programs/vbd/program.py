@@ -29,11 +29,14 @@ class Body:
         turned = np.linalg.det(edges) < 0.0
         cells[turned] = cells[turned][:, [0, 1, 3, 2]]
         volume = np.abs(np.linalg.det(edges)) / 6.0
-        share = np.repeat(volume * case.constant("density") / 4.0, 4)
+        density = case.constant("density")
+        if np.isnan(density).any():
+            raise RefusedError("no density: it comes to rest by steps in time")
+        share = np.repeat(volume * density / 4.0, 4)
         self.mass = np.bincount(cells.ravel(), share, minlength=len(stage.points))
         law = case.constant("lame"), case.constant("shear")
         self.solid = ImplicitEuler(stage.points, cells, *law, self.mass, self.held)
-        wave = np.sqrt((case.constant("density") / law[1]).max())
+        wave = np.sqrt((density / law[1]).max())
         self.through = np.ptp(stage.points, axis=0).max() * wave  # s
         if case.parameters["step"] == "descent":
             self.build(cells, *law)
