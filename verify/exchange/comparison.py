@@ -15,15 +15,12 @@ from verify.exchange.export import Answers
 from verify.files import read_json
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases
-from verify.runner.checking import check_scene
 from verify.runner.directory import (
     Job,
     RunDirectory,
-    claimed,
     emptied,
     solution_files,
     store_record,
-    write_run,
 )
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.scene import Scene
@@ -74,18 +71,15 @@ def compare_answers(
     if not _NAME.fullmatch(name) or name in solver_names():
         own = ", ".join(solver_names())
         raise InputError(f"'{name}' cannot name a program; expected a word other than {own}")
-    for scene in scenes:
-        check_scene(scene)
     names = tuple(dict.fromkeys([*_imported_before(out), name]))
     judged = _judged_scenes(scenes, judged_as, names)
     options = replace(options, parameters={}, imported=names)
-    cases = [scene.name for scene in scenes]
-    identity = {"cases": cases, "options_of_result": options.of_result()}
-    with claimed(out, identity) as directory:
-        write_run(directory, {**identity, "command": command, "options": options.record()})
+
+    def put(directory: RunDirectory) -> None:
         for scene in scenes:
             _store(scene, answers[scene.name], name, directory)
-    return run_cases(judged, out, options, progress, command).results
+
+    return run_cases(judged, out, options, progress, command, before=put).results
 
 
 def _imported_before(out: Path) -> list[str]:

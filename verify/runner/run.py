@@ -7,7 +7,7 @@ its case lists as a known finding does not count.
 """
 
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,7 +20,7 @@ from verify.processes import start_server
 from verify.provenance import provenance
 from verify.result import COMPARISON_FAILED, CaseResult, Status, Verdict
 from verify.runner.checking import check_scene
-from verify.runner.directory import claimed, folder_name, write_run
+from verify.runner.directory import RunDirectory, claimed, folder_name, write_run
 from verify.runner.engines import ClusterEngine
 from verify.runner.fingerprint import code_of_solver
 from verify.runner.loading import load_solvers
@@ -87,6 +87,7 @@ def run_cases(
     progress: Progress,
     command: str = "",
     drawings: Path | None = None,
+    before: Callable[[RunDirectory], None] | None = None,
 ) -> RunSummary:
     """Solve, compare and judge `scenes` into the directory `out`; resume a run that is there.
 
@@ -102,6 +103,8 @@ def run_cases(
         The command line, for the record.
     drawings : Path, optional
         Folder into which each case is drawn for the report as soon as it is judged.
+    before : callable, optional
+        Puts answers of ``options.imported`` into the run directory.
 
     Raises
     ------
@@ -156,6 +159,8 @@ def run_cases(
                 "provenance": origin,
             }
             write_run(directory, record)
+            if before is not None:
+                before(directory)
             plans = [plan_case(scene, options, loaded, directory, bundle) for scene in scenes]
             work = Work(plans, directory, options, origin, progress, bundle, cluster, drawings)
             results = work.until_done(stop.check)
