@@ -17,6 +17,7 @@ FROZEN = {
     "1.0": {
         "c1_slit": "1903205a6b76ff93",
         "c2_meeting": "e2604ce04e9e6c07",
+        "c4_disc": "63e0260eaa1aaa5c",
         "c8_slivers[epsilon=0.5]": "b73941cf325b8e1d",
         "c8_slivers[epsilon=0]": "8985e2890fd6aba2",
         "c8_slivers_space[epsilon=0.5]": "736287b738c0aab9",
