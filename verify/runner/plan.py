@@ -20,7 +20,7 @@ from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
 from verify.runner.selection import Options
 from verify.scene import Scene
 from verify.scene.strict import nearest
-from verify.solvers.interface import parameters_of
+from verify.solvers.interface import is_installed, parameters_of
 
 _FEWEST = 3  # levels from which a reference has an error bar
 
@@ -136,7 +136,8 @@ def _named(scene: Scene, options: Options) -> list[str]:
     """Names of the solvers that the command line or else the checks ask for."""
     compared = [check.compared for check in scene.acceptance if check.compared]
     if options.imported:
-        beside = dict.fromkeys([*options.solvers, *compared])
+        installed = [name for name in compared if is_installed(name)]
+        beside = dict.fromkeys([*options.solvers, *installed])
         return [name for name in beside if name not in options.imported]
     checks = [check.solver for check in scene.acceptance if check.solver is not None]
     return list(dict.fromkeys(options.solvers or ("xfem", "conforming", *checks, *compared)))

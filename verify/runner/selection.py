@@ -188,7 +188,7 @@ class Options:
         Whether the references that judge are solved with the rest; without them only `solvers` run.
     imported : tuple of str
         Programs whose answers lie in the run directory: they are compared with the solves. Then
-        only `solvers` run, those that checks compare with, and the reference.
+        only `solvers` run, those that checks compare with if they are installed, and the reference.
     """
 
     solvers: tuple[str, ...] = ()

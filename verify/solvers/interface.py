@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from inspect import Parameter, signature
 from math import isfinite
 from pathlib import Path
@@ -39,6 +40,7 @@ _METHODS = (
     "virtual_node", "virtual_node_arbitrary", "uncut",
 )  # fmt: skip
 _BUILT_IN |= dict.fromkeys(_METHODS, "verify.solvers.methods_adapter:MethodSolver")
+_WITHOUT = {"conforming": "dolfinx", "reference": "dolfinx"}  # what they do not load without
 _GROUP = "verify.solvers"
 # programs of others, a folder each, of the class named here, which is told the name
 _PROGRAMS = Path(__file__).resolve().parents[1] / "foreign" / "programs"
@@ -129,6 +131,13 @@ def checked_levels(answer: Any) -> int:
 def is_built_in(name: str) -> bool:
     """Whether the solver called `name`, with parameters or without, comes with the project."""
     return solver_in(name) in _BUILT_IN
+
+
+def is_installed(name: str) -> bool:
+    """Whether what a solver of the project needs is there; of another solver nothing is known."""
+    solver = solver_in(name)
+    needed = _WITHOUT.get(solver, "numba" if solver in _BUILT_IN else "sys")
+    return find_spec(needed) is not None
 
 
 def module_of(name: str) -> str | None:
