@@ -25,7 +25,7 @@ from verify.solution import ContactPressure, Solution
 
 Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]  # at points (n, d) and a time, Pa
-_PRESSED = 1e-3  # of the largest pressure: faces are together where it is more
+_PRESSED = 1e-3  # of the mean pressure (the largest may be at a tip): where more, faces touch
 _AROUND = 2.0  # elements over which the oscillation is told from the error
 _MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
 
@@ -149,14 +149,16 @@ def _errors(
 
 def _resultants(pressure: Array, weights: Array) -> tuple[float, float]:
     """Length or area of the faces that are together, and the force between them."""
-    pressed = pressure > _PRESSED * pressure.max(initial=0.0)
-    return float(weights[pressed].sum()), float(weights @ pressure)
+    return float(weights[_pressed(pressure, weights)].sum()), float(weights @ pressure)
+
+
+def _pressed(pressure: Array, weights: Array) -> NDArray[np.bool_]:
+    return np.asarray(pressure > _PRESSED * (weights @ pressure) / weights.sum())
 
 
 def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
     """Largest displacement along each other of faces that are together, m."""
-    pressure = contact.pressure[-1]
-    points = contact.points[pressure > _PRESSED * pressure.max()]
+    points = contact.points[_pressed(contact.pressure[-1], contact.weights)]
     if not len(points):
         return 0.0
     nearest = cKDTree(rule.points).query(points)[1]
