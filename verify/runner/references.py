@@ -35,6 +35,9 @@ from pathlib import Path
 from time import time
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from verify.errors import InputError
 from verify.files import asked_place, parse_json, read_json, whole_file, write_json, write_whole
 from verify.printable import one_line, shown, words_of
@@ -49,12 +52,14 @@ from verify.runner.fingerprint import (
     physics_digest,
 )
 from verify.scene import Scene
+from verify.solution import read_solution, write_solution
 
 REFERENCE = "reference"
 BESIDE = "references"  # folder beside a case in which its own bundle lies
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"
 _HOUR = 3600.0
+_BITS = 27  # eight digits: what is random below them takes half of the room
 BUNDLE_SCHEMA = 2
 _CONTENTS = "bundle.json"
 _PACKED = ".tar.xz"
@@ -317,28 +322,42 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
         whole_file(path) as partial,
         zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
     ):
-        contents = {
-            "schema": BUNDLE_SCHEMA,
-            "entries": [entry.as_json() for entry in entries],
-        }
+        packed = [_packed(entry, cache.root / entry.key) for entry in entries]
+        contents = {"schema": BUNDLE_SCHEMA, "entries": [entry.as_json() for entry, _ in packed]}
         text = json.dumps(contents, indent=1, sort_keys=True)
         archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
-        for entry in entries:
-            packed = _packed(cache.root / entry.key, sorted(entry.files))
-            archive.writestr(_member(entry.key + _PACKED), packed, zipfile.ZIP_STORED)
-    return entries
+        for entry, data in packed:
+            archive.writestr(_member(entry.key + _PACKED), data, zipfile.ZIP_STORED)
+    return [entry for entry, _ in packed]
 
 
-def _packed(folder: Path, names: Sequence[str]) -> bytes:
-    """Files of a folder in one compressed archive: the same files give the same bytes."""
-    packed = io.BytesIO()
-    with tarfile.open(fileobj=packed, mode="w:xz") as archive:
-        for name in names:
-            data = (folder / name).read_bytes()
-            member = tarfile.TarInfo(name)
+def _packed(entry: Entry, folder: Path) -> tuple[Entry, bytes]:
+    """Files of an entry in one compressed archive, fields rounded; the same give the same bytes."""
+    solution, packed, digests = read_solution(folder / "solution"), io.BytesIO(), {}
+    fields = {
+        name: _rounded(values)
+        for name in ("displacement", "velocity", "acceleration")
+        if (values := getattr(solution, name)) is not None
+    }
+    with (
+        tempfile.TemporaryDirectory() as place,
+        tarfile.open(fileobj=packed, mode="w:xz") as archive,
+    ):
+        write_solution(replace(solution, **fields), Path(place) / "solution")
+        for file in sorted(Path(place).iterdir()):
+            data = file.read_bytes()
+            member = tarfile.TarInfo(file.name)
             member.size = len(data)
             archive.addfile(member, io.BytesIO(data))
-    return packed.getvalue()
+            digests[file.name] = bytes_digest(data)
+    return replace(entry, files=digests), packed.getvalue()
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round to 2^-`_BITS` of the largest of each time: far below what a reference knows."""
+    largest = np.abs(values).max(axis=(1, 2), keepdims=True)
+    unit = np.exp2(np.floor(np.log2(np.where(largest > 0.0, largest, 1.0))) - _BITS)
+    return np.asarray(np.round(values / unit) * unit)
 
 
 def _unpacked(packed: bytes) -> dict[str, bytes]:
