@@ -23,6 +23,12 @@ FROZEN = {
         "c8_slivers_space[epsilon=0.5]": "736287b738c0aab9",
         "c8_slivers_space[epsilon=0]": "899393247c611cf6",
         "c8_slivers_corner[epsilon=0.5]": "593505e9cef76b71",
+        "c3_strip": "0a9165b4bd97d77c",
+        "c5_blade_01": "8a602cdc74439e84",
+        "c5_blade_03": "51dbf38021b944ef",
+        "c5_blade_06": "244f66bbe562bd65",
+        "c6_block": "6899b0a0b7412f12",
+        "c7_spinning": "423b45aad475cfd9",
     },
 }
 

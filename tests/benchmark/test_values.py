@@ -92,7 +92,7 @@ def test_the_second_route_gives_what_is_stated(scene):
 
 @pytest.mark.heavy
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("scene", ["c1_slit", "c2_meeting", "c4_disc"])
+@pytest.mark.parametrize("scene", ["c1_slit", "c2_meeting", "c3_strip", "c4_disc"])
 def test_solvers_are_off_by_what_the_page_says(scene, tmp_path):
     """Two digits of the errors in L2 and in the energy norm, level by level."""
     command = ["verify", "run", f"benchmark/{scene}", "--repetitions", "1", "--no-conform"]
