@@ -146,7 +146,9 @@ def _conforms(solution: Any, scene: Any, level: int) -> bool:
     corners = solution.cut_facets.reshape(-1, scene.dimension)
     if not len(corners) or solution.unknowns != solution.points.size:
         return False
-    counts = None if scene.geometry.kind == "file" else grid_of(scene, level)[0]
+    if scene.geometry.kind == "file" or level >= scene.mesh.count:  # a reference goes on
+        return True
+    counts = grid_of(scene, level)[0]
     if counts is None:
         return True
     lower, upper = np.asarray(scene.geometry.lower), np.asarray(scene.geometry.upper)
