@@ -203,6 +203,20 @@ def test_a_foreign_code_solves_as_the_conforming_solver_says(name, case):
     )
 
 
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", [installed("kratos")])
+@pytest.mark.parametrize("case", ["neo_hookean_halves", "neo_stretched_halves"])
+def test_total_lagrangian_elements_of_kratos_are_those_of_the_conforming_solver(name, case):
+    scene = load_scene(f"rotation/{case}")
+    logarithmic = scene.material.model_copy(update={"model": "neo_hookean"})
+    scene = scene.model_copy(update={"material": logarithmic})
+    found = find_solver(name).solve(scene, 0, repetitions=1)
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1)
+    rows = same_nodes(found, expected)
+    off = np.abs(found.displacement - expected.displacement[:, rows])
+    assert off.max() < 1e-11 * np.abs(expected.displacement).max()
+
+
 @pytest.mark.parametrize("name", [
     "stretched_halves", "torn_block", "turned_apart", "freed_half",
 ])  # fmt: skip

@@ -1,9 +1,13 @@
-"""Kratos Multiphysics: small displacements on the conforming mesh, Newmark's method in time.
+"""Kratos Multiphysics on the conforming mesh: small displacements, Newmark's method in time.
 
 python kratos.py FOLDER LEVEL
+
+At rest also its total Lagrangian elements of neo-Hookean material, whose stress is that of
+``model = "neo_hookean"``: S = λ ln J C⁻¹ + μ (I − C⁻¹). Newton's method in load steps.
 """
 
 import KratosMultiphysics as KM  # noqa: N817
+import KratosMultiphysics.ConstitutiveLawsApplication as CLA  # noqa: N817
 import KratosMultiphysics.LinearSolversApplication as LSA  # noqa: N817
 import KratosMultiphysics.StructuralMechanicsApplication as SMA  # noqa: N817
 import numpy as np
@@ -15,6 +19,8 @@ LAWS = {
     "stress": SMA.LinearElasticPlaneStress2DLaw,
     None: SMA.LinearElastic3DLaw,
 }
+NEO_HOOKEAN = {"strain": CLA.HyperElasticPlaneStrain2DLaw, None: CLA.HyperElastic3DLaw}
+LOAD_STEPS, TOLERANCE = 20, 1e-10
 FIELDS = (KM.DISPLACEMENT, KM.VELOCITY, KM.ACCELERATION)
 OTHERS = (KM.REACTION, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD)
 AXES = "XYZ"
@@ -25,6 +31,7 @@ class Body:
 
     def __init__(self, case, stage):
         self.held, self.d, self.time = stage.held, case.dimension, 0.0
+        self.turns = case.content["analysis"]["kinematics"] != "linear"
         self.model, self.strategies, self.begun = KM.Model(), {}, None
         self.part = self.model.CreateModelPart("body", 2)
         self.part.ProcessInfo[KM.DOMAIN_SIZE] = self.d
@@ -37,7 +44,8 @@ class Body:
             self.properties(number, material, case.content["analysis"]["damping"])
             for number, material in enumerate(materials)
         ]
-        element = f"SmallDisplacementElement{self.d}D{self.d + 1}N"
+        name = "TotalLagrangianElement" if self.turns else "SmallDisplacementElement"
+        element = f"{name}{self.d}D{self.d + 1}N"
         for i, (cell, number) in enumerate(
             zip((stage.cells + 1).tolist(), case.material, strict=True), 1
         ):
@@ -55,7 +63,7 @@ class Body:
         found = self.part.CreateNewProperties(number)
         found[KM.YOUNG_MODULUS], found[KM.POISSON_RATIO] = material["young"], material["poisson"]
         found[KM.DENSITY], found[KM.THICKNESS] = material["density"] or 0.0, 1.0
-        found[KM.CONSTITUTIVE_LAW] = LAWS[material["plane"]]()
+        found[KM.CONSTITUTIVE_LAW] = (NEO_HOOKEAN if self.turns else LAWS)[material["plane"]]()
         found[SMA.RAYLEIGH_ALPHA], found[SMA.RAYLEIGH_BETA] = damping
         return found
 
@@ -77,9 +85,15 @@ class Body:
         """Return the strategy of a key, which solves once."""
         if key not in self.strategies:
             builder = KM.ResidualBasedBlockBuilderAndSolver(LSA.SparseLUSolver())
-            found = KM.ResidualBasedLinearStrategy(
-                self.part, scheme, builder, False, False, False, False
-            )  # nothing computed beside, one pattern, the mesh stays
+            if self.turns:
+                small = KM.DisplacementCriteria(TOLERANCE, 1e-14)
+                found = KM.ResidualBasedNewtonRaphsonStrategy(
+                    self.part, scheme, small, builder, 40, False, False, True
+                )  # no reactions, one pattern, the mesh moves
+            else:
+                found = KM.ResidualBasedLinearStrategy(
+                    self.part, scheme, builder, False, False, False, False
+                )  # nothing computed beside, one pattern, the mesh stays
             found.SetEchoLevel(0)
             found.Check()
             self.strategies[key] = found
@@ -87,10 +101,22 @@ class Body:
 
     def equilibrium(self, values, force):
         """Displacement at rest under forces and values of what is held."""
-        self.put(KM.DISPLACEMENT, values)
-        self.put(SMA.POINT_LOAD, force)
-        self.strategy("static", KM.ResidualBasedIncrementalUpdateStaticScheme()).Solve()
-        return self.get(KM.DISPLACEMENT)
+        count, u = LOAD_STEPS if self.turns else 1, np.zeros_like(values)
+        for n in range(1, count + 1):
+            self.put(KM.DISPLACEMENT, np.where(self.held, n / count * values, u))
+            self.put(SMA.POINT_LOAD, n / count * force)
+            strategy = self.strategy("static", KM.ResidualBasedIncrementalUpdateStaticScheme())
+            if self.turns:
+                KM.VariableUtils().UpdateCurrentPosition(self.part.Nodes, KM.DISPLACEMENT)
+            strategy.Initialize()
+            strategy.InitializeSolutionStep()
+            strategy.Predict()
+            solved = strategy.SolveSolutionStep()
+            strategy.FinalizeSolutionStep()
+            if self.turns and not solved:
+                raise RuntimeError(f"load step {n} of {count} does not converge")
+            u = self.get(KM.DISPLACEMENT)
+        return u
 
     def begin(self, u, v, force, dt):
         """Take the acceleration of a very short step that ends at u: it balances the forces."""
@@ -119,11 +145,14 @@ class Body:
 def solve(case):
     """Refuse what the model does not hold; solve the rest."""
     if case.content["analysis"]["kinematics"] != "linear":
-        text = "finite rotation: Kratos' total Lagrangian elements have the law of St. Venant and"
-        raise RefusedError(
-            f"{text} Kirchhoff, not that of the corotation; a neo-Hookean one with ln J is in its "
-            "ConstitutiveLawsApplication, which is not installed with it"
-        )
+        material = case.content["material"]
+        if material.get("each", [material])[0]["model"] != "neo_hookean":
+            raise RefusedError(
+                "Hooke's law at finite rotation: Kratos' total Lagrangian elements have that of "
+                "St. Venant and Kirchhoff or a neo-Hookean one, not that of the corotation"
+            )
+        if case.content["analysis"]["kind"] == "dynamic":
+            raise RefusedError("motion at finite rotation")
     KM.ParallelUtilities.SetNumThreads(1)
     KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
     said = {"version": KM.KratosGlobals.Kernel.Version(), "scheme": "newmark", "mass": "consistent"}
