@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from verify.cli.signatures import Arg, Cases, Jobs, Out, Strict, Timeout, count, positive
+from verify.cli.signatures import Arg, Cases, Jobs, Out, Repetitions, Strict, Timeout
 from verify.cli.streams import command_line, print_json
 
 if TYPE_CHECKING:
@@ -72,41 +72,39 @@ def export(
     return 0
 
 
+AnswersDir = Annotated[
+    Path, Arg("directory with level-<k>/solution.json; of several cases in <case>/", "DIR")
+]
+ImportRun = Annotated[
+    Path,
+    Arg(
+        "run directory; one of an earlier import of the same cases keeps the other programs", "RUN"
+    ),
+]
+Beside = Annotated[
+    Sequence[str],
+    Arg(
+        "solver to run beside it; repeat for several (default: those that checks compare with, "
+        "where they are installed, and the reference)",
+        "NAME",
+    ),
+]
+JudgedAs = Annotated[
+    str | None,
+    Arg("checks that a case makes of this solver by its name are made of the program too", "NAME"),
+]
+
+
 def import_(
     case: Cases,
-    answers: Annotated[
-        Path, Arg("directory with level-<k>/solution.json; of several cases in <case>/", "DIR")
-    ],
+    answers: AnswersDir,
     *,
     solver: Annotated[str, Arg("what the program is called in the report", "NAME")],
-    out: Annotated[
-        Path,
-        Arg(
-            "run directory; one of an earlier import of the same case keeps the other programs",
-            "RUN",
-        ),
-    ],
-    beside: Annotated[
-        Sequence[str],
-        Arg(
-            "solver to run beside it; repeat for several (default: those that checks compare "
-            "with, and the reference)",
-            "NAME",
-        ),
-    ] = (),
-    judged_as: Annotated[
-        str | None,
-        Arg(
-            "checks that the case makes of this solver by its name are made of the program too",
-            "NAME",
-        ),
-    ] = None,
-    timeout: Annotated[
-        float, Arg("wall seconds after which a solve beside it is killed", "S", read=positive)
-    ] = 600.0,
-    repetitions: Annotated[
-        int, Arg("timed repetitions of the solves beside it", "N", read=count)
-    ] = 1,
+    out: ImportRun,
+    beside: Beside = (),
+    judged_as: JudgedAs = None,
+    timeout: Timeout = 600.0,
+    repetitions: Repetitions = 1,
     jobs: Jobs = 1,
     strict: Strict = False,
     as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False,
@@ -117,6 +115,7 @@ def import_(
     --------
       verify import statics/f3_inclined f3 --solver freefem --out run
       verify import statics/f3_inclined f3 --solver freefem --beside xfem --out run
+      verify import benchmark answers --solver mine --out run -j 2
 
     Exit codes as of `verify run`.
     """
