@@ -31,9 +31,9 @@ def moved(mesh, size=0.2, seed=1):
     return xfem.SimplexMesh(points, mesh.cells)
 
 
-def grid(dim, n):
+def grid(dim, n, seed=1):
     mesh = xfem.rectangle_mesh((n, n)) if dim == 2 else xfem.box_mesh((n, n, n))
-    return moved(mesh)
+    return moved(mesh, seed=seed)
 
 
 def material(dim):
@@ -321,6 +321,30 @@ def test_a_wedge_that_only_faces_hold_is_in_balance_and_at_the_least_energy():
     random = np.random.default_rng(0).normal(size=start.shape) * np.abs(start).mean()
     other = minimize(energy, start + random, jac=True, method="L-BFGS-B", options={"maxiter": 500})
     assert other.fun > least - 1e-12 * abs(least)
+
+
+@pytest.mark.parametrize("seed", [28, 122, *range(12)])
+def test_any_cuts_and_any_movement_of_the_boundary_find_a_balance(seed):
+    # of the first two a piece between the cuts is loose until faces hold it
+    random, dim = np.random.default_rng(seed), 2 + seed % 2
+    mesh = grid(dim, int(random.integers(6, 14) if dim == 2 else random.integers(3, 5)), seed)
+    cuts = []
+    for _ in range(random.integers(1, 4)):
+        node, normal = random.integers(len(mesh.points)), random.normal(size=dim)
+        cuts.append(xfem.Plane(mesh.points[node] + 10.0 ** -random.uniform(1, 13), normal))
+    linear, square = (0.05 * random.normal(size=(dim,) * order) for order in (2, 3))
+
+    def field(x, _):
+        return x @ linear.T + np.einsum("ijk,nj,nk->ni", square, x, x)
+
+    _, faces, found, _ = closed(mesh, cuts, field)
+    assert found.residual < 1e-10
+    assert found.iterations <= 30
+    # where faces press, γ times the overlap is what the pressure is beyond the mean stress
+    stress = np.einsum("fid,fid->f", faces.stress, found.displacement[faces.nodes])
+    gap = np.einsum("fqid,fid->fq", faces.gap, found.displacement[faces.nodes])
+    trial = stress[:, None] + faces.stiffness[:, None] * gap
+    assert np.abs(found.pressure - np.maximum(0.0, -trial)).max() < 1e-12
 
 
 def test_a_body_without_faces_is_solved_as_ever():

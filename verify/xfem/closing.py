@@ -194,7 +194,9 @@ class ClosingFaces:
         """Whether faces press on each other, (f, q)."""
         return self.trial_stress(displacement) < 0.0
 
-    def add_stiffness(self, pattern: BlockPattern, blocks: Floats, touching: Bools | bool) -> None:
+    def add_stiffness(
+        self, pattern: BlockPattern, blocks: Floats, touching: Floats | Bools | bool
+    ) -> None:
         """Add the second derivative of the energy to the nodal blocks (B, d, d).
 
         Parameters
@@ -202,7 +204,8 @@ class ClosingFaces:
         pattern : BlockPattern
             Of the body, with the `couplings`.
         blocks : (B, d, d) float array
-        touching : (f, q) bool array or bool
+        touching : (f, q) array or bool
+            Share of the stiffness of a closed face: 1 where faces touch, 0 where they are apart.
         """
         if self._entries is None or self._entries[0] is not pattern:
             self._entries = pattern, *self._stiffness_of_points(pattern, blocks.shape[1])
@@ -242,7 +245,7 @@ def _normals(corners: Floats) -> tuple[Floats, Floats]:
     else:
         normal, share = np.cross(edges[:, 0], edges[:, 1]), 0.5
     size = np.linalg.norm(normal, axis=1)
-    return normal / size[:, None], share * size
+    return normal / np.maximum(size, np.finfo(float).tiny)[:, None], share * size
 
 
 def _faces_of_pieces(parts: Ints) -> Ints:
@@ -283,6 +286,7 @@ _TOLERANCE = 1e-12  # of the residual, over the largest force
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises (Armijo)
 _UNSEEN = 1e-13  # of the energy: a fall that round-off hides
 _HALVINGS = 6
+_WEAK = (0.0, 1e-6, 1e-3)  # of the stiffness of closed faces, of those that are apart
 
 
 class _Closing:
@@ -307,7 +311,7 @@ class _Closing:
         scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
         return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
 
-    def correction(self, residual: Floats, touching: Bools) -> Floats:
+    def correction(self, residual: Floats, touching: Floats) -> Floats:
         blocks = self.elastic.copy()
         self.faces.add_stiffness(self.pattern, blocks, touching)
         constrain(self.pattern, self.fixed, blocks)
@@ -320,25 +324,31 @@ class _Closing:
         force = self.force.evaluate(values)[0]
         force += self.faces.force(values, tied=True)
         residual = np.where(self.fixed, 0.0, self.load - force)
-        return values + self.correction(residual, np.ones(self.faces.weights.shape, dtype=bool))
+        return values + self.correction(residual, np.ones(self.faces.weights.shape))
 
     def next(self, u: Floats, residual: Floats, touching: Bools) -> tuple[Floats, bool]:
         """Lower the energy; and whether by the whole of Newton's correction."""
-        energy, size = self.energy(u), float(np.abs(residual).max())
-        try:
-            step = self.correction(residual, touching)
-            fall = float(np.vdot(residual, step))
-            for halving in range(_HALVINGS):
-                share = 0.5**halving
-                trial = u + share * step
-                seen = share * fall > _UNSEEN * abs(energy)
-                if seen and self.energy(trial) <= energy - _ENOUGH * share * fall:
-                    return trial, halving == 0
-                if not seen and np.abs(self.residual(trial)[0]).max() < size:
-                    return trial, halving == 0
-        except SingularStiffnessError:
-            pass  # what only the contact holds is apart
-        return u + self.correction(residual, np.ones_like(touching)), False
+        # a part that no face holds now needs a weak tie, or it goes anywhere
+        for tie in _WEAK:
+            try:
+                step = self.correction(residual, np.where(touching, 1.0, tie))
+            except SingularStiffnessError:
+                continue
+            if share := self.share_downhill(u, residual, step):
+                return u + share * step, share == 1.0 and tie == 0.0
+        return u + self.correction(residual, np.ones(touching.shape)), False
+
+    def share_downhill(self, u: Floats, residual: Floats, step: Floats) -> float:
+        """Share of a correction that lowers the energy as its slope says; 0 if none."""
+        energy, fall = self.energy(u), float(np.vdot(residual, step))
+        for share in 0.5 ** np.arange(_HALVINGS):
+            trial = u + share * step
+            if share * fall > _UNSEEN * abs(energy):
+                if self.energy(trial) <= energy - _ENOUGH * share * fall:
+                    return float(share)
+            elif np.abs(self.residual(trial)[0]).max() < np.abs(residual).max():
+                return float(share)
+        return 0.0
 
 
 def solve_closed(
@@ -381,6 +391,7 @@ def solve_closed(
     >>> held = xfem.Supports.none(phantom).prescribe(phantom, x == 0.0)
 
     >>> held = held.prescribe(phantom, x == 1.0, [-1e-3, 0.0])
+
     >>> force = xfem.InternalForce(phantom, material, "linear")
     >>> found = solve_closed(force, ClosingFaces(phantom, material), held)
     >>> float(found.pressure.min().round(9)), float(found.pressure.max().round(9))
