@@ -66,6 +66,11 @@ def peak_memory() -> float:
     return float("nan")
 
 
+def memory_limit(given: float | None, sharers: int = 1) -> float:
+    """Limit of memory of one of some processes, bytes; default 80 % of the machine's, shared."""
+    return given or 0.8 * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / sharers
+
+
 # what the libraries read when they are loaded
 ONE_THREAD = dict.fromkeys(
     (

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.geometry.simplices import area_inside, distance_to_triangles, ear_clipping, overlap_area
+from verify.geometry.simplices import area_inside, ear_clipping, nearest_parts, overlap_area
 from verify.scene import (
     CylinderCut,
     DiscCut,
@@ -115,7 +115,8 @@ def test_the_area_in_a_box_is_that_of_clipping():
 def test_the_distance_to_a_cut_is_that_to_its_nearest_point():
     surface = PolygonCut(**SQUARE).facets()
     for point, distance in (((0.5, 0.4, 0.9), 0.4), ((0.9, 0.5, 0.5), 0.1), ((1.1, 1.2, 0.5), 0.5)):
-        assert distance_to_triangles(np.array([point]), surface) == pytest.approx([distance])
+        away, _ = nearest_parts(np.array([point]), surface[0][surface[1]])
+        assert away == pytest.approx([distance])
 
 
 @pytest.mark.parametrize(

@@ -157,8 +157,6 @@ def main(batch_file: Path) -> None:
     """Solve the trials of a batch, in order."""
     die_with_parent()
     batch = read_json(batch_file)
-    if ":" in batch["solver"]:
-        sys.path.append(os.getcwd())
     try:
         name = solver_in(batch["solver"])
         check_parameters(name, find_solver(name), batch["parameters"])

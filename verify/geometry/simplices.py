@@ -255,11 +255,6 @@ def distance_to_polyline(points: Array, vertices: Array) -> Array:
     return nearest_parts(points, np.stack([vertices[:-1], vertices[1:]], axis=1))[0]
 
 
-def distance_to_triangles(points: Array, surface: tuple[Array, Ints]) -> Array:
-    """Distance (n,) of points (n, 3) to a triangulated surface, m."""
-    return nearest_parts(points, surface[0][surface[1]])[0]
-
-
 class HasFeet(Protocol):
     """A piece of a curve or of a surface."""
 

@@ -15,10 +15,9 @@ from typing import NamedTuple
 
 from verify.report.curves import Curve, Point, error_curves
 from verify.report.notation import ROUND_OFF, number, solver_title
-from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, finest_of
+from verify.result import CRITICAL_STEP, REFERENCE, CaseResult, SolveRecord, Status, finest_of
 
 BASELINE = "conforming"
-_REFERENCE = "reference"
 _ERROR = "displacement_l2"
 _TAKERS = ("a blade", "damping")  # sinks of energy that a case states
 _NAMED = 3  # solvers in a sentence
@@ -185,7 +184,7 @@ def _of_times(results: Sequence[CaseResult]) -> str:
 
 def compared_curves(result: CaseResult) -> list[Curve]:
     """Return the displacement error of every solver but the reference, coarse to fine."""
-    return [c for c in error_curves(result, _ERROR) if c.solver != _REFERENCE]
+    return [c for c in error_curves(result, _ERROR) if c.solver != REFERENCE]
 
 
 def moving(
@@ -198,7 +197,7 @@ def moving(
     for result in results:
         solved = (s for s in result.solves if s.status is Status.SOLVED)
         for solve in finest_of(solved).values():
-            followed = solve.solver != _REFERENCE and len(solve.account.get("total", [])) > 1
+            followed = solve.solver != REFERENCE and len(solve.account.get("total", [])) > 1
             if followed and _taker(solve) == taker:
                 yield result, solve
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from verify.errors import InputError
+from verify.geometry.simplices import mesh_edges
 from verify.read_mesh import read_with_meshio
 from verify.report.notation import RAISED, Drawing
 from verify.solution import Solution, read_solution
@@ -167,11 +168,11 @@ def _body(
 ) -> Body:
     flat, drawn = points.shape[1] == 2, _in_space(points)
     if cells.shape[1] == 3:
-        triangles, inner = cells, _all_edges(elements[:, :3])
+        triangles, inner = cells, mesh_edges(elements[:, :3])
         edges = _single(cells, _SIDES) if flat else _creases(drawn, triangles, oriented=False)
     else:
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
-        edges, inner = _creases(drawn, triangles), _all_edges(triangles)
+        edges, inner = _creases(drawn, triangles), mesh_edges(triangles)
     return Body(drawn, triangles, edges, values, inner, drawn)
 
 
@@ -192,13 +193,6 @@ def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDA
     _, first, count = np.unique(_keys(found), return_index=True, return_counts=True)
     single: NDArray[np.int64] = found[np.sort(first[count == 1])]
     return single
-
-
-def _all_edges(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    found = np.concatenate([triangles[:, list(side)] for side in _SIDES])
-    _, first = np.unique(_keys(found), return_index=True)
-    edges: NDArray[np.int64] = np.sort(found[first], axis=1)
-    return edges
 
 
 def _creases(
@@ -240,8 +234,8 @@ class View:
 
     Parameters
     ----------
-    right, up, towards : (3,) tuples of float
-        Axes of the picture; `towards` points at the viewer.
+    axes : (3, 3) array
+        Unit vectors of the picture as rows: right, up, towards the viewer.
     window : (x0, x1, y0, y1)
         Visible part, in the picture's axes, m.
     size : (width, height)
@@ -254,9 +248,7 @@ class View:
         Whether there are values above `limits`, which have the last colour.
     """
 
-    right: tuple[float, ...]
-    up: tuple[float, ...]
-    towards: tuple[float, ...]
+    axes: NDArray[np.float64]
     window: tuple[float, float, float, float]
     size: tuple[int, int]
     colours: str
@@ -265,9 +257,7 @@ class View:
 
     def projected(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (n, 3): place in the picture, and depth towards the viewer."""
-        axes = np.array([self.right, self.up, self.towards])
-        result: NDArray[np.float64] = points @ axes.T
-        return result
+        return np.asarray(points @ self.axes.T)
 
 
 def common_view(
@@ -296,9 +286,7 @@ def common_view(
     half = np.array([max(width, height * ratio), max(height, width / ratio)]) / 2
     (x0, y0), (x1, y1) = centre - half, centre + half
     return View(
-        tuple(axis[0].tolist()),
-        tuple(axis[1].tolist()),
-        tuple(axis[2].tolist()),
+        axis,
         (float(x0), float(x1), float(y0), float(y1)),
         size,
         colours,
@@ -464,14 +452,13 @@ def packed(body: Body, view: View) -> dict[str, str]:
     value = np.clip((body.values[used] - bottom) / ((top - bottom) or 1.0), 0, 1)
     vertices = np.column_stack([(points - low) / span, value]) * _STEPS
     x0, x1, y0, y1 = view.window
-    axes = np.array([view.right, view.up, view.towards])
     depth = view.projected(points)[:, 2]
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2, (depth.min() + depth.max()) / 2])
-    middle = centre @ axes
+    middle = centre @ view.axes
     head: dict[str, Any] = {
         "low": low.tolist(),
         "span": span.tolist(),
-        "axes": axes.ravel().tolist(),
+        "axes": view.axes.ravel().tolist(),
         "middle": middle.tolist(),
         "half": [(x1 - x0) / 2, (y1 - y0) / 2],
         "depth": float(np.linalg.norm(points - middle, axis=1).max()) * 1.05,

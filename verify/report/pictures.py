@@ -42,7 +42,6 @@ _CLIP = 2.0  # times the peak of the solver in the middle, where the scale ends
 _TIP_SHARE = 0.15  # of the cut's length: half of the window around a tip
 _TIP_CELLS = 4.0  # elements that are shown on each side of a tip at least
 _TIP_SIZE = (420, 420)  # in pixels
-_PLANE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _ON = 1e-6  # of the body's size: an end that is closer to a line ends on it
 
 Points = NDArray[np.float64]
@@ -281,7 +280,8 @@ def _add_tip(pictures: CasePictures, result: CaseResult, shown: dict[str, Body])
         if most <= worst:
             continue
         worst = most
-        view = View(*_PLANE, window, _TIP_SIZE, _OF_ERRORS, (0.0, top or 1.0), beyond=most > top)
+        limits = (0.0, top or 1.0)
+        view = View(np.eye(3), window, _TIP_SIZE, _OF_ERRORS, limits, beyond=most > top)
         pictures.tip_at = f"({number(x, 4)}, {number(y, 4)}) m, {number(2 * half, 2)} m wide"
         pictures.tip = [
             Picture(

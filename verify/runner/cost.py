@@ -15,12 +15,11 @@ import numpy as np
 
 from reference.deformation import wave_speed
 from verify.printable import duration_text, memory_text
-from verify.result import SolveRecord
+from verify.result import REFERENCE, SolveRecord
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.scene.placement import points_of_body
 from verify.solvers.interface import is_built_in, solver_in
 
-REFERENCE = "reference"
 _FENICSX = ("conforming", REFERENCE)
 _BESIDE = {True: 0.8, False: 0.25}  # s of a process that is no solve, with FEniCSx and without
 _MEMORY = {True: 2.3e8, False: 1.6e8}  # bytes of a process before it solves

@@ -15,6 +15,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
+from verify.processes import memory_limit
 from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.fingerprint import code_of_solver
@@ -184,7 +185,7 @@ def solve_remotely(
     from distributed import get_worker
 
     worker = get_worker()
-    limit = memory or 0.8 * provenance()["memory"] / max(1, worker.state.nthreads)
+    limit = memory_limit(memory, max(1, worker.state.nthreads))
     with tempfile.TemporaryDirectory(prefix="verify-worker-") as place:
         folder = Path(place)
         if mesh is not None:

@@ -42,7 +42,7 @@ from verify.errors import InputError
 from verify.files import asked_place, parse_json, read_json, whole_file, write_json, write_whole
 from verify.printable import one_line, shown, words_of
 from verify.provenance import provenance
-from verify.result import SolveRecord, Status, checked
+from verify.result import REFERENCE, SolveRecord, Status, checked
 from verify.runner.directory import Job, is_file_name, solution_files
 from verify.runner.fingerprint import (
     bytes_digest,
@@ -54,7 +54,6 @@ from verify.runner.fingerprint import (
 from verify.scene import Scene
 from verify.solution import read_solution, write_solution
 
-REFERENCE = "reference"
 BESIDE = "references"  # folder beside a case in which its own bundle lies
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"

@@ -7,7 +7,6 @@ several MPI ranks it solves its part; the first rank writes.
 
 import contextlib
 import errno
-import os
 import sys
 import traceback
 from pathlib import Path
@@ -96,8 +95,6 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     from verify.solvers import find_solver
     from verify.solvers.interface import checked_levels, refusal_of, solver_in
 
-    if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
-        sys.path.append(os.getcwd())
     scene = restore_scene(job["scene"])
     solver = find_solver(solver_in(job["solver"]))
     if refusal := refusal_of(solver, scene):

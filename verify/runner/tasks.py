@@ -6,7 +6,6 @@ Its result lies beside, with the key of the call and of its code.
 """
 
 import json
-import os
 import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +19,7 @@ from typing import Any, get_type_hints
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.printable import words_of
-from verify.processes import die_with_parent, start_server
+from verify.processes import die_with_parent, memory_limit, start_server
 from verify.result import checked
 from verify.runner.child import Child, Ending, death, watch_all
 from verify.runner.directory import emptied, folder_name
@@ -81,8 +80,7 @@ class Limits:
     @property
     def bytes(self) -> float:
         """Limit of memory: by default 80 % of the machine's, shared."""
-        whole = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-        return self.memory or 0.8 * whole / self.jobs
+        return memory_limit(self.memory, self.jobs)
 
 
 @dataclass(frozen=True)
@@ -150,8 +148,6 @@ def main(task_file: Path) -> None:
     """Make the task of a file, and write beside it the result, or why there is none."""
     die_with_parent()
     task = read_json(task_file)
-    if task["guest"]:  # found from where the study was started
-        sys.path.append(os.getcwd())
     try:
         function = getattr(import_module(task["module"]), task["function"])
         content = {"key": task["key"], "found": function(**task["arguments"])}
@@ -169,7 +165,7 @@ def _folder_name(task: Task) -> str:
 def _started(task: Task, place: Path, limits: Limits) -> Child:
     emptied(place)
     own = not task.fresh and all(map(is_built_in, task.solvers))
-    write_json({**task.question(), "key": task.key(), "guest": not own}, place / "task.json")
+    write_json({**task.question(), "key": task.key()}, place / "task.json")
     files = place / "task.json", place / "log.txt"
     return Child(__name__, *files, limits.timeout, limits.bytes, own=own)
 

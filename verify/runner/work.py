@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line
+from verify.processes import memory_limit
 from verify.result import FORECAST, LOG, CaseResult, SolveRecord, Status, write_result
 from verify.runner.child import POLL_SECONDS, Child, Ending, death
 from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
@@ -145,7 +146,7 @@ class Work:
         self.records: dict[Path, bytes] = {}  # as they were written
         self.again: set[Path] = set()
         side_by_side = max(1, min(options.jobs, sum(plan.count for plan in plans)))
-        self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
+        self.memory = memory_limit(options.memory, side_by_side)
         limits = options.timeout, self.memory
         self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
         self.engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)

@@ -128,11 +128,6 @@ class _ResultantQuantity(Strict):
     component: Literal["x", "y", "z"] = Field(description="in 2D a moment is about z")
     time: Time = None
 
-    @property
-    def about(self) -> tuple[float, ...] | list[float] | None:
-        """Point that a moment is about, m."""
-        raise NotImplementedError
-
     def direction(self, dimension: int) -> NDArray[np.float64]:
         """Return the unit vector (d,) of a force, or the axis of a moment."""
         return np.eye(3)["xyz".index(self.component)][: 3 if self.of == "moment" else dimension]
@@ -151,7 +146,7 @@ class ReactionQuantity(_ResultantQuantity):
     )  # fmt: skip
 
     @property
-    def about(self) -> tuple[float, ...] | list[float] | None:
+    def about(self) -> list[float] | None:
         """Point that a moment is about, m."""
         return self.centre
 
@@ -170,7 +165,7 @@ class SectionQuantity(_ResultantQuantity):
     )  # fmt: skip
 
     @property
-    def about(self) -> tuple[float, ...] | list[float] | None:
+    def about(self) -> list[float]:
         """Point that a moment is about, m."""
         return self.point
 

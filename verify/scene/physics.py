@@ -356,10 +356,13 @@ class PrescribedMotion:
 class _Load(Strict):
     """A load with numbers or formulas, one per component, or from the exact solution."""
 
+    key: ClassVar[str]  # that gives them
+
     @property
     def components(self) -> Sequence[float | str] | Literal["exact"]:
         """The numbers and formulas given, or ``"exact"``."""
-        raise NotImplementedError
+        given: Sequence[float | str] | Literal["exact"] = getattr(self, self.key)
+        return given
 
     @property
     def exact(self) -> bool:
@@ -383,10 +386,7 @@ class Gravity(_Load):
     kind: Literal["gravity"]
     acceleration: Vector = Field(description="m/s²")
 
-    @property
-    def components(self) -> Sequence[float | str]:
-        """Acceleration, m/s²."""
-        return self.acceleration
+    key: ClassVar[str] = "acceleration"
 
 
 class BodyForce(_Load):
@@ -398,10 +398,7 @@ class BodyForce(_Load):
     )
     history: History | None = None
 
-    @property
-    def components(self) -> Sequence[float | str] | Literal["exact"]:
-        """Force per volume, N/m³."""
-        return self.force
+    key: ClassVar[str] = "force"
 
 
 class Traction(_Load):
@@ -414,10 +411,7 @@ class Traction(_Load):
     )
     history: History | None = None
 
-    @property
-    def components(self) -> Sequence[float | str] | Literal["exact"]:
-        """Force per area, Pa."""
-        return self.traction
+    key: ClassVar[str] = "traction"
 
 
 class CutFaces(_Load):

@@ -5,6 +5,8 @@ and verdicts beside those of ``xfem``.
 """
 
 import json
+import os
+import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
@@ -188,6 +190,8 @@ def find_solver(name: str) -> Solver:
 
 
 def _class_of(name: str) -> Any:
+    if ":" in name and os.getcwd() not in sys.path:  # from where the command was started
+        sys.path.append(os.getcwd())
     if ":" in name or name in _BUILT_IN or name in _foreign_names():
         module, _, attribute = _BUILT_IN.get(name, name if ":" in name else _FOREIGN).partition(":")
         if not module or not attribute:

@@ -31,12 +31,13 @@ from verify.judge.reference import (
     exact_reference,
     size_of,
 )
+from verify.result import REFERENCE
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 from verify.study.budget_parts import Answer
 from verify.study.study import Solved
 
-REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
+JUDGED, CONFORMING = "xfem", "conforming"
 
 
 # Of scenes, a place, solvers, their parameters and whether they are timed: solves all levels by

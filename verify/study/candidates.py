@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import nan
 from statistics import median
 from typing import Any
 
@@ -48,14 +50,14 @@ class Candidate:
     kinematics: str
     choices: str
     level: int
-    size: float
-    unknowns: int
-    error: float
-    low: float
-    high: float
-    seconds: float
-    fastest: float
-    slowest: float
+    size: float = nan
+    unknowns: int = 0
+    error: float = nan
+    low: float = nan
+    high: float = nan
+    seconds: float = nan
+    fastest: float = nan
+    slowest: float = nan
     reason: str = ""
     analysis: str = ""
 
@@ -129,7 +131,6 @@ def _of_the_others(
     )
 
 
-_NONE = float("nan")
 _STANDARD = "trapezoidal, side-wise mass"
 # in words, and the parameters of the solver; the last ones are left out by --quick
 _MOTIONS: list[tuple[str, dict[str, Any]]] = [
@@ -185,7 +186,8 @@ def find_candidates(
     try:
         still = solve([at_rest(s) for s in scenes], "static", (JUDGED,), timed=True)
     except (InputError, UnsupportedSceneError) as problem:
-        return [*candidates, *(_without(k, "static", "static", 0, str(problem)) for k in kinds)]
+        failed = partial(Candidate, reason=str(problem), analysis="static")
+        return [*candidates, *(failed(kind, "static", 0) for kind in kinds)]
     static = [_Tried(k, "static", "static", s) for k, s in zip(kinds, still, strict=True)]
     return candidates + _measured(static, chain, times, metric)
 
@@ -199,28 +201,21 @@ def _measured(tried: Sequence[_Tried], chain: Chain, times: Times, metric: str) 
                 continue
             solution = one.solved.solutions.get(JUDGED, {}).get(record.level)
             if record.status is not Status.SOLVED or solution is None:
-                reason = record.reason or str(record.status)
-                found.append(
-                    _without(one.kinematics, one.choices, one.analysis, record.level, reason)
-                )
+                failed = Candidate(one.kinematics, one.choices, record.level,
+                                   reason=record.reason or str(record.status),
+                                   analysis=one.analysis)  # fmt: skip
+                found.append(failed)
                 continue
             error = _error(one, solution, chain.known, chain.body, metric, law, times)
             found.append(_candidate(one, record, solution, error))
     return found
 
 
-def _without(kinematics: str, choices: str, analysis: str, level: int, reason: str) -> Candidate:
-    return Candidate(
-        kinematics, choices, level, _NONE, 0, _NONE, _NONE, _NONE, _NONE, _NONE, _NONE, reason,
-        analysis,
-    )  # fmt: skip
-
-
 def _candidate(
     one: _Tried, record: SolveRecord, solution: Solution, error: tuple[float, float]
 ) -> Candidate:
     value, width = error
-    totals = paid_times(record) or [_NONE]
+    totals = paid_times(record) or [nan]
     return Candidate(
         one.kinematics, one.choices, record.level, size_of(solution), solution.unknowns, value,
         max(value - width, 0.0), value + width, median(totals), min(totals), max(totals),

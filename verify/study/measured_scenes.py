@@ -3,8 +3,6 @@
 The energy study is such measurements alone: what any solver keeps of energy, momenta and mass.
 """
 
-import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -35,15 +33,7 @@ class Variant:
     parameters: dict[str, Any] = field(default_factory=dict)
 
     def found(self) -> Solver:
-        """Find the solver; a class of the user's own from where the study was started.
-
-        Raises
-        ------
-        InputError
-            If there is no such solver.
-        """
-        if ":" in self.solver and os.getcwd() not in sys.path:
-            sys.path.append(os.getcwd())
+        """Find the solver; InputError if there is none."""
         return find_solver(self.solver)
 
 
