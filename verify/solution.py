@@ -18,9 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.errors import InputError
-from verify.files import read_json, whole_file, write_whole
-from verify.handed_over import (
+from verify.checked_solution import (
     check_accounts,
     check_cells,
     check_field,
@@ -29,11 +27,13 @@ from verify.handed_over import (
     plain_mass,
     restored_mass,
 )
+from verify.errors import InputError
+from verify.files import read_json, whole_file, write_whole
 from verify.read_mesh import read_with_meshio
 from verify.result import Regularisation
 
 __all__ = [
-    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "handed_over",
+    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "checked_solution",
     "read_solution", "write_solution",
 ]  # fmt: skip
 
@@ -212,7 +212,7 @@ class Solution:
         return _CELL_TYPES[self.cell_dimension, self.order]
 
 
-def handed_over(answer: Any) -> Solution:
+def checked_solution(answer: Any) -> Solution:
     """Return what a solver answered, checked anew: its arrays may have changed since it was made.
 
     Raises

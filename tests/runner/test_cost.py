@@ -19,7 +19,7 @@ from verify.runner.cost import (
     solver_costs,
 )
 from verify.runner.directory import RunDirectory
-from verify.runner.plan import levels_left_out, plan_case
+from verify.runner.plan import late_levels, plan_case
 from verify.runner.selection import Options
 from verify.scene import ToolPathCut
 from verify.solvers.body_of_scene import background_mesh
@@ -186,16 +186,16 @@ def test_levels_that_end_too_late_are_left_out_by_what_the_others_took(tmp_path)
     plan = plan_case(SCENES[case], asked, {}, RunDirectory(tmp_path))
     levels = [plan.job_of("reference", level) for level in range(3)]
     records = [solved(case, k, *RECORDED[case][k]) for k in range(2)]
-    assert levels_left_out(plan, levels[0], records[:1], levels[1:])[0][0] == levels[2]
+    assert late_levels(plan, levels[0], records[:1], levels[1:])[0][0] == levels[2]
     for solves, waiting in ((records[:1], levels[1:]), (records, levels[2:])):
-        ((job, record),) = levels_left_out(plan, levels[len(solves) - 1], solves, waiting)
+        ((job, record),) = late_levels(plan, levels[len(solves) - 1], solves, waiting)
         assert job == levels[2]
         assert record.status is Status.REFUSED
         assert "--within asks for 20 s" in record.reason
     quick = [replace(one, wall=0.1 * one.wall) for one in records]
-    assert not levels_left_out(plan, levels[1], quick, levels[2:])
+    assert not late_levels(plan, levels[1], quick, levels[2:])
     unasked = plan_case(SCENES[case], replace(asked, within=None), {}, RunDirectory(tmp_path))
-    assert not levels_left_out(unasked, levels[0], records[:1], levels[1:])
+    assert not late_levels(unasked, levels[0], records[:1], levels[1:])
     stored = plan_case(SCENES[case], replace(asked, cache=tmp_path), {}, RunDirectory(tmp_path))
     assert stored.bundle is not None
     assert stored.within is None

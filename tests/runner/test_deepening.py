@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
-from verify.judge.checks import unjudged_result
+from verify.judge.checks import result_without_verdicts
 from verify.judge.intervals import sufficiency
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.directory import Job
-from verify.runner.plan import CasePlan, further_level, levels_in_vain
+from verify.runner.plan import CasePlan, next_level, unneeded_levels
 from verify.scene import Scene, load_scene
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
@@ -83,19 +83,19 @@ def test_levels_are_added_one_by_one_while_they_are_needed(scene):
     waiting = plan(scene)
     poor = judged(scene, solve("xfem", 0, uncertainty=0.05), solve("reference", 0))
     good = judged(scene, solve("xfem", 0), solve("reference", 0))
-    assert further_level(waiting, good) is None
-    assert further_level(waiting, poor).level == 3
-    assert further_level(waiting, poor).level == 4
-    assert further_level(waiting, poor) is None
+    assert next_level(waiting, good) is None
+    assert next_level(waiting, poor).level == 3
+    assert next_level(waiting, poor).level == 4
+    assert next_level(waiting, poor) is None
     assert [job.level for job in waiting.jobs] == [3, 4]
 
 
 def test_no_level_follows_one_that_was_not_solved(scene):
     failed = solve("reference", 3, status=Status.TIMEOUT)
     poor = solve("xfem", 0, uncertainty=1)
-    assert further_level(plan(scene), judged(scene, poor, failed)) is None
+    assert next_level(plan(scene), judged(scene, poor, failed)) is None
     unjudged = replace(judged(scene), reference=ReferenceRecord("none", reason="too few levels"))
-    assert further_level(plan(scene), unjudged) is None
+    assert next_level(plan(scene), unjudged) is None
 
 
 @pytest.mark.parametrize("status", [Status.TIMEOUT, Status.MEMORY, Status.FAILED])
@@ -104,14 +104,14 @@ def test_levels_wait_in_vain_when_fewer_than_three_can_have_an_answer(scene, sta
     others = [Job("slit", "xfem", 0, 1, "key", Path()), Job("other", "reference", 2, 1, "", Path())]
     waiting = [others[0], *levels[1:3], others[1]]
     three = CasePlan(scene, ["xfem", "reference"], job_of, jobs=[others[0], *levels[:3]])
-    in_vain = levels_in_vain(three, levels[0], levels[0].blank(status, "why"), waiting)
+    in_vain = unneeded_levels(three, levels[0], levels[0].blank(status, "why"), waiting)
     assert [job for job, _ in in_vain] == levels[1:3]
     assert all(record.status is Status.FAILED for _, record in in_vain)
     assert all("level 0" in record.reason for _, record in in_vain)
     four = CasePlan(scene, ["xfem", "reference"], job_of, jobs=levels)
-    assert not levels_in_vain(four, levels[0], levels[0].blank(status, "why"), levels[1:])
-    assert not levels_in_vain(three, levels[0], levels[0].blank(Status.SOLVED, ""), waiting)
-    assert not levels_in_vain(three, others[0], others[0].blank(status, "why"), waiting)
+    assert not unneeded_levels(four, levels[0], levels[0].blank(status, "why"), levels[1:])
+    assert not unneeded_levels(three, levels[0], levels[0].blank(Status.SOLVED, ""), waiting)
+    assert not unneeded_levels(three, others[0], others[0].blank(status, "why"), waiting)
 
 
 @pytest.mark.fenicsx
@@ -135,7 +135,7 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
 
 
 def test_a_case_without_a_comparison_is_kept_in_the_keys_of_a_case_file(scene):
-    content = unjudged_result(scene, [], "no reference", {}).scene
+    content = result_without_verdicts(scene, [], "no reference", {}).scene
     again = Scene.model_validate(content)
     assert again.model_dump() == scene.model_dump()
     assert content["schema"] == 1

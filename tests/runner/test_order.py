@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from verify.runner.directory import Job
-from verify.runner.plan import CasePlan, begun_after
+from verify.runner.plan import CasePlan, start_order
 from verify.runner.selection import Options
 from verify.scene import load_scene
 
@@ -22,7 +22,7 @@ def no_job(solver, level):
 
 def order_of_solves(plans, options):
     jobs = [job for plan in plans for job in (*plan.jobs, *plan.models)]
-    return sorted(jobs, key=begun_after(plans, options))
+    return sorted(jobs, key=start_order(plans, options))
 
 
 PLANS = [planned("statics/f1_patch"), planned("benchmark/c3_strip")]

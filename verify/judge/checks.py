@@ -117,7 +117,7 @@ def result_of(
     )
 
 
-def unjudged_result(
+def result_without_verdicts(
     scene: Scene,
     solves: list[SolveRecord],
     reason: str,

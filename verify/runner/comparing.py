@@ -14,7 +14,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.files import read_json, write_json
-from verify.judge.checks import unjudged_result
+from verify.judge.checks import result_without_verdicts
 from verify.result import COMPARISON_FAILED, CaseResult, read_result
 from verify.runner.child import Child, Ending, death
 from verify.runner.directory import JUDGING, RunDirectory, load_record
@@ -109,7 +109,7 @@ class Comparison:
         reason, origin = f"{COMPARISON_FAILED}: {why}", self._question["provenance"]
         judged = self._question["judge_only"]
         solves = [load_record(folder) for folder in self._folders]
-        result = unjudged_result(self.scene, solves, reason, origin, judged)
+        result = result_without_verdicts(self.scene, solves, reason, origin, judged)
         write_json(result.content(), self._folder / "result.json")
         return result
 

@@ -277,7 +277,7 @@ def outcome_in(folder: Path) -> dict[str, Any] | None:
     return {name: getattr(record, name) for name in outcome}
 
 
-def levels_told(job: Job) -> int:
+def reported_levels(job: Job) -> int:
     """Return the number of levels that a solver reported with level 0; 0 if it has not."""
     try:
         return min(int((job.folder / LEVELS).read_text()), MOST_LEVELS)

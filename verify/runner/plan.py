@@ -215,7 +215,7 @@ def plan_case(
     return plan
 
 
-def begun_after(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], tuple[Any, ...]]:
+def start_order(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], tuple[Any, ...]]:
     """Return the key by which the solves of a run are sorted as they are begun.
 
     One after the other they keep the order of the plans. Side by side, the longest case by the
@@ -284,7 +284,7 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
     return jobs, scenes
 
 
-def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
+def next_level(plan: CasePlan, result: CaseResult) -> Job | None:
     """Take the next level of the reference out of the plan's spare ones, if it is needed.
 
     It is needed if all levels so far are solved and the half-width of the reference is above a
@@ -306,7 +306,7 @@ def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
     return plan.jobs[-1]
 
 
-def levels_in_vain(
+def unneeded_levels(
     plan: CasePlan, failed: Job, record: SolveRecord, waiting: Collection[Job]
 ) -> list[tuple[Job, SolveRecord]]:
     """List the levels of a reference that need not be solved, each with a record that says so.
@@ -341,7 +341,7 @@ def levels_in_vain(
     return [(job, job.blank(Status.FAILED, reason)) for job in levels if job in waiting]
 
 
-def levels_to_come(plan: CasePlan, solved: Job, record: SolveRecord) -> list[LevelCost]:
+def forecast_levels(plan: CasePlan, solved: Job, record: SolveRecord) -> list[LevelCost]:
     """Forecast the finer levels of a case's own reference when one is solved."""
     own = solved.solver == REFERENCE and not solved.model and not plan.scene.judged_by_exact
     if not own or record.status is not Status.SOLVED:
@@ -349,7 +349,7 @@ def levels_to_come(plan: CasePlan, solved: Job, record: SolveRecord) -> list[Lev
     return finer_costs(plan.scene, record, plan.scene.reference.levels)
 
 
-def levels_left_out(
+def late_levels(
     plan: CasePlan, solved: Job, records: Sequence[SolveRecord], waiting: Collection[Job]
 ) -> list[tuple[Job, SolveRecord]]:
     """List the levels of a reference that would end too late, each with a record that says so.
@@ -368,7 +368,7 @@ def levels_left_out(
         return []
     spent = sum(record.wall or 0.0 for record in records)
     late: list[tuple[Job, SolveRecord]] = []
-    for row in levels_to_come(plan, solved, records[-1]):
+    for row in forecast_levels(plan, solved, records[-1]):
         spent += row.seconds
         job = plan.job_of(REFERENCE, row.level)
         if job in waiting and (late or spent > plan.within):

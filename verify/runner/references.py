@@ -106,7 +106,7 @@ class Entry:
         """Whether the reference's code or versions are others today."""
         return self.code != code_of_solver(REFERENCE)
 
-    def taken_by(self, job: Job, words: str) -> SolveRecord:
+    def record_for(self, job: Job, words: str) -> SolveRecord:
         """Return its record for `job`, with a note in `words` on where it comes from."""
         code = "; the code of the reference has changed since" if self.outdated else ""
         said = f"{words}, solved {self.made}{self._by()}{code}"
@@ -182,7 +182,7 @@ class ReferenceCache:
         except (FileNotFoundError, InputError):  # damaged, or removed while we looked
             self._remove(folder)
             return None
-        return entry.taken_by(job, "from the reference cache")
+        return entry.record_for(job, "from the reference cache")
 
     def keep(self, scene: Scene, job: Job, record: SolveRecord) -> str:
         """Keep the solution in the folder of `job`; say what hindered it, if anything did.
@@ -439,7 +439,7 @@ class ReferenceBundle:
         entry = self._of(scene)[job.level]
         for name, data in self._read(entry).items():
             write_whole(job.folder / Path(name).name, data)
-        return entry.taken_by(job, f"from the bundle {self.path.name}")
+        return entry.record_for(job, f"from the bundle {self.path.name}")
 
     def _read(self, entry: Entry) -> dict[str, bytes]:
         """Contents of its files, all whole."""

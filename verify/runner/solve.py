@@ -91,7 +91,7 @@ def _leave_traceback() -> None:
 def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict[str, Any]:
     from verify.provenance import compile_times
     from verify.scene import restore_scene
-    from verify.solution import handed_over, write_solution
+    from verify.solution import checked_solution, write_solution
     from verify.solvers import find_solver
     from verify.solvers.interface import checked_levels, refusal_of, solver_in
 
@@ -103,7 +103,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         _without_links(folder)
         write_whole(folder / LEVELS, str(checked_levels(solver.levels(scene))))
     with compile_times() as compiled:
-        solution = handed_over(
+        solution = checked_solution(
             solver.solve(scene, job["level"], repetitions=job["repetitions"], **job["parameters"])
         )
     if solution.dimension != scene.dimension:

@@ -21,9 +21,9 @@ from verify.runner.directory import (
     Job,
     RunDirectory,
     emptied,
-    levels_told,
     load_record,
     outcome_in,
+    reported_levels,
     store_record,
     stored_record,
 )
@@ -31,11 +31,11 @@ from verify.runner.engines import ClusterEngine, LocalEngine, RemoteSolve
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.plan import (
     CasePlan,
-    begun_after,
-    further_level,
-    levels_in_vain,
-    levels_left_out,
-    levels_to_come,
+    forecast_levels,
+    late_levels,
+    next_level,
+    start_order,
+    unneeded_levels,
 )
 from verify.runner.references import REFERENCE, ReferenceBundle, ReferenceCache
 from verify.runner.selection import Options
@@ -134,7 +134,7 @@ class Work:
         self.directory, self.options, self.origin = directory, options, origin
         self.progress, self.reused = progress, 0
         self.plans = {plan.scene.name: plan for plan in plans}
-        self.begun_after = begun_after(plans, options)
+        self.start_order = start_order(plans, options)
         self.waiting: list[Job] = []
         self.running: dict[Running, Job] = {}
         for plan in plans:
@@ -187,7 +187,7 @@ class Work:
     def _wait(self, jobs: Iterable[Job]) -> None:
         """Have jobs wait for their turn."""
         for job in jobs:
-            insort(self.waiting, job, key=self.begun_after)
+            insort(self.waiting, job, key=self.start_order)
 
     def _is_open(self, case: str) -> bool:
         """Whether a solve of a case is to come or to end."""
@@ -270,14 +270,14 @@ class Work:
             trouble = self.references.keep(self.plans[job.case].scene_of(job), job, record)
             if trouble:
                 record.notes["cache"] = trouble
-        self._foretell(job, record)
+        self._note_forecast(job, record)
         record = self._kept(job, record)
         self._solve_done(job, record, reused=False)
 
-    def _foretell(self, job: Job, record: SolveRecord) -> None:
+    def _note_forecast(self, job: Job, record: SolveRecord) -> None:
         """Note what finer levels of a reference will take, and whether its elements are larger."""
         plan = self.plans[job.case]
-        if finer := levels_to_come(plan, job, record):
+        if finer := forecast_levels(plan, job, record):
             limits = self.options.timeout, self.memory
             record.notes[FORECAST] = forecast_text(plan.scene, finer, *limits)
         if plan.coarser > 1 and job.solver == REFERENCE:
@@ -326,12 +326,12 @@ class Work:
         self.progress.solved(job.label, record, reused)
         plan = self.plans[job.case]
         before = plan.count
-        self._wait(plan.following(job, record, levels_told(job)))
+        self._wait(plan.following(job, record, reported_levels(job)))
         if plan.count != before:
             self._say_plan()
-        left_out = levels_in_vain(plan, job, record, self.waiting)
+        left_out = unneeded_levels(plan, job, record, self.waiting)
         if job.solver == REFERENCE and "cache" not in record.notes:
-            left_out += levels_left_out(plan, job, self._levels_until(job, plan), self.waiting)
+            left_out += late_levels(plan, job, self._levels_until(job, plan), self.waiting)
         for other, without in left_out:
             self.waiting.remove(other)
             self.progress.solved(other.label, self._kept(other, without), reused=False)
@@ -401,7 +401,7 @@ class Work:
         self.progress.started(comparison_label(case))
 
     def _case_done(self, result: CaseResult) -> None:
-        if (job := further_level(self.plans[result.case], result)) is not None:
+        if (job := next_level(self.plans[result.case], result)) is not None:
             self._wait([job])
             self._say_plan()
             return

@@ -150,7 +150,7 @@ def _read(
     for _, given in raw.blocks:
         if given.size and not (given.min() >= 0 and given.max() < len(points)):
             raise InputError(f"a cell names a node outside 0..{len(points) - 1}", where)
-    notes += _said_of_kinds(raw, k)
+    notes += _notes_on_kinds(raw, k)
     if weld:
         points, blocks, count = _welded(points, blocks, k, weld, where)
         notes.append(f"{count} nodes are joined to others within {weld:g} m")
@@ -227,7 +227,7 @@ def _simplices(kind: str, cells: Ints) -> tuple[Ints, Ints]:
     return simplices[whole][order], parent[whole][order]
 
 
-def _said_of_kinds(raw: RawMesh, k: int) -> list[str]:
+def _notes_on_kinds(raw: RawMesh, k: int) -> list[str]:
     notes = []
     for kind in dict.fromkeys(kind for kind, _ in raw.blocks):
         own = [cells for one, cells in raw.blocks if one == kind and len(cells)]

@@ -16,7 +16,7 @@ from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
 from verify.runner.tasks import Failure, Task
 from verify.scene import Scene, ValueCheck, restore_scene, scene_content
-from verify.solution import handed_over
+from verify.solution import checked_solution
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import one_name, parameters_in, refusal_of, solver_in
 from verify.study.study import Finding, Making, Study, held
@@ -183,7 +183,7 @@ def measured_families(
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
     from reference.exact import exact_of
 
-    solution = handed_over(solver.solve(scene, level, repetitions=1, **variant.parameters))
+    solution = checked_solution(solver.solve(scene, level, repetitions=1, **variant.parameters))
     record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
     solutions = {variant.solver: {level: solution}}
     result = assess_accuracy(scene, [record], solutions, exact_of(scene))
