@@ -13,12 +13,12 @@ from verify.runner import child
 
 
 def without_waits(text):
-    """Return what a command said, but not what it waited for: that depends on the machine."""
+    """Return the output of a command without its waits, which depend on the machine."""
     return "".join(line for line in text.splitlines(True) if not line.startswith("… "))
 
 
 def run_here(arguments, folder, environment=None):
-    """Run ``verify ARGUMENTS`` in a folder; return its exit code and what it said."""
+    """Run ``verify ARGUMENTS`` in a folder; return its exit code and output."""
     words, out, err = [str(word) for word in arguments], StringIO(), StringIO()
     with (
         chdir(folder),
@@ -35,7 +35,7 @@ def run_here(arguments, folder, environment=None):
 
 
 def forking(harmless):
-    """Fork the processes of guests that do no harm to theirs, as those of own solvers are."""
+    """Fork the processes of guests that do no harm to theirs, as of own solvers."""
     fresh = child._fresh
 
     def start(run, log, environment):

@@ -1,4 +1,4 @@
-"""Scenes that tests build: of each only what its claim needs is said."""
+"""Scenes that tests build: each states only the keys that its claim needs."""
 
 from functools import cache
 
@@ -14,7 +14,7 @@ def catalogue():
 
 
 def box(upper, lower=None):
-    """Geometry of a rectangle or box, from the origin unless said otherwise."""
+    """Geometry of a rectangle or box, by default from the origin."""
     kind = "rectangle" if len(upper) == 2 else "box"
     return {"kind": kind, "lower": list(lower or [0.0] * len(upper)), "upper": list(upper)}
 

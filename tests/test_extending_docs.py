@@ -98,7 +98,7 @@ def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(exa
 def test_every_command_on_regression_succeeds_in_order(tmp_path):
     for line in commands("guide/regression.md"):
         done = run_line(line, tmp_path)
-        # what is undecided about speed depends on the machine: the page says so
+        # undecided verdicts on speed depend on the machine: the page says so
         allowed = (0, 5) if "--strict" in line else (0, 1) if " check " in line else (0,)
         assert done.returncode in allowed, f"{line}\n{done.stdout}\n{done.stderr}"
         assert not re.search("^FAIL +(own|independent|reference)", done.stdout, re.MULTILINE)

@@ -86,7 +86,7 @@ def test_each_acceptance_check_of_a_case_file_is_a_test_that_passes_or_fails(pyt
         ]
     )
     assert (pytester.path / "runs/strain.verify/run.json").is_file()
-    # what is finished is reused; strict: what nobody knows is not good enough
+    # finished solves are reused; strict: an undecided verdict fails
     strict = session("--verify-strict", "--verify-out", "runs")
     strict.assert_outcomes(passed=2, failed=2, xfailed=1)
 

@@ -1,4 +1,4 @@
-"""The neutral solution: what is written is read, a wrong shape fails where it arises."""
+"""The neutral solution: files are read as written, a wrong shape fails where it arises."""
 
 import json
 from dataclasses import fields, replace

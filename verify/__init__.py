@@ -1,7 +1,7 @@
 """A verification lab for cutting: scenes, solvers, comparison, verdicts, reports.
 
 Importing this package is cheap and needs neither FEniCSx nor gmsh; every sub-package is
-imported when it is asked for.
+imported on first use.
 """
 
 __version__ = "0.1.0"

@@ -9,7 +9,7 @@ class InputError(ValueError):
     Parameters
     ----------
     what : str
-        What is wrong and what was expected, in one sentence.
+        The fault and the expected value, in one sentence.
     where : str, optional
         The file, and the key in it, where it was found.
     """
@@ -28,7 +28,7 @@ class UnsupportedSceneError(Exception):
 
 
 class RunStoppedError(Exception):
-    """A run was asked to stop by a signal; what is finished stays."""
+    """A run was asked to stop by a signal; finished solves stay."""
 
     def __init__(self, signum: int) -> None:
         self.signum = signum

@@ -62,7 +62,7 @@ def read_bounded(path: Path, what: str, largest: int = 2**28) -> bytes:
     ----------
     path : Path
     what : str
-        What is expected there, for the message: "a case file".
+        Expected kind of file, for the message: "a case file".
     largest : int
         Bytes.
 
@@ -139,7 +139,7 @@ def read_json(path: Path, what: str = "a JSON file") -> dict[str, Any]:
     ----------
     path : Path
     what : str
-        What is expected there, for the message.
+        Expected content, for the message.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        As `read_json`; `where` is said in it.
+        As `read_json`, with `where`.
     """
     try:
         content = json.loads(text, parse_int=_whole)
@@ -197,7 +197,7 @@ def plain(value: Any, lost: dict[str, str] | None = None, place: str = "") -> An
     Parameters
     ----------
     value : object
-        Numpy's scalars and arrays become Python's; what is unknown becomes its text.
+        Numpy's scalars and arrays become Python's; other objects become their text.
     lost : dict, optional
         Takes up what became null: ``"nan"``, ``"inf"`` or ``"-inf"`` by place, which is a JSON
         pointer (RFC 6901).

@@ -116,7 +116,7 @@ def _turning(phantom: PhantomMesh, kind: State) -> None:
 def _without_slivers(
     body: Callable[[], tuple[PhantomMesh, State]], use: Callable[[PhantomMesh, State], None]
 ) -> None:
-    # what is aggregated assembles at corners, by the same loops: the untreated body has them all
+    # aggregated cells assemble at corners by the same loops: the untreated body has them all
     phantom, kind = body()
     treat_slivers(phantom)
     use(phantom, kind)

@@ -1,8 +1,8 @@
 """Processes that solve: one thread each, their first and last acts, the server that forks them.
 
-Parallel runs are processes, timings are one thread's. BLAS with a thread per core also costs: the
-quick sliver study took 82 s of two cores with it, and 35 s of one without (small matrices, whose
-threads wait for each other).
+Parallel runs are processes, timings are one thread's. BLAS with a thread per core also costs:
+threads wait for each other over small matrices. The quick sliver study took 82 s of two cores with
+it, and 35 s of one without.
 """
 
 import contextlib
@@ -88,6 +88,6 @@ ONE_THREAD = dict.fromkeys(
 def pin_to_one_thread() -> None:
     """Pin this process, and those it starts, before numpy or numba is loaded.
 
-    Whatever the environment says: what is recorded of every run and study is one thread.
+    Whatever the environment says: records of every run and study are of one thread.
     """
     os.environ.update(ONE_THREAD)

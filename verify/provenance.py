@@ -2,7 +2,7 @@
 
 Nothing is imported to find a version (DOLFINx would start MPI); the installed metadata says it.
 
-A run and every number of a baseline keep the revision at which they were made of what is measured;
+A run and every number of a baseline keep the revision of the measurement with which they were made;
 files from before revisions were kept have revision 1.
 
 Times have two yardsticks: a fixed piece of work beside every solve, and the time of compilation.
@@ -36,7 +36,7 @@ from typing import Any
 import verify
 from verify.result import SolveRecord
 
-# what is reported -> the distributions that may carry it, the likelier first
+# reported name -> the distributions that may carry it, the likelier first
 DISTRIBUTIONS = {
     "numpy": ["numpy"],
     "scipy": ["scipy"],
@@ -56,8 +56,8 @@ def provenance() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``commit`` (str or None), ``dirty`` (bool or None if unknown), ``meaning`` (revision of
-        what numbers mean, `verify.provenance`), ``versions``, ``cpu``,
+        ``commit`` (str or None); ``dirty`` (bool or None if unknown); ``meaning`` (revision of
+        what numbers mean, `verify.provenance`); ``versions``; ``cpu``;
         ``cores`` (usable by this process), ``memory`` (bytes), ``load`` (one-minute average
         when asked), ``threads`` (of a solving process), ``os`` and ``date`` (UTC, ISO 8601).
     """
@@ -81,7 +81,7 @@ def provenance() -> dict[str, Any]:
 def versions() -> dict[str, str]:
     """Return the versions of the project, of Python and of what the solvers stand on.
 
-    Of what is installed when it is asked first; what is installed later has not been imported.
+    As installed at the first call; a package that is installed later has not been imported.
     """
     found = {"verify": verify.__version__, "python": platform.python_version()}
     for name, distributions in DISTRIBUTIONS.items():
@@ -163,7 +163,7 @@ class Change:
     metrics : tuple of str
         Names or patterns of the metrics.
     why : str
-        What is measured now.
+        The measurement of today.
     concerns : callable
         Whether a case and a solve of it are concerned.
     """
@@ -251,7 +251,7 @@ CHANGES = (
     ),
 )  # fmt: skip
 REVISION = max(change.revision for change in CHANGES)
-# of uncertainties, which no axis of a baseline holds against those of before
+# of half-widths, which no axis of a baseline compares with earlier ones
 WIDTHS = (
     2,
     "half-widths of references come from another rule, and those of relative errors of quantities "
@@ -356,7 +356,7 @@ class CompileTimes:
 
 @contextmanager
 def compile_times() -> Iterator[CompileTimes]:
-    """Measure what is compiled meanwhile; nothing if numba has not been imported by then."""
+    """Measure compilation in the block; nothing if numba has not been imported by its end."""
     times = CompileTimes()
     if sys.modules.get("numba") is None:  # what does not need it is not to wait for its import
         yield times

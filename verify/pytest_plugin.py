@@ -1,16 +1,16 @@
 """pytest plugin: one test per acceptance check of a case and solver.
 
 Two ways in. Case files are collected (``*.verify.toml``, and what the ini option ``verify_cases``
-names), or a test function is marked ``@pytest.mark.verify("case")``: it becomes one test per
-check and solver, whose body runs if the check passes and may ask for the fixtures
-``verify_check`` (a `VerdictRecord`) and ``verify_result`` (a `CaseResult`).
+names), or a test function is marked ``@pytest.mark.verify("case")``. It becomes one test per check
+and solver, whose body runs if the check passes. Its fixtures are ``verify_check`` (a
+`VerdictRecord`) and ``verify_result`` (a `CaseResult`).
 
-The solvers are those of the ini option ``verify_solvers``, else ``xfem`` and those that the checks
+The solvers come from the ini option ``verify_solvers``, else ``xfem`` and those that the checks
 name. FAIL and ERROR fail; a FAIL that the case lists as a known finding is an expected failure.
 UNDECIDED is skipped with its reason, because nothing was found out; with ``--verify-strict`` it
 fails. So is a check of a solver that refuses the case. A case is run once per process, through
-the runner, in a temporary directory (or ``--verify-out``, where a later session takes over what is
-finished).
+the runner, in a temporary directory (or ``--verify-out``, where a later session reuses finished
+solves).
 """
 
 import tempfile

@@ -122,7 +122,7 @@ def _of_meshio(mesh: Any) -> RawMesh:
 
 
 def _add_values(raw: RawMesh, key: str, arrays: Any, names: dict[tuple[int, int], str]) -> None:
-    """Add a group for each value of whole-numbered cell data; its name is that of the value."""
+    """Add a group for each value of whole-numbered cell data, with the value as its name."""
     values = [np.asarray(one) for one in arrays]
     values = [one[:, 0] if one.ndim == 2 and one.shape[1] == 1 else one for one in values]
     if any(one.ndim != 1 or not np.issubdtype(one.dtype, np.integer) for one in values):
@@ -244,7 +244,7 @@ def read_with_meshio(path: Path, file_format: str | None = None, what: str = "a 
     file_format : str, optional
         As meshio calls it; default: by the ending of `path`.
     what : str
-        What is expected there, for the message.
+        Expected kind of file, for the message.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class Regularisation:
         How often.
     size : float or None
         Its largest contribution, in the unit of `unit`; None as read from JSON, which has no word
-        for what is not finite.
+        for numbers that are not finite.
     unit : str
         Unit of `size`, e.g. ``"volume fraction"``.
     """
@@ -86,7 +86,7 @@ class CutRecord:
 
     @property
     def continued(self) -> bool:
-        """Whether what is judged is continued across all of the realised cut."""
+        """Whether the judged field is continued across all of the realised cut."""
         return self.lateral <= self.limit
 
     @property
@@ -150,7 +150,7 @@ SCHEMA_VERSION = 1
 REFERENCE = "reference"  #: solver that judges the others, where no exact solution does
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
-FORECAST = "finer levels"  #: of those of a reference: what the levels to come are expected to take
+FORECAST = "finer levels"  #: of the notes of a reference: expected time of the levels to come
 MESHING = "meshing"  #: of the phases of a solve: the first mesh that it makes
 HANDED_OVER = "mesh handed over"  #: phase of who solves on a conforming mesh that others made
 _CUTTING = ("cutting", "enrichment")  # phases that cut a mesh which does not know the cut
@@ -184,7 +184,7 @@ class Status(StrEnum):
 
 
 class Verdict(StrEnum):
-    """What is known about a requirement."""
+    """The state of a requirement."""
 
     PASS = "PASS"
     FAIL = "FAIL"
@@ -195,7 +195,7 @@ class Verdict(StrEnum):
 @_closed
 @dataclass(frozen=True)
 class Metric:
-    """A number that was measured, with what is known about its truth.
+    """A number that was measured, with its reference and half-width.
 
     Parameters
     ----------
@@ -390,9 +390,9 @@ class Rate:
 class VerdictRecord:
     """The verdict on one acceptance check of a case, made of one solver.
 
-    `solver` is empty if the check holds for no solver of the run. `observed` is what was measured,
-    `low`/`high` the interval in which its true value lies given the reference's uncertainty,
-    `limit` what the case demands (as text), `reason` one sentence. `known` is the reason that the
+    `solver` is empty if the check holds for no solver of the run. `observed` is the measured value;
+    `low`/`high` is the interval of its true value, by the half-width of the reference. `limit` is
+    the demand of the case (as text), `reason` one sentence. `known` is the reason that the
     case gives for a FAIL that it lists as a known finding, else empty. `reference_share` is the
     half-width of the reference over the error that is judged, on the finest level; None where no
     reference judges, or both are round-off.
@@ -460,8 +460,8 @@ class OpeningCurve:
     """The displacement jump of one field along a line on a cut.
 
     `level` is None for an exact solution. `normal` and `tangential` are in m, positive where the
-    cut opens; in space the tangential jump is a length. The bands are half-widths of what is known
-    of a reference, m; empty where nothing says how well the field is known.
+    cut opens; in space the tangential jump is a length. The bands are half-widths of a reference,
+    m; empty where nothing says how well the field is known.
     """
 
     solver: str
@@ -563,7 +563,7 @@ def finest_of(solves: Iterable[SolveRecord]) -> dict[str, SolveRecord]:
 def worst(verdicts: Iterable[Verdict]) -> Verdict:
     """Return the worst of verdicts: FAIL, ERROR, UNDECIDED, PASS; UNDECIDED if there are none.
 
-    A FAIL stands whatever the checks that could not be judged would have said.
+    A FAIL stands whatever the outcome of checks that could not be judged.
     """
     order = (Verdict.PASS, Verdict.UNDECIDED, Verdict.ERROR, Verdict.FAIL)
     return max(verdicts, key=order.index, default=Verdict.UNDECIDED)
@@ -593,7 +593,7 @@ class Standing:
     rank : int or None
         One more than the number of solvers that are certainly better (their intervals lie
         wholly below). None for a solver without a number in some item: its `value` is over fewer
-        items than that of the others.
+        items than the others' values.
     tied : bool
         Whether another has the same rank.
     value, low, high : float or None

@@ -1,9 +1,8 @@
 """The neutral solution that every solver returns, whatever its method.
 
-A `Solution` is a displacement field on a simplicial mesh *of the uncut material
-configuration that conforms to the solver's own realised cut* (nodes doubled on the cut), with
-what the solver did to get there. It says nothing about how good it is: that is measured by
-`verify.compare`, from the `Solution` alone.
+A `Solution` is a displacement field on a simplicial mesh of the uncut material configuration. The
+mesh *conforms to the solver's own realised cut*: nodes are doubled on the cut. It has the solver's
+regularisations too, but nothing about its own accuracy: `verify.compare` measures that.
 
 Stored as one VTU file (mesh, fields) and one JSON file beside it (the rest). The same pair is
 the file exchange for programs that are not written in Python.
@@ -64,8 +63,8 @@ class ContactPressure:
     points : (q, d) float array
         On the realised cut, in the undeformed body, m; of a rule of integration, or nodes.
     weights : (q,) float array
-        Length (in space area) of the cut that each stands for, m or m²; their sum is that of the
-        cuts whose faces may touch.
+        Length (in space area) of the cut that each stands for, m or m²; they add up to the cuts
+        whose faces may touch.
     pressure : (t, q) float array
         At each output time, Pa: positive where faces press, zero where they are apart.
     """
@@ -97,9 +96,8 @@ class Solution:
         The cut as realised: segments (2D) or triangles (3D) by their corner coordinates; of a
         membrane (f, 2, 3).
     cell_sides : (m,) int array
-        Labels of the piece of material that a cell belongs to, as far as the solver knows
-        them (0 away from the cut). Information for pictures; the comparison decides sides by
-        geometry alone.
+        Labels of the piece of material that a cell belongs to, if the solver knows them (0 away
+        from the cut). Information for pictures; the comparison decides sides by geometry alone.
     velocity : (t, n, d) float array, optional
         Nodal velocity in m/s.
     acceleration : (t, n, d) float array, optional
@@ -153,7 +151,7 @@ class Solution:
     contact: ContactPressure | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no solution, so that a wrong solver fails where it hands over, not later.
+        """Refuse a malformed solution, so that a wrong solver fails here, not later.
 
         Raises
         ------
@@ -359,7 +357,7 @@ def _read_contact(entry: Any, dimension: int) -> ContactPressure | None:
 
 
 def _check_record(record: Any, where: str) -> None:
-    """Refuse what is not of this schema, lacks a mandatory key or has an unknown one."""
+    """Refuse a record of another schema, without a mandatory key or with an unknown one."""
     if record.get("schema") != SCHEMA_VERSION:
         raise InputError(f"schema {record.get('schema')!r}; expected {SCHEMA_VERSION}", where)
     if missing := [key for key in _MANDATORY if key not in record]:

@@ -116,8 +116,8 @@ def critical_step(system: System) -> float:
     Raises
     ------
     InputError
-        If there is no mass, or it is singular to round-off (that of a strip much thinner than
-        its elements, if it is not lumped).
+        If there is no mass, or it is singular to round-off: the consistent mass of a strip much
+        thinner than its elements.
     """
     if system.mass is None:
         raise InputError("the scene states no density")

@@ -74,7 +74,7 @@ BY_PAGE = {
     "docs/guide/tutorial.md": "tests/cli/test_tutorial.py"
         "::test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails",
 }  # fmt: skip
-# by their first words; what is no case of the docs is run with another one
+# by their first words; a command whose case is not in the docs is run with another one
 BY_TEST = {
     "verify list": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
     "verify schema": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",

@@ -68,7 +68,7 @@ def test_time_is_compared_at_an_equal_error_between_levels_by_a_power_law():
         solve("conforming", s.level, s.metrics[0].value, seconds=s.timings["solve"]) for s in wide
     ]
     assert "1.00 (0.250–4.00) times" in answers([case("a", *wide, *same)])[3].sentence
-    # what is better on its coarsest level than the other ever is has no time at that error
+    # a solver that is better on its coarsest level than the other ever is has no time there
     better = [solve("conforming", 0, 1e-4, seconds=[1.0])]
     assert (
         "no other solver reaches an equal error" in answers([case("a", *slow, *better)])[3].sentence

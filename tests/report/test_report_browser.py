@@ -12,7 +12,7 @@ from verify.report.rendering import BROWSERS, print_page
 
 pytestmark = pytest.mark.browser
 
-# what is measured is written into the page by a script that is added to a copy of it
+# a script in a copy of the page writes its measurements into it
 PROBE = """<script>addEventListener('load', () => {
   const wide = document.documentElement;
   const left = [...document.querySelectorAll('body *')].filter(e => {

@@ -228,7 +228,7 @@ def result(tmp_path_factory):
 
 @pytest.fixture
 def openings_drawn(result, monkeypatch):
-    """Return the figures of some profiles, and of each panel what is drawn, before it is SVG."""
+    """Return the figures of some profiles, and the curves of each panel before it is SVG."""
 
     def of(*shown):
         panels = []
@@ -290,7 +290,7 @@ def test_missing_and_damaged_solutions_become_notes(tmp_path):
     shown = case_pictures(root, load_run(root).entries[0])
     assert not shown.all
     notes = " ".join(shown.notes)
-    # the rest of each sentence is that of verify.solution
+    # the rest of each sentence is from verify.solution
     assert "No picture of XFEM, level 3: " in notes
     assert "No picture of conforming P1, level 3: " in notes
     assert "stored" in notes

@@ -60,7 +60,7 @@ class Other(Instant):
 
 
 class Straining(Instant):
-    """Stretches as far as it is told."""
+    """Stretches by its parameter."""
 
     choices = MappingProxyType({"way": ("along", "across")})
 

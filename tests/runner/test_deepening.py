@@ -127,7 +127,7 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
     assert 3 < len(levels) <= 6
     assert levels == list(range(len(levels)))
     assert f"reached with {len(levels)} levels" in result["reference"]["suffices_reason"]
-    # again: nothing is solved, and the same is said
+    # again: nothing is solved, and the reason stays
     again = verify(*command)
     assert f"{len(levels) + 1} finished solves of before were reused" in again.stdout
     said = json.loads((verify.folder / "out/cases/slit/result.json").read_text())["reference"]

@@ -26,7 +26,7 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
         assert (records[name, 0]["status"], records[name, 0]["reason"]) == (status, reason)
     assert records["Instant", 0]["status"] == records["Instant", 1]["status"] == "solved"
     assert done.returncode == 3
-    # the log keeps what the solver said
+    # the log keeps the output of the solver
     log = verify.folder / "out/cases/square/fake_solvers_Raising-0/log.txt"
     assert "Traceback" in log.read_text()
     result = json.loads((verify.folder / "out/cases/square/result.json").read_text())

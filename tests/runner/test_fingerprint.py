@@ -109,7 +109,7 @@ def test_a_reference_depends_on_no_method_and_no_comparison(sources):
 
 
 def test_a_program_that_changes_is_run_again(sources):
-    """A stored answer of Kratos is not that of another program, nor of other versions of it."""
+    """A stored answer of Kratos is not used for another program, nor for other versions of it."""
     folder = "verify.foreign.programs"
     found = sources.closure(f"{folder}.kratos.program")
     assert {f"{folder}.motion", f"{folder}.exchange_files"} <= found

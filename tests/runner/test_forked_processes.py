@@ -126,7 +126,7 @@ def test_the_server_has_started_neither_threads_nor_mpi_and_has_one_thread(solve
 
 def test_memory_is_that_of_the_process_alone(solved):
     child, _ = solved("memory", body="x = np.ones(50_000_000); time.sleep(1)")
-    assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and what is imported
+    assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and imported modules
 
 
 def test_all_of_them_die_with_the_runner(prepared):

@@ -24,7 +24,7 @@ ASKED = {
     "RaisingRefusal": "SystemExit: not today",
     "Blaming": "body.msh: its mesh has a hole",
 }
-# of solvers that are compared: how they end, and what is said of them
+# of solvers that are compared: status and reason
 COMPARED = dict.fromkeys(("Large", "TinySize", "Twice", "FarAway", "Needle"), (Status.SOLVED, ""))
 PROCESSES = {
     "Elsewhere": (Status.SOLVED, ""),

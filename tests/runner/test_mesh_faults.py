@@ -192,7 +192,7 @@ def test_sheets_that_cross_are_refused(tmp_path):
 
 @pytest.mark.parametrize("kind, count", [("plane", 2), ("space", 16), ("membrane", 2)])
 def test_hanging_nodes_are_counted(tmp_path, kind, count):
-    """Of 3 and 5 nodes along an edge (9 and 25 on a face) those of the finer side hang."""
+    """Of 3 and 5 nodes along an edge (9 and 25 on a face) the nodes of the finer side hang."""
     coarse, fine = body(kind, 2, -1.0, 0.0), body(kind, 4)
     for points, _ in (coarse, fine):
         if kind == "membrane":

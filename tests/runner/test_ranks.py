@@ -74,7 +74,7 @@ def test_two_ranks_give_the_answer_of_one_and_say_so(verify, monkeypatch):
     one = find_solver("reference").solve(load_scene(verify.folder / "box.toml"), 1, 0)
     two = read_solution(verify.folder / "out/cases/box/reference-1/solution")
     assert two.ledger["strain"] == pytest.approx(one.ledger["strain"], rel=1e-10)
-    # the nodes are numbered otherwise, and those of both faces share their place
+    # the nodes are numbered otherwise, and nodes of both faces share their place
     rows = [np.hstack([f.points, f.displacement[-1]]).round(8) for f in (one, two)]
     order = [np.lexsort(row.T[::-1]) for row in rows]
     difference = one.displacement[-1][order[0]] - two.displacement[-1][order[1]]

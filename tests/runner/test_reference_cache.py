@@ -1,4 +1,4 @@
-"""A reference is solved once per content; what is damaged or of other content is never used."""
+"""A reference is solved once per content; a damaged one, or one of other content, is not used."""
 
 import io
 import json
@@ -231,7 +231,7 @@ def test_the_bundle_beside_a_case_judges_until_the_case_changes(scene, kept, tmp
     assert plan.job_of("reference", 2).key == bundle.key(scene, 2)
     assert plan_case(scene, replace(options, cache=None), {}, directory).bundle is None  # solved
     other = replace(options, parameters={"reference": {"opening": "late"}})
-    assert plan_case(scene, other, {}, directory).bundle is None  # not what is stored
+    assert plan_case(scene, other, {}, directory).bundle is None  # other than the stored ones
     scene.file.write_text(scene.file.read_text().replace("young = 1.0", "young = 2.0"))
     assert references.bundle_of_case(load_scene(scene.file)) is None
     beside.write_text("no bundle")

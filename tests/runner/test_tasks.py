@@ -17,7 +17,7 @@ from verify.runner.tasks import Failure, Limits, Task, made
 
 @dataclass(frozen=True)
 class Product:
-    """What is found."""
+    """The result of a task."""
 
     value: float
     of: tuple[int, int]
@@ -49,7 +49,7 @@ def asked(log):
 
 @pytest.fixture
 def found_by_name(monkeypatch):
-    """A process finds this module by its name, as it does those of the project."""
+    """A process finds this module by its name, as modules of the project."""
     here = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
     monkeypatch.setenv("PYTHONPATH", here)
     monkeypatch.setattr(tasks, "code_digest", lambda *modules: "this code")
@@ -63,7 +63,7 @@ def products(log, numbers=(2, 0, 5)):
 
 @pytest.fixture
 def guest(monkeypatch, found_by_name):
-    """Each in a fresh process: what is forked has its path from the server."""
+    """Each in a fresh process: a forked one has the path of the server."""
     monkeypatch.setattr(tasks, "code_of_solver", lambda name: name)
     monkeypatch.setattr(tasks, "find_solver", lambda name: name)
 
@@ -78,7 +78,7 @@ def test_every_call_is_answered_in_order_and_made_once(tmp_path, guest, monkeypa
     assert [one[0].value for one in again] == [15.0, 6.0, 21.0]
     assert sorted(asked(log)) == [0, 2, 5, 7]
     kept = {path.name.split("-")[0] for path in (tmp_path / "kept").iterdir()}
-    assert len(kept) == 3  # what is no longer asked is gone
+    assert len(kept) == 3  # other tasks are gone
     monkeypatch.setattr(tasks, "code_digest", lambda *modules: "other code")
     made(products(log, (2,)), tmp_path / "kept")
     assert sorted(asked(log)) == [0, 2, 2, 5, 7]

@@ -17,7 +17,7 @@ def gradients(corners):
 
 
 def parts(corners, heights):
-    """Volume and centroid of what is above a plane: corners (4, 3), heights over the plane (4,)."""
+    """Volume and centroid above a plane: corners (4, 3), heights over the plane (4,)."""
     above = np.flatnonzero(heights > 0.0)
     below = np.flatnonzero(heights <= 0.0)
 

@@ -1,4 +1,4 @@
-"""Loads and supports that vary in space, said by formulas in the case."""
+"""Loads and supports that vary in space, by formulas in the case."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bodies of files that people have: their groups, kinds of cells, units; and what is no body."""
+"""Bodies of files that people have: their groups, kinds of cells, units; and refused files."""
 
 import itertools
 import json
@@ -195,7 +195,7 @@ def expected(points, cells, hard, ends, turn):
      ("gmsh", 6), ("vtk", 7), ("medit", 8), ("xdmf", 9)],
 )  # fmt: skip
 def test_groups_of_ten_files_give_the_energy_of_an_independent_program(tmp_path, form, seed):
-    """Materials by groups of cells, clamps by groups of facets; 1e-9 is that of both solves."""
+    """Materials by groups of cells, clamps by groups of facets; 1e-9 is of both solves."""
     points, cells, hard, ends, turn = block(seed)
     file, names = write(tmp_path, form, points @ turn, cells, hard, ends)
     scene = case(tmp_path, file, turn, *names)
@@ -495,7 +495,7 @@ def test_a_closed_surface_says_that_it_has_no_rim(tmp_path, capsys):
 
 @pytest.mark.parametrize("solver", ["xfem", "conforming"])
 def test_a_closed_surface_is_held_at_a_group_of_its_triangles_or_nodes(tmp_path, solver):
-    """A bag that falls: what is in the group stands still, on both sides of a cut through it."""
+    """A bag that falls: its group stands still, on both sides of a cut through it."""
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
     points, cells, _, _, turn = block(0)
@@ -572,7 +572,7 @@ def test_a_spoilt_file_gives_one_line(tmp_path, capsys, monkeypatch, form):
 
 
 def test_guests_get_groups_and_metres(tmp_path):
-    """What is exported is in metres, with a material for each cell and the nodes of each clamp."""
+    """The export is in metres, with a material for each cell and the nodes of each clamp."""
     points, cells, hard, ends, turn = block(2)
     file, names = write(tmp_path, "gmsh22", 1000.0 * points @ turn, cells, hard, ends)
     scene = case(tmp_path, file, turn, *names, geometry="scale = 1e-3")

@@ -56,7 +56,7 @@ def body(d, seed, count):
 
 
 def cut_across(d, turn, middle=0.47, reach=3.0):
-    """An inclined line, or plane, across the unit square or cube; or as far as x = `reach`."""
+    """An inclined line, or plane, across the unit square or cube; or up to x = `reach`."""
     begin, end = [-1.0, middle - 0.2], [reach, middle + 0.13 * reach]
     if d == 2:
         return f'kind = "polyline"\npoints = {(np.array([begin, end]) @ turn).tolist()}'
@@ -108,7 +108,7 @@ def test_body_and_groups_keep_their_measure_and_cells_their_shape(tmp_path, d):
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_energy_under_a_load_rises_with_every_level(tmp_path, d):
-    """Their spaces are nested, cut or not (Rayleigh, Ritz); either part reaches what is held."""
+    """Their spaces are nested, cut or not (Rayleigh, Ritz); either part reaches the support."""
     mesh = body(d, 5, 3 if d == 2 else 2)
     load = REGION + f'[[loads]]\nkind = "gravity"\nacceleration = {[3.0, 5.0, -9.81][:d]}\n'
     scene = case(tmp_path, d, mesh, cut_across(d, mesh[-1]), refine=5 - d, more=load)
@@ -185,7 +185,7 @@ def test_refinement_belongs_to_a_given_mesh(tmp_path):
 
 @pytest.mark.fenicsx
 def test_at_a_tip_energies_are_of_first_order_against_a_graded_reference(tmp_path):
-    """λ = ½: the energy of uniform meshes falls short by O(h), that of graded P2 by far less.
+    """λ = ½: the energy of uniform meshes falls short by O(h), of graded P2 by far less.
 
     Ends of the support (λ about 0.7) matter less from level to level.
     """
@@ -211,7 +211,7 @@ def test_where_a_body_turns_in_the_interval_covers_the_value_of_another_mesh(tmp
     """An L, turned, with a cut that ends in an arm: the reference is graded to its inner corner.
 
     A body described by its corners is meshed and graded anew. Graded to the tip of the cut alone,
-    the energy was said to 1.2e-3, and 3.4e-3 off.
+    the stated half-width was 1.2e-3, and the energy 3.4e-3 off.
     """
     pytest.importorskip("dolfinx_solver")
     mesh = rectangle_mesh((8, 8), (0.0, 0.0), (1.0, 1.0))

@@ -89,7 +89,7 @@ def test_areas_of_the_triangulations_are_those_of_the_cuts():
 @given(seed=st.integers(0, 10**6), corners=st.integers(3, 12))
 @settings(max_examples=50, deadline=None)
 def test_a_star_shaped_polygon_is_triangulated_without_overlap(seed, corners):
-    """All triangles turn the same way and their areas add up to that of the polygon."""
+    """All triangles turn the same way and their areas add up to the polygon's."""
     rng = np.random.default_rng(seed)
     angle = 2 * np.pi * (np.arange(corners) + rng.uniform(0.1, 0.9, corners)) / corners
     plane = rng.uniform(0.2, 1.0, (corners, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])

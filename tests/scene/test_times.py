@@ -36,7 +36,7 @@ def test_output_times_are_evenly_spaced_and_eleven_unless_said_otherwise(tmp_pat
     [(0.0, 1.0, 0.0), (1.0, 1.0, 2.0), (1.25, 1.5, 2.0), (2.0, -1.0, 0.0), (3.0, -1.0, 0.0)],
 )
 def test_a_history_is_linear_between_its_times_and_constant_outside(time, factor, slope):
-    """After a jump (at 2) the new factor holds; the rate is that of what follows."""
+    """After a jump (at 2) the new factor holds; the rate is the one after it."""
     history = [(1.0, 1.0), (2.0, 3.0), (2.0, -1.0)]
     assert (factor_at(history, time), slope_at(history, time)) == (factor, slope)
     assert (first_factor(history), jumps(history)) == (1.0, [2.0])

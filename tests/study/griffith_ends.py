@@ -42,13 +42,12 @@ def crack_scene(ends, angle, mesh):
 
 @dataclass(frozen=True)
 class Off:
-    """What an answer is off by.
+    """Errors of an answer.
 
-    `error` is that of the displacement in L2, relative; `ends` (2, 2) the places of both ends of
-    the crack whose displacement it has, from those of the true crack in elements, by modes, fitted
-    in L2; `rest` what of the error is left; `released` the same number of elements from the energy
-    alone, the sum of both ends: with the outline held, dU/da = −G. `realised` says how the ends
-    are realised, at the end of the crack first.
+    `error` is relative, of the displacement in L2. The answer belongs to a crack with other ends:
+    `ends` (2, 2) is their shift in elements, by modes, fitted in L2, and `rest` the error that is
+    left. `released` is the shift from the energy alone, the sum of both ends: with the outline
+    held, dU/da = −G. `realised` is the realised shift, at the end of the crack first.
     """
 
     error: float
@@ -77,7 +76,7 @@ class Crack:
         )
         self._energy = self.exact.strain_energy(scene)
         k = np.array(self.exact.stress_intensity)
-        self.modes = k**2 / (k @ k)  # shares of both modes in what is released
+        self.modes = k**2 / (k @ k)  # shares of both modes in the release
         self._release = (1 - scene.material.poisson**2) / scene.material.young * (k @ k)
 
     def _norm(self, field):

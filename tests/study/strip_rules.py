@@ -2,7 +2,7 @@
 
 |x| < 3, 0 < y < 1, b = w₀ = μ = ρ = 1: c = 1, and G = ½ of the half model. Linear triangles on
 squares of 1/n. Nodes of y = 0 are held at 0 ahead of the tip. A rule releases a node at x when the
-tip is at x + begin·h and lets its reaction, inertia included, fall to zero until x + end·h.
+tip is at x + begin·h. Its reaction, inertia included, falls to zero until x + end·h.
 
 ``python tests/study/strip_rules.py docs/images/opening-rules.svg`` draws φ, the work of the
 reactions over G, against the speed (16 elements across; a quarter of a minute).

@@ -95,7 +95,7 @@ def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_
     energy = parts(study, "strain_energy")
     total = energy.pop("total")
     assert sum(energy.values()) == pytest.approx(total, rel=1e-10)
-    assert energy[CUT] > 0.9 * total  # relative to what is released by the larger crack
+    assert energy[CUT] > 0.9 * total  # relative to the release of the larger crack
 
 
 PLANE = {

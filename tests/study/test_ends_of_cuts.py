@@ -75,7 +75,7 @@ def test_the_derivative_by_an_end_is_held_at_the_outline_and_singular_as_the_cra
     points = tip + 1e-4 * around
     wanted = (advanced(step).displacement(points) - advanced(-step).displacement(points)) / step / 2
     found = first.displacement(points) + second.displacement(points)
-    # what is regular there is smaller by the root of 1e-4
+    # regular terms are smaller there by the root of 1e-4
     assert np.abs(found - wanted).max() < 0.02 * np.abs(wanted).max()
 
 
@@ -147,7 +147,7 @@ MESHES = {"structured": {"cells": [[16, 16]]}, "unstructured": {"sizes": [0.25]}
 
 
 def ratios(crack, conforming):
-    """Errors in L2 and in energy over those of the conforming mesh."""
+    """Errors in L2 and in energy over the conforming mesh's."""
     found = crack.solve("xfem", tip="partial")
     energy = np.sqrt(found.released / conforming.released)  # the held outline: E_h − E = ‖e‖²
     return found.error / conforming.error, energy

@@ -36,7 +36,7 @@ class Halving:
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """The rows of its table and what it said; and where it is kept."""
+    """The rows of its table, its output, and its folder."""
     folder, said = tmp_path_factory.mktemp("halving"), io.StringIO()
     (folder / "halving.py").write_text(textwrap.dedent(SOLVER))
     words = ["study", "iterations", "dynamics/block_falls_apart", "--solver", "halving:Halving"]

@@ -1,12 +1,12 @@
 """Change of the displacement of a body with a straight crack when an end of it advances.
 
-With the displacement of the outline held, du/da of an end is the field that vanishes on the
-outline, frees the faces of the crack from traction and grows like r^-1/2 at that end: Bueckner's
-weight function. In the complex potentials of Griffith's crack, R = √(z−a) √(z+a),
+The displacement of the outline is held. du/da of an end is then Bueckner's weight function: it
+vanishes on the outline, leaves the faces free of traction and grows like r^-1/2 at that end.
+In the complex potentials of Griffith's crack, R = √(z−a) √(z+a),
 
     φ = R (c/(z − e) + P) + Q,    ω = R (c/(z − e) + P) − Q,
 
-where e is the end, c follows from dR/de, and the polynomials P and Q undo the values of the first
+where e is the end and c follows from dR/de. The polynomials P and Q undo the values of the first
 term on the outline, by least squares. Nothing of it is finite elements.
 """
 

@@ -35,7 +35,7 @@ DIVISIONS = {2: 16, 3: 6}
 MOVED = 0.2  # of an element
 ADVANCE = 1 / 8  # elements per step of a moving tip
 STEPS = 16
-TOLERANCE = 0.25  # of an error above that of `inside`, in any scene
+TOLERANCE = 0.25  # of an error above the error of `inside`, in any scene
 NU, YOUNG = 0.3, 1.0
 
 
@@ -418,7 +418,7 @@ def interval(logs, seed=0, draws=10000):
 
 
 def weighed(rows, dimension):
-    """Work of each rule at equal error over that of `inside`: of solves, of explicit motions."""
+    """Work of each rule at equal error over the work of `inside`: solves, explicit motions."""
     found = {}
     for rule in RULES[dimension]:
         errors = np.log([row.error[rule] / row.error["inside"] for row in rows])
@@ -460,7 +460,7 @@ def parts(rule, dimension, before=0.3):
 
 
 def rows_of(scenes, quick, dimension):
-    """Measure scenes, and print each as a row of a table, then what is weighed."""
+    """Measure scenes, and print each as a row of a table, then the weighed work."""
     rules = RULES[dimension]
     print(f"| scene | {' | '.join(f'{key} {rule}' for key in 'es' for rule in rules)} |")
     rows = []

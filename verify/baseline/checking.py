@@ -255,7 +255,7 @@ def meaning_lines(old: FinishedRun, new: FinishedRun) -> Iterator[str]:
 
 
 def _checks(result: CaseResult | None) -> dict[str, VerdictRecord]:
-    """Verdicts by what is checked; a check that a case makes twice is numbered."""
+    """Verdicts by check; a check that a case makes twice is numbered."""
     if result is None:
         return {}
     found, times = {}, Counter[str]()

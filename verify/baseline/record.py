@@ -1,4 +1,4 @@
-"""What is kept of a run: the file of a baseline, and a finished run as a baseline reads it.
+"""The file of a baseline, and a finished run as a baseline reads it.
 
 The file is JSON, sorted, made to be committed and read in a review.
 """
@@ -59,7 +59,7 @@ class Quantity(Strict):
 
 
 class Speed(_From):
-    """Time of a solve over that of the calibration kernel in the same process."""
+    """Time of a solve over the time of the calibration kernel in the same process."""
 
     ratio: Positive
     spread: NonNegative = Field(description="relative half-width of `ratio`")

@@ -47,7 +47,7 @@ class Move:
 def update_from(
     baseline: Baseline, run: FinishedRun, only: Sequence[str]
 ) -> tuple[Baseline, list[Move]]:
-    """Move the own values named in `only` to those of `run`.
+    """Move the own values named in `only` to the values of `run`.
 
     Parameters
     ----------
@@ -159,9 +159,8 @@ def _refused(case: str, key: str, entry: CaseBaseline, why: str) -> Move:
 def save_run(baseline: Baseline, run: FinishedRun) -> tuple[Baseline, list[str]]:
     """Add the cases, quantities and speeds of `run` that `baseline` does not have.
 
-    The independent axis is filled from what the case states (a value with its source, or a
-    bound of the error) and from the run's reference; its tolerance is never taken from what
-    was measured.
+    The independent axis is filled from the case (a value with its source, or a bound of the error)
+    and from the run's reference. Its tolerance is never taken from a measurement.
 
     Returns
     -------

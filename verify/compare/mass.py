@@ -21,9 +21,9 @@ from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
 from verify.compiled import COMPILED, njit
 from verify.errors import InputError
-from verify.handed_over import CONSISTENT
 from verify.scene import Scene
 from verify.solution import Solution
+from verify.solution_checks import CONSISTENT
 
 Array = NDArray[np.float64]
 

@@ -23,10 +23,10 @@ from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places
 from reference.nodal_algebra import facing_nodes, lasting_ties
 from reference.space import ConformingSpace, conforming_space
-from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import ContactPressure
+from verify.solution_checks import CONSISTENT
 from verify.solvers.runs import (
     LedgerRows,
     Record,

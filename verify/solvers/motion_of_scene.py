@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.handed_over import CONSISTENT
 from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import Regularisation
+from verify.solution_checks import CONSISTENT
 from verify.solvers.body_of_scene import Openings, density_of, material_of
 from verify.solvers.runs import (
     LedgerRows,

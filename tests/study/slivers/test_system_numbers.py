@@ -164,7 +164,7 @@ def test_a_system_has_the_mass_of_the_body_and_no_stiffness_against_translation(
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_all_solvers_have_the_same_stiffness_without_a_cut(name, scene):
-    """One mesh, one element: the condition number, which no numbering changes, is that of xfem."""
+    """One mesh, one element: the condition number, which no numbering changes, is the same."""
     uncut = scene.model_copy(update={"cuts": []})
     found = condition_numbers(find_solver(name).system(uncut, 0))
     assert found == pytest.approx(condition_numbers(find_solver("xfem").system(uncut, 0)), rel=1e-9)

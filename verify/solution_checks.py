@@ -1,7 +1,7 @@
 """Checks of a solution as its solver returns it, so that a malformed one fails there, not later.
 
-Shapes, types, and numbers that mean nothing: what is not finite, or so large that its square is
-not; sizes and times below zero. Whether an answer is right is not asked here.
+Shapes, types, and numbers that mean nothing: not finite, or so large that their squares are not;
+sizes and times below zero. Whether an answer is right is not asked here.
 
 The mass that a solver moves with, on the nodes of its solution, is none, a word, a vector or a
 matrix. `CONSISTENT` says that it is ∫ρ N_i N_j of the solution's own field. A vector has the mass
