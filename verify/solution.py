@@ -17,7 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.checked_solution import (
+from verify.errors import InputError
+from verify.files import read_json, whole_file, write_whole
+from verify.read_mesh import read_with_meshio
+from verify.result import Regularisation
+from verify.solution_checks import (
     check_accounts,
     check_cells,
     check_field,
@@ -26,10 +30,6 @@ from verify.checked_solution import (
     plain_mass,
     restored_mass,
 )
-from verify.errors import InputError
-from verify.files import read_json, whole_file, write_whole
-from verify.read_mesh import read_with_meshio
-from verify.result import Regularisation
 
 __all__ = [
     "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "checked_solution",
