@@ -131,7 +131,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
 
 
 def _conforms(solution: Any, scene: Any, level: int) -> bool:
-    """Whether the unknowns are those of the answer's nodes, and its facets carry the cut.
+    """Whether the unknowns sit on the nodes of the answer, and its facets carry the cut.
 
     A cut along faces of the background mesh needs no other one. Time that nobody would pay there
     is charged to nobody.
