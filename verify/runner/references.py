@@ -332,8 +332,9 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
 
 def _packed(entry: Entry, folder: Path) -> tuple[Entry, bytes]:
     """Files of an entry in one compressed archive, fields rounded; the same give the same bytes."""
-    solution, packed, digests = read_solution(folder / "solution"), io.BytesIO(), {}
-    fields = {
+    solution, packed = read_solution(folder / "solution"), io.BytesIO()
+    digests: dict[str, str] = {}
+    fields: dict[str, Any] = {
         name: _rounded(values)
         for name in ("displacement", "velocity", "acceleration")
         if (values := getattr(solution, name)) is not None
