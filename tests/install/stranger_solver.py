@@ -87,10 +87,10 @@ class Body:
         opens = self._opens_at(scene.cuts[0])
         tied = opens > 0.0
         u = self.rest(self._ties(tied))["displacement"].ravel()
-        v, time, kept, solver = np.zeros_like(u), 0.0, [], None
+        v, kept, solver = np.zeros_like(u), [], None
         outputs = np.asarray(scene.analysis.output_times)
-        for k in range(round(outputs[-1] / step) + 1):
-            time = k * step
+        for k in range(round(outputs[-1] / scene.analysis.time_step) + 1):
+            time = k * scene.analysis.time_step
             if solver is None or (tied & (opens <= time)).any():
                 tied = tied & (opens > time)
                 free = _free(self._ties(tied), self.held)
