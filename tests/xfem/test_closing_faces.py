@@ -264,6 +264,38 @@ def test_a_closed_inclined_crack_slides_under_uniform_pressure():
     assert (rates > 0.8).all()  # its ends are within an element
 
 
+def test_faces_that_slide_along_a_circle_bear_the_pressure_as_if_they_did_not():
+    # All of the plate is under pressure P, and its disc is turned besides. Along the circle the
+    # faces slide by s = turn R and do not part, so nothing changes. With normals of facets s reads
+    # as a gap of s h/R from facet to facet, a pressure of M s/R = P here whatever the mesh.
+    lam, shear = NU / ((1.0 + NU) * (1.0 - 2.0 * NU)), SHEAR
+    turn, centre, radius = P / (lam + 2.0 * shear), np.array([0.52, 0.49]), 0.3
+    angles = np.linspace(0.0, 2.0 * np.pi, 6000)
+    circle = xfem.Polyline(centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    found = []
+    for n in (14, 28, 56):
+        mesh = grid(2, n)
+        phantom = xfem.cut_mesh(mesh, [circle])
+        x = phantom.node_points - centre
+        inside = np.linalg.norm(phantom.node_piece_points - centre, axis=1) < radius
+        exact = -P / (2.0 * (lam + shear)) * x
+        exact += np.where(inside[:, None], turn * np.stack([-x[:, 1], x[:, 0]], axis=1), 0.0)
+        held = np.linalg.norm(x, axis=1) < 0.4 * radius
+        outer = np.zeros(len(mesh.points), dtype=bool)
+        outer[boundary_nodes(mesh)] = True
+        fixed = np.repeat((held | outer[phantom.node_parent])[:, None], 2, axis=1)
+        faces = ClosingFaces(phantom, material(2), [circle])
+        force = xfem.InternalForce(phantom, material(2), "linear")
+        answer = solve_closed(force, faces, xfem.Supports(fixed, np.where(fixed, exact, 0.0)))
+        # it is this that normals of facets would take for gaps
+        taken = faces.stiffness[:, None] * faces.slid(answer.displacement)
+        assert np.abs(taken).max() > P
+        found.append(misses(faces, answer.pressure, np.full_like(answer.pressure, P))[0])
+    # differences over a step of h/4 leave a gap of s (h/4R)², a pressure of M s h/16R²
+    assert found[0] > 1.5 * found[1] > 1.5**2 * found[2]
+    assert found[2] < 1.0 / (16 * 56 * radius)
+
+
 def test_a_ring_cut_along_a_circle_has_the_pressure_of_lame():
     # u_r = A r + B/r about a centre outside of the body; its cut is a curve
     centre, radius = np.array([-0.3, -0.4]), 1.1
@@ -343,7 +375,7 @@ def test_any_cuts_and_any_movement_of_the_boundary_find_a_balance(seed):
     # where faces press, γ times the overlap is what the pressure is beyond the mean stress
     stress = np.einsum("fid,fid->f", faces.stress, found.displacement[faces.nodes])
     gap = np.einsum("fqid,fid->fq", faces.gap, found.displacement[faces.nodes])
-    trial = stress[:, None] + faces.stiffness[:, None] * gap
+    trial = stress[:, None] + faces.stiffness[:, None] * (gap + faces.slide)
     assert np.abs(found.pressure - np.maximum(0.0, -trial)).max() < 1e-12
 
 

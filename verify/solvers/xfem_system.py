@@ -19,7 +19,7 @@ from verify.methods.mass_variants import (
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
 from verify.scene.physics import factor_at, first_factor
 from verify.solution import ContactPressure
-from verify.solvers.body_of_scene import density_of, material_of
+from verify.solvers.body_of_scene import cuts_of, density_of, material_of
 from verify.solvers.boundary_conditions import (
     forces_of,
     is_moving,
@@ -52,6 +52,7 @@ from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]
+_FINE = 0.1  # of an element: arcs are sampled so for their normals
 
 
 def elasticity_of(
@@ -99,7 +100,9 @@ def faces_of(
         raise UnsupportedSceneError(
             "contact of the faces of a cut is for slivers = 'keep' or 'drop': it needs no others"
         )
-    return ClosingFaces(phantom, material_of(scene, phantom.mesh), moving)
+    mesh = phantom.mesh
+    cuts = cuts_of(scene, _FINE * float(mesh.measures.mean()) ** (1.0 / mesh.dim))
+    return ClosingFaces(phantom, material_of(scene, mesh), cuts, moving)
 
 
 def contact_of(faces: ClosingFaces, displacements: Iterable[_Floats]) -> ContactPressure:

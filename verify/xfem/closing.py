@@ -28,6 +28,11 @@ J is convex and quadratic in parts. Its second derivative is at most the one wit
 correction by the latter lowers J without a search. Newton's method takes it where its own does not
 lead down: J always falls, and no set of touching faces comes twice in a circle.
 
+Along a curved cut g is measured by the normals of the cut as asked: a slip s across flat facets
+would read as a gap of s h/R. Forces keep the normals of facets, so that a pressure from all sides
+stays in equilibrium. The difference is a given gap in J, and is corrected from solution to
+solution.
+
 In motion σ is left out, and the energy is the penalty ∫ γ [g]₋²/2 dS, with a γ five times as
 large. It is never negative, so kinetic and strain energy never exceed the initial ones. Its force
 is taken at the end of a step, whatever the scheme takes of the others. As the energy is convex, the
@@ -36,6 +41,7 @@ force of the middle would lose nothing. But the pressure of bars that meet would
 times its value and back from step to step.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +57,7 @@ from verify.xfem.arrays import (
     finite_array,
 )
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, pattern_places
+from verify.xfem.cuts import Cut
 from verify.xfem.element import Material
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads_and_supports import Supports, check_bodies, simplex_rule
@@ -63,6 +70,7 @@ FIRMNESS = 10.0  # in place of c where σ is left out: right triangles overlap b
 # share of the largest facet: smaller ones rim pieces of round-off size that the others have taken,
 # along faces of cells and not along the cut
 _RIM = 1e-7
+_SMOOTH = np.cos(np.pi / 6.0)  # a resolved arc turns by at most half a radian from facet to facet
 
 
 class ClosingFaces:
@@ -72,6 +80,8 @@ class ClosingFaces:
     ----------
     phantom : PhantomMesh
     material : Material
+    cuts : sequence of Cut
+        As asked; the normals of curved ones. Without them, and in motion, those of facets serve.
     moving : bool
         Whether the energy is a penalty, without σ; see the docstring of the module.
 
@@ -87,6 +97,8 @@ class ClosingFaces:
         γ, in Pa/m.
     points : (f, q, d) float array
         Quadrature points, in metres.
+    slide : (f, q) float array
+        Gap given beside the normal jump, in metres; see the docstring of the module.
     weights : (f, q) float array
         In m^(d − 1).
 
@@ -96,7 +108,13 @@ class ClosingFaces:
         If cells are aggregated, the body is a membrane, or its law not Hooke's.
     """
 
-    def __init__(self, phantom: PhantomMesh, material: Material, moving: bool = False) -> None:
+    def __init__(
+        self,
+        phantom: PhantomMesh,
+        material: Material,
+        cuts: Sequence[Cut] = (),
+        moving: bool = False,
+    ) -> None:
         if phantom.aggregation is not None or phantom.mesh.is_membrane or material.law != "hooke":
             raise XfemError(
                 "contact of a body with aggregated cells, of a membrane or of another law than "
@@ -136,6 +154,9 @@ class ClosingFaces:
         shapes[..., 0] += 1.0
         shapes[:, :, 0] *= -1.0
         self.gap = _flat(shapes[..., None] * normal[:, None], 2)
+        step = 0.25 * largest ** (1.0 / (mesh.dim - 1))
+        smooth = _curved(normal[:, 0, 0], self.points, step, cuts)
+        turned = _flat(shapes[..., None] * (smooth[:, :, None, None] - normal[:, None]), 2)
         self.nodes: Ints = np.concatenate(list(phantom.cells[pieces.T]), axis=1)
         self.stiffness = (
             (FIRMNESS if moving else STABILITY)
@@ -148,6 +169,8 @@ class ClosingFaces:
         self._trial = self._of_nodes(self._rows)
         self._mean = self._of_nodes(self.stress[:, None])
         self._turned = self._trial.T.tocsr(), self._mean.T.tocsr()
+        self._bend = None if moving else self._of_nodes(turned)
+        self.slide: Floats = np.zeros(self.weights.shape)
         self._entries: tuple[BlockPattern, csc_array, Floats] | None = None
 
     def _of_nodes(self, rows: Floats) -> csr_array:
@@ -169,7 +192,14 @@ class ClosingFaces:
 
     def trial_stress(self, displacement: Floats) -> Floats:
         """σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
-        return (self._trial @ displacement.ravel()).reshape(self.weights.shape)
+        trial = (self._trial @ displacement.ravel()).reshape(self.weights.shape)
+        return trial + self.stiffness[:, None] * self.slide
+
+    def slid(self, displacement: Floats) -> Floats:
+        """Gap (f, q) in metres by which curved faces open as they slide; see `slide`."""
+        if self._bend is None:
+            return self.slide
+        return (self._bend @ displacement.ravel()).reshape(self.weights.shape)
 
     def pressure(self, displacement: Floats) -> Floats:
         """Pressure (f, q) between the faces in pascal; zero where they are apart."""
@@ -248,6 +278,28 @@ def _normals(corners: Floats) -> tuple[Floats, Floats]:
     return normal / np.maximum(size, np.finfo(float).tiny)[:, None], share * size
 
 
+def _curved(flat: Floats, points: Floats, step: Floats, cuts: Sequence[Cut]) -> Floats:
+    """Find normals (f, q, d) of the cuts themselves at points (f, q, d) of their facets.
+
+    They are differences of the distance over a `step` (f,) each way. A facet that lies beside no
+    cut, or across a bend, keeps its own normal (f, d).
+    """
+    kept = np.broadcast_to(flat[:, None], points.shape)
+    if not cuts or not len(flat):
+        return kept
+    middles = points.mean(axis=1)
+    cut = np.argmin([np.abs(one.level_set(middles)) for one in cuts], axis=0)
+    ways = step[:, None, None, None] * np.eye(points.shape[2])  # (f, 1, d, d)
+    found = np.empty(points.shape)
+    for k, one in enumerate(cuts):
+        ends = (points[:, :, None] + sign * ways for sign in (1.0, -1.0))
+        ahead, behind = (one.level_set(end[cut == k].reshape(-1, points.shape[2])) for end in ends)
+        found[cut == k] = (ahead - behind).reshape(-1, *points.shape[1:])
+    found /= np.linalg.norm(found, axis=2).clip(np.finfo(float).tiny)[..., None]
+    turned = np.einsum("fqd,fd->fq", found, flat)[..., None]
+    return np.where(np.abs(turned) > _SMOOTH, np.sign(turned) * found, kept)
+
+
 def _faces_of_pieces(parts: Ints) -> Ints:
     """Most of the faces that one of the two pieces (f, 2) of each facet has; a face is a pair."""
     pairs, which = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
@@ -282,6 +334,7 @@ class ClosedSolution(NamedTuple):
 
 
 _ITERATIONS = 100
+_SLIDES, _SETTLED = 60, 1e-6  # corrections of curved faces; share of the pressure
 _TOLERANCE = 1e-12  # of the residual, over the largest force
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises (Armijo)
 _UNSEEN = 1e-13  # of the energy: a fall that round-off hides
@@ -325,6 +378,22 @@ class _Closing:
         force += self.faces.force(values, tied=True)
         residual = np.where(self.fixed, 0.0, self.load - force)
         return values + self.correction(residual, np.ones(self.faces.weights.shape))
+
+    def solved(self, u: Floats) -> Floats:
+        """Minimise J from a displacement (N, d), with the faces slid as they are."""
+        for _ in range(_ITERATIONS):
+            residual, scale = self.residual(u)
+            now = self.faces.touching(u)
+            if np.abs(residual).max() <= _TOLERANCE * scale:
+                return u
+            u, whole = self.next(u, residual, now)
+            if whole and np.array_equal(now, self.faces.touching(u)):
+                return u
+        left = np.abs(residual).max()
+        raise NotConvergedError(
+            f"contact not found in {_ITERATIONS} iterations: unbalanced force {left:.3g} N against "
+            f"forces of {scale:.3g} N. Expected faces or supports that hold every part"
+        )
 
     def next(self, u: Floats, residual: Floats, touching: Bools) -> tuple[Floats, bool]:
         """Lower the energy; and whether by the whole of Newton's correction."""
@@ -407,20 +476,18 @@ def solve_closed(
     given = finite_array(np.zeros(shape) if load is None else load, "load", shape)
     check_bodies(force.phantom, supports, (faces.nodes, faces.gap))
     newton = _Closing(force, faces, supports, given)
+    faces.slide = np.zeros(faces.weights.shape)
     u = newton.tied(supports.values)
-    for _ in range(_ITERATIONS):
-        residual, scale = newton.residual(u)
-        now = faces.touching(u)
-        if np.abs(residual).max() <= _TOLERANCE * scale:
-            break
-        u, whole = newton.next(u, residual, now)
-        if whole and np.array_equal(now, faces.touching(u)):
+    for _ in range(_SLIDES):
+        u = newton.solved(u)
+        before, faces.slide = faces.slide, faces.slid(u)
+        change = np.abs(faces.stiffness[:, None] * (faces.slide - before)).max(initial=0.0)
+        if change <= _SETTLED * np.abs(faces.pressure(u)).max(initial=0.0):
             break
     else:
-        left = np.abs(residual).max()
         raise NotConvergedError(
-            f"contact not found in {_ITERATIONS} iterations: unbalanced force {left:.3g} N against "
-            f"forces of {scale:.3g} N. Expected faces or supports that hold every part"
+            f"curved faces still slide after {_SLIDES} corrections: pressures change by "
+            f"{change:.3g} Pa. Expected a cut that turns by less from element to element"
         )
     residual, scale = newton.residual(u)
     return ClosedSolution(
