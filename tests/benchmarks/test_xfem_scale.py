@@ -173,7 +173,7 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark,
 
     Nodes, places, gradients, moduli and vectors read once, rotations read and written, the matrix
     written once: 400 bytes for each tetrahedron. Seen is 0.11; with vectors written in the
-    compiler's own language it was 0.17 to 0.23 (docs/theory/errata.md).
+    compiler's own language it was 0.17 to 0.23 (docs/theory/history.md).
     """
     phantom, pattern, force, blocks, _ = system()
     displacement = np.zeros_like(phantom.node_points)

@@ -86,7 +86,7 @@ def test_the_energy_error_of_an_unenriched_tip_falls_with_the_square_root_of_h()
     assert errors == pytest.approx([0.42198, 0.29834, 0.21093], abs=1e-5)
     # E_h − E is the squared error, but for the interpolated boundary values (O(h²))
     assert errors == pytest.approx(from_energies, rel=0.01)
-    # another P1 XFEM, its mesh not known: .4388, .3129, .2222; see docs/theory/errata.md
+    # another P1 XFEM, its mesh not known: .4388, .3129, .2222; see docs/theory/history.md
     assert errors == pytest.approx([0.4388, 0.3129, 0.2222], rel=0.06)
 
 
