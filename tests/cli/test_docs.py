@@ -120,6 +120,12 @@ BY_TEST = {
     "verify study": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
     "verify run cutting/hanging_block_quick": "tests/cli/test_docs.py"
         "::test_a_command_of_minutes_succeeds",
+    "verify export benchmark": "tests/install/test_light_judge.py"
+        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
+    "verify import benchmark": "tests/install/test_light_judge.py"
+        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
+    "verify run benchmark --solver": "tests/install/test_light_judge.py"
+        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
     "verify run benchmark/":
         "tests/benchmark/test_values.py::test_solvers_are_off_by_what_the_page_says",
     "verify run dynamics/freed_half": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",

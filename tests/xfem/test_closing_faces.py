@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 from scipy.optimize import minimize
+from xfem_bodies import boundary_nodes, sparse_stiffness
 
 import verify.xfem as xfem
-from tests.xfem.xfem_bodies import boundary_nodes, sparse_stiffness
 from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.closing import STABILITY, ClosingFaces, solve_closed
