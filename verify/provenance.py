@@ -116,7 +116,7 @@ def _commit() -> tuple[str | None, bool | None]:
         try:
             head = _git(root, "rev-parse", "HEAD").strip()
             # who solves a bundle of references anew has moved the old one aside
-            where = ("--", ".", ":(exclude)cases/*/references")
+            where = ("--", ".", ":(exclude)cases/*/references/*")
             changed = _git(root, "status", "--porcelain", "--untracked-files=no", *where)
             return head, bool(changed.strip())
         except (OSError, subprocess.SubprocessError):
