@@ -335,10 +335,12 @@ class SolveRecord:
 def meshes_charged(records: Sequence[SolveRecord]) -> list[SolveRecord]:
     """Charge solves on a mesh that conforms to the cut, and that they were handed, with making it.
 
-    Its time is that of a solve of the same level that makes such a mesh (`conforming`). Without
-    one the phase is empty, and the solve has no time.
+    `conforming` on the same level says how long that takes; without it the quickest other solve
+    that makes such a mesh. Without any the phase is empty, and the solve has no time.
     """
-    makers = {r.level: r for r in records if r.conforming and MESHING in r.paid}
+    able = [r for r in records if r.conforming and r.paid.get(MESHING)]
+    able.sort(key=lambda r: (r.solver == "conforming", -median(r.timings[MESHING])))
+    makers = {record.level: record for record in able}  # the last one counts
     return [
         replace(record, timings={**record.timings, HANDED_OVER: _share(record, makers)})
         if record.conforming and record.timings and not _makes_its_mesh(record)
@@ -354,7 +356,21 @@ def _makes_its_mesh(record: SolveRecord) -> bool:
 def _share(record: SolveRecord, makers: Mapping[int, SolveRecord]) -> list[float]:
     if (maker := makers.get(record.level)) is None:
         return []
-    return [median(maker.timings[MESHING])] * max(map(len, record.timings.values()))
+    return [median(maker.timings[MESHING])]
+
+
+def repeated_totals(phases: Mapping[str, Sequence[float]]) -> list[float]:
+    """Wall seconds of each repetition over all phases; none where a phase has no time.
+
+    A phase that was timed less often, as meshing is, counts by its median in each of them.
+    """
+    if not all(phases.values()):
+        return []
+    count = max(map(len, phases.values()), default=0)
+    return [
+        sum(times[i] if len(times) == count else median(times) for times in phases.values())
+        for i in range(count)
+    ]
 
 
 @_closed

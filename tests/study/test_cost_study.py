@@ -120,8 +120,19 @@ def test_who_is_handed_a_mesh_that_conforms_to_the_cut_pays_for_its_making():
         assert paid["guest", level] == pytest.approx(2.0 + own)
         assert paid["background", level] == pytest.approx(own)
         assert paid["splitter", level] == pytest.approx(0.5 + own)
-    # nobody made such a mesh in this run: what is not measured is not nothing
+    # `conforming` says the time, whichever solvers make such a mesh and in any order
+    known = ladder("conforming", 0.4, 0.01, meshing=3.0, conforming=True)
+    for records in ([*known, *maker, *guest], [*guest, *maker, *known]):
+        paid = {(r.solver, r.level): paid_times(r) for r in meshes_charged(records)}
+        assert paid["guest", 0] == pytest.approx([3.01] * 3)
+    # nobody made such a mesh in this run: no time is not a time of zero
     assert [paid_times(r) for r in meshes_charged(guest)] == [[]] * 3
+
+
+def test_a_phase_that_was_timed_once_hides_no_repetition_of_the_others():
+    record = ladder("one", 0.4, 0.01, spread=0.5, conforming=True)[0]
+    once = replace(record, timings={**record.timings, "meshing": [2.0]})
+    assert paid_times(once) == pytest.approx([2.005, 2.01, 2.015])
 
 
 def test_the_pareto_front_has_only_what_nothing_beats():

@@ -15,7 +15,16 @@ from verify.errors import InputError
 from verify.files import read_json, write_json
 from verify.judge.intervals import ERROR_METRICS
 from verify.provenance import KERNEL, seconds_of_note
-from verify.result import CaseResult, Metric, SolveRecord, Status, finest_of, read_result
+from verify.result import (
+    HANDED_OVER,
+    CaseResult,
+    Metric,
+    SolveRecord,
+    Status,
+    finest_of,
+    read_result,
+    repeated_totals,
+)
 from verify.runner.fingerprint import digest_of
 from verify.scene import Scene
 from verify.scene.strict import Finite, NonNegative, Positive, Strict, first_fault
@@ -207,18 +216,14 @@ def speed_of(solve: SolveRecord) -> MeasuredSpeed:
         return MeasuredSpeed(reason=f"{solve.status}: {solve.reason}")
     if kernel is None:
         return MeasuredSpeed(reason="the calibration kernel was not timed beside it")
-    if not solve.timings or not all(solve.timings.values()):
+    own = {name: times for name, times in solve.timings.items() if name != HANDED_OVER}
+    totals = repeated_totals(own)
+    if not totals:
         return MeasuredSpeed(reason="the solver gives no timings")
     if solve.notes.get("timing", "").startswith("contended"):
         return MeasuredSpeed(reason=solve.notes["timing"])
-    count = max(len(seconds) for seconds in solve.timings.values())
-    if count < 3:
-        return MeasuredSpeed(reason=f"{count} repetitions; a spread needs 3")
-    # a phase timed once (meshing) is the same in all repetitions
-    totals = [
-        sum(s[i] if len(s) == count else median(s) for s in solve.timings.values())
-        for i in range(count)
-    ]
+    if len(totals) < 3:
+        return MeasuredSpeed(reason=f"{len(totals)} repetitions; a spread needs 3")
     if not median(totals) > 0.0:
         return MeasuredSpeed(reason="its times are zero")
     spread = _half_width(totals) + _half_width(kernel)

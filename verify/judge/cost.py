@@ -12,7 +12,16 @@ from statistics import median
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import Interval, error_interval
 from verify.judge.standing import Item, compared_by_mean, item_at_equal_size
-from verify.result import CaseResult, Comparison, LeftOut, Profile, SolveRecord, Standing, Status
+from verify.result import (
+    CaseResult,
+    Comparison,
+    LeftOut,
+    Profile,
+    SolveRecord,
+    Standing,
+    Status,
+    repeated_totals,
+)
 
 _METRICS = ("displacement_l2", "energy_norm")
 _SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
@@ -89,7 +98,7 @@ def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
 
 def paid_times(record: SolveRecord) -> list[float]:
     """Return the wall time of what each cut costs anew, s, by repetition."""
-    return [sum(times) for times in zip(*record.paid.values(), strict=False)]
+    return repeated_totals(record.paid)
 
 
 def time_at(points: Sequence[WorkPoint], error: float) -> tuple[float, float, float] | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from verify.report.notation import SECONDARY, solver_title
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, repeated_totals
 
 # Beyond these a number is a symptom, and powers of ten around it overflow
 _DRAWABLE = (1e-200, 1e200)
@@ -116,26 +116,13 @@ def error_curves(result: CaseResult, metric: str) -> list[Curve]:
 def duration(solve: SolveRecord) -> Duration | None:
     """Return the time of a solve, or None if it was not measured.
 
-    Phases have one entry per repetition; where a phase has fewer, medians and extremes are
-    added phase by phase (the spread is then an upper bound).
+    See `repeated_totals` for phases that were timed less often than others.
     """
-    timed = solve.paid
-    everything = [second for values in timed.values() for second in values]
-    if (
-        not all(timed.values())
-        or not everything
-        or not all(math.isfinite(second) and second >= 0 for second in everything)
-    ):
+    everything = [second for times in solve.paid.values() for second in times]
+    totals = repeated_totals(solve.paid)
+    if not totals or not all(math.isfinite(second) and second >= 0 for second in everything):
         return None
-    counts = {len(values) for values in timed.values()}
-    if len(counts) == 1:
-        totals = [sum(repetition) for repetition in zip(*timed.values(), strict=True)]
-        middle, low, high = median(totals), min(totals), max(totals)
-    else:
-        middle, low, high = (
-            sum(pick(values) for values in timed.values()) for pick in (median, min, max)
-        )
-    return Duration(middle, low, high, min(counts), tuple(timed))
+    return Duration(median(totals), min(totals), max(totals), len(totals), tuple(solve.paid))
 
 
 def _curve(
