@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]  # at points (n, d) and a time, Pa
 _PRESSED = 1e-3  # of the mean pressure (the largest may be at a tip): where more, faces touch
 _AROUND = 2.0  # elements over which the oscillation is told from the error
+_SAFETY = 3.0  # times the last difference of levels: the half-width of what has no order
 _MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
 
 
@@ -34,7 +35,7 @@ _MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
 class ContactTruth:
     """Pressures that are known, the best first, and what they are.
 
-    A second one says by its distance how well the first is known.
+    A second one says by its distance how well the first is known; an exact one stands alone.
     """
 
     pressures: Sequence[Pressure]
@@ -114,7 +115,7 @@ def contact_metrics(
     unit = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
     for i, name in enumerate(("contact_extent", "contact_force")):
         values = [other[i] for other in others]
-        width = abs(values[0] - values[1]) if len(values) > 1 else 0.0
+        width = _SAFETY * abs(values[0] - values[1]) if len(values) > 1 else 0.0
         metrics.append(Metric(name, own[i], unit[i], next(iter(values), None), width, source))
     if truth is None:
         return metrics, {}
@@ -135,7 +136,7 @@ def _errors(
     scale, error = norm(known[0]), contact.pressure - known[0]
     if scale == 0.0:
         return [], dict.fromkeys(CONTACT_ERRORS, "no face is pressed in the reference")
-    width = norm(known[0] - known[1]) / scale if len(known) > 1 else 0.0
+    width = _SAFETY * norm(known[0] - known[1]) / scale if len(known) > 1 else 0.0
     around = cKDTree(contact.points).sparse_distance_matrix(
         cKDTree(contact.points), _AROUND * size, output_type="coo_matrix"
     )

@@ -392,7 +392,9 @@ def _contact(
     if reference is not None:
         judged = one.scene.judged_by_exact
         known = [exact_pressure(exact, one.law, rule)] if judged else reference.contact
-        truth = ContactTruth(known, reference.source) if known else None
+        # one level of a reference does not say how well it is known
+        if judged or len(known) > 1:
+            truth = ContactTruth(known, reference.source)
     size = compared_size(one.solution, one.body)
     return contact_metrics(one.solution, one.field, rule, truth, size)
 
