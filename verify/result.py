@@ -717,6 +717,42 @@ class Profile:
     most: float | None = None
 
 
+@dataclass(frozen=True)
+class Pair:
+    """A solver beside another, on the scenes that both did.
+
+    Parameters
+    ----------
+    metric : str
+        ``"displacement_l2"``, ``"energy_norm"``, ``"jump_l2"``, ``"quantities"`` (all of interest)
+        at equal element size, or ``"time"`` at an equal error of the displacement.
+    kind : str
+        Of the scenes: ``"rest"`` or ``"motion"``.
+    solver, rival : str
+        Each pair stands in both directions.
+    wins, ties, losses : int
+        Scenes, of the solver; their sum is the number of scenes in common.
+    ratio : float or None
+        Number of the solver over that of its rival, median over scenes; None if there is none.
+    low, high : float or None
+        Range of the ratios: 5th and 95th percentile; below ten scenes least and largest.
+    count : int
+        Scenes that have a ratio: neither number is round-off, and both are told from none.
+    """
+
+    metric: str
+    kind: str
+    solver: str
+    rival: str
+    wins: int
+    ties: int
+    losses: int
+    ratio: float | None
+    low: float | None
+    high: float | None
+    count: int
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
     """A table per question, and what was left out.
@@ -728,6 +764,12 @@ class Ranking:
         What ``verify conform`` found, by solver; it does not move the ranks.
     accuracy, energy, cost : list of Comparison
     stability : list of StabilityStanding
+    pairs : list of Pair
+        In both directions.
+    groups : list of list of str
+        Solvers that are one discretisation, two or more.
+    coverage : dict of str to dict
+        By solver and kind of scene (``"rest"``, ``"motion"``): scenes answered, scenes asked.
     left_out : list of LeftOut
         What no ranking counts.
     contended : list of str
@@ -748,6 +790,9 @@ class Ranking:
     left_out: list[LeftOut]
     contended: list[str]
     profiles: list[Profile] = field(default_factory=list)
+    pairs: list[Pair] = field(default_factory=list)
+    groups: list[list[str]] = field(default_factory=list)
+    coverage: dict[str, dict[str, list[int]]] = field(default_factory=dict)
 
 
 def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:

@@ -205,6 +205,33 @@ def common_error(points: Mapping[str, Sequence[WorkPoint]]) -> tuple[float, list
     return found
 
 
+def times_at_equal_error(
+    one: Sequence[WorkPoint], other: Sequence[WorkPoint]
+) -> tuple[Interval, Interval] | None:
+    """Return the times of two solvers at the smallest error that both reach, s.
+
+    None where that error lies below the coarsest level of either: its time would be that of a mesh
+    nobody would choose. An error that cannot be told from none, by the reference or by round-off,
+    buys nothing.
+    """
+    both = [
+        [p for p in points if p.low > 0.0 and p.error > ROUND_OFF and p.seconds > 0.0]
+        for points in (one, other)
+    ]
+    if not all(both):
+        return None
+    error = max(min(p.error for p in points) for points in both)
+    if any(max(p.error for p in points) * (1 + 1e-9) < error for points in both):
+        return None
+    found = []
+    for points in both:
+        if (times := time_at(points, error)) is None:
+            return None
+        # time_at interpolates each of the three by itself: they may cross by round-off
+        found.append(Interval(times[0], min(times), max(times)))
+    return found[0], found[1]
+
+
 def cost_item(result: CaseResult, metric: str, solvers: Sequence[str]) -> Item | LeftOut:
     """Take the times of a case at the error at which most solvers can be compared."""
     known = work_points([s for s in result.solves if s.solver in solvers], metric)

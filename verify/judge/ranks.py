@@ -13,6 +13,7 @@ from verify.judge.cost import (
     why_times_are_no_sample,
 )
 from verify.judge.intervals import ERROR_METRICS
+from verify.judge.pairs import coverage_of, groups_of, pairs_of
 from verify.judge.standing import (
     Item,
     compared_by_mean,
@@ -70,6 +71,9 @@ def rank_solvers(
         cost=cost_comparisons(results, solvers),
         left_out=_left_out(results),
         contended=_why_times_may_be_off(results, solvers),
+        pairs=pairs_of(results, solvers),
+        groups=groups_of(results, solvers),
+        coverage=coverage_of(results, solvers),
         profiles=[performance_profile(results, solvers), *data_profiles(results, solvers)],
     )
     return asdict(found)
