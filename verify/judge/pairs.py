@@ -8,12 +8,17 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from verify.judge.convergence import ROUND_OFF
-from verify.judge.cost import times_at_equal_error, why_times_are_no_sample, work_points
+from verify.judge.cost import (
+    WorkPoint,
+    times_at_equal_error,
+    why_times_are_no_sample,
+    work_points,
+)
 from verify.judge.intervals import ERROR_METRICS, Interval, NotMeasuredError, error_interval
 from verify.result import CaseResult, Pair, SolveRecord, Status
 
@@ -27,7 +32,7 @@ _SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a s
 _FEW = 10  # scenes below which a range has no percentiles
 _SHARED = 3  # scenes that show that two programs are one discretisation
 
-type _Item = Mapping[str, object]  # by solver: what a pair is taken from
+type _Item = Mapping[str, Any]  # by solver: numbers by level, or times; a pair is taken from them
 type _Both = tuple[Interval, Interval]
 
 
@@ -169,16 +174,16 @@ def _number(solve: SolveRecord, name: str) -> Interval | None:
     return found if math.isfinite(found.value) and math.isfinite(found.high) else None
 
 
-def _timed(result: CaseResult, solver: str) -> tuple[object, bool]:
+def _timed(result: CaseResult, solver: str) -> tuple[list[WorkPoint], bool]:
     """Take what a solver's levels cost, and whether its times are a sample."""
     own = [s for s in result.solves if s.solver == solver]
     return work_points(own, NORMS[0]), not why_times_are_no_sample([result], [solver])
 
 
-def _at_equal_size(one: object, other: object) -> _Both | None:
+def _at_equal_size(
+    one: Mapping[int, tuple[float, Interval]], other: Mapping[int, tuple[float, Interval]]
+) -> _Both | None:
     """Take the numbers on the finest level of both whose element sizes agree."""
-    assert isinstance(one, dict)
-    assert isinstance(other, dict)
     for level in sorted(set(one) & set(other), reverse=True):
         (size, mine), (beside, theirs) = one[level], other[level]
         if min(size, beside) > 0.0 and abs(math.log(size / beside)) <= math.log1p(_SAME_SIZE):
@@ -186,11 +191,12 @@ def _at_equal_size(one: object, other: object) -> _Both | None:
     return None
 
 
-def _at_equal_error(one: object, other: object) -> _Both | None:
-    """Take the times at an equal error; without bounds where repetitions are no sample."""
-    (mine, sampled), (theirs, too) = one, other  # type: ignore[misc]
-    times = times_at_equal_error(mine, theirs)
-    if times is None or (sampled and too):
+def _at_equal_error(
+    one: tuple[list[WorkPoint], bool], other: tuple[list[WorkPoint], bool]
+) -> _Both | None:
+    """Take the times at an equal error; they tie where repetitions are no sample."""
+    times = times_at_equal_error(one[0], other[0])
+    if times is None or (one[1] and other[1]):
         return times
     first, second = (time.value for time in times)
     low, high = min(first, second), max(first, second)
@@ -198,7 +204,7 @@ def _at_equal_error(one: object, other: object) -> _Both | None:
 
 
 def _joined(
-    items: Sequence[_Item], both: Callable[[object, object], _Both | None], solver: str, rival: str
+    items: Sequence[_Item], both: Callable[[Any, Any], _Both | None], solver: str, rival: str
 ) -> _Outcome | None:
     """Compare two solvers in a scene; None if they have no item in common."""
     met = [
@@ -250,9 +256,9 @@ def _turned(outcome: _Outcome) -> _Outcome:
 def _pair(metric: str, kind: str, solver: str, rival: str, outcomes: Sequence[_Outcome]) -> Pair:
     won = [outcome.won for outcome in outcomes]
     logs = [outcome.ratio for outcome in outcomes if outcome.ratio is not None]
-    ratio: tuple[float | None, ...] = (None, None, None)
+    middle = low = high = None
     if logs:
         ends = (0.05, 0.95) if len(logs) >= _FEW else (0.0, 1.0)
-        ratio = tuple(float(math.exp(v)) for v in np.quantile(logs, [0.5, *ends]))
+        middle, low, high = (math.exp(v) for v in np.quantile(logs, [0.5, *ends]))
     return Pair(metric, kind, solver, rival, won.count(1), won.count(0), won.count(-1),
-                *ratio, count=len(logs))  # fmt: skip
+                middle, low, high, len(logs))  # fmt: skip
