@@ -617,7 +617,7 @@ class Standing:
     count : int
         Items that it rests on.
     where : str
-        Case that decided, where the worst counts.
+        Case that decided.
     """
 
     solver: str
@@ -632,26 +632,20 @@ class Standing:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All solvers in one respect.
+    """All solvers in one respect, on the finest level of each; the worst case counts.
 
     Parameters
     ----------
     metric : str
         What was compared.
-    view : str
-        Under which condition.
-    how : str
-        How cases are joined: ``"mean"``, geometric mean of the ratios to the best of each case,
-        or ``"worst"``.
     items : int
+        Cases.
     standings : list of Standing
         Best first, those without rank last.
     left_out : list of LeftOut
     """
 
     metric: str
-    view: str
-    how: str
     items: int
     standings: list[Standing]
     left_out: list[LeftOut]
@@ -693,28 +687,6 @@ class StabilityStanding:
     inside_out: int
     lost: float | None
     regularisations: dict[str, int]
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Share of items that each solver has done within a number, as a function of that number.
-
-    Parameters
-    ----------
-    quantity : str
-        What the number is.
-    items : int
-        All of them; a solver that has not done an item has one number less.
-    steps : dict of str to list of float
-        By solver, the numbers at which its share grows by one item; ascending.
-    most : float or None
-        Number beyond which nothing is shown.
-    """
-
-    quantity: str
-    items: int
-    steps: dict[str, list[float]]
-    most: float | None = None
 
 
 @dataclass(frozen=True)
@@ -762,37 +734,32 @@ class Ranking:
     cases, solvers : list of str
     conformance : dict of str to dict
         What ``verify conform`` found, by solver; it does not move the ranks.
-    accuracy, energy, cost : list of Comparison
-    stability : list of StabilityStanding
     pairs : list of Pair
-        In both directions.
+        Accuracy and cost.
     groups : list of list of str
         Solvers that are one discretisation, two or more.
     coverage : dict of str to dict
         By solver and kind of scene (``"rest"``, ``"motion"``): scenes answered, scenes asked.
+    stability : list of StabilityStanding
+    energy : list of Comparison
     left_out : list of LeftOut
         What no ranking counts.
     contended : list of str
         Why times may be off, if they may.
-    profiles : list of Profile
-        Performance and data profiles.
     """
 
-    schema: Literal[1]
+    schema: Literal[2]
     kind: Literal["ranking"] = "ranking"
     cases: list[str]
     solvers: list[str]
     conformance: dict[str, dict[str, Any]]
-    accuracy: list[Comparison]
+    pairs: list[Pair]
+    groups: list[list[str]]
+    coverage: dict[str, dict[str, list[int]]]
     stability: list[StabilityStanding]
     energy: list[Comparison]
-    cost: list[Comparison]
     left_out: list[LeftOut]
     contended: list[str]
-    profiles: list[Profile] = field(default_factory=list)
-    pairs: list[Pair] = field(default_factory=list)
-    groups: list[list[str]] = field(default_factory=list)
-    coverage: dict[str, dict[str, list[int]]] = field(default_factory=dict)
 
 
 def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:

@@ -152,7 +152,7 @@ def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(
     assert "solvers on" not in text_of(root)
     ranked(root)
     said = text_of(root)
-    assert "solvers on 3 cases" in said
+    assert "solvers on 3 scenes at rest, compared two by two" in said
     assert "conformance" in said
     stored = json.loads((root / "results.json").read_text())["ranking"]
     assert stored == json.loads((root / "ranking.json").read_text())

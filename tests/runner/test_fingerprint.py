@@ -92,7 +92,7 @@ def test_what_imports_a_changed_module_has_another_digest_and_nothing_else(
 
 def test_a_verdict_depends_on_every_file_of_the_judge_but_the_ranking(sources):
     """Shown once: `judged_by` judged nobody, and stored verdicts were still two PASS."""
-    ranking = {f"verify.judge.{name}" for name in ("cost", "pairs", "ranks", "standing")}
+    ranking = {f"verify.judge.{name}" for name in ("cost", "pairs", "ranks")}
     assert set(modules_in("verify.judge")) - ranking <= sources.closure("verify.runner.judging")
 
 

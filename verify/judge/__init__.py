@@ -5,8 +5,8 @@
    it lies at least and at most. `accuracy` does this for all solves of a case.
 3. `checks` makes each demand of a case one of each solver that it holds for.
 4. `verdict` holds the intervals against the demands: PASS, FAIL, UNDECIDED or ERROR.
-5. `standing` ranks solvers by intervals, `cost` by time at equal error, and `ranks` by every
-   question that a run answers.
+5. `cost` takes times at equal error, `pairs` compares solvers two by two, and `ranks` puts
+   together every question that a run answers.
 
 Beside the verdicts stand `notices`, overlaps (`openings`), and what the model of a case costs
 (`models`). The judge solves nothing and writes nothing.

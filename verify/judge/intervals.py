@@ -66,6 +66,18 @@ def error_interval(metric: Metric) -> Interval:
     return Interval(*metric.relative_distance())
 
 
+def interval_of(solve: SolveRecord, name: str) -> Interval | None:
+    """Interval in which a metric of a solve lies; None if there is no such number."""
+    measured = solve.metric(name)
+    if solve.status is not Status.SOLVED or measured is None:
+        return None
+    try:
+        found = error_interval(measured)
+    except NotMeasuredError:
+        return None
+    return found if isfinite(found.value) and isfinite(found.high) else None
+
+
 def quotient_half_width(part: float, width: float, whole: float, whole_width: float) -> float:
     """Half-width of part/whole where both are uncertain; infinite where the whole may be 0."""
     least = abs(whole) - whole_width

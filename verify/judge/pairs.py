@@ -19,8 +19,8 @@ from verify.judge.cost import (
     why_times_are_no_sample,
     work_points,
 )
-from verify.judge.intervals import ERROR_METRICS, Interval, NotMeasuredError, error_interval
-from verify.result import CaseResult, Pair, SolveRecord, Status
+from verify.judge.intervals import ERROR_METRICS, Interval, interval_of
+from verify.result import CaseResult, LeftOut, Pair, SolveRecord, Status
 
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 QUANTITIES = "quantities"  # of interest: those of a scene together
@@ -32,6 +32,7 @@ _SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a s
 _FEW = 10  # scenes below which a range has no percentiles
 _SHARED = 3  # scenes that show that two programs are one discretisation
 
+type _Levels = dict[int, tuple[float, Interval]]  # element size and number
 type _Item = Mapping[str, Any]  # by solver: numbers by level, or times; a pair is taken from them
 type _Both = tuple[Interval, Interval]
 
@@ -130,6 +131,24 @@ def coverage_of(
     return counted
 
 
+def not_told(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[LeftOut]:
+    """List the errors on finest levels that the reference cannot tell from none: in no ratio."""
+    found = []
+    for result in results:
+        for metric in (*NORMS, QUANTITIES):
+            for name, levels in _named_items(result, metric, solvers):
+                finest = {own: numbers[max(numbers)][1] for own, numbers in levels.items()}
+                untold = [
+                    f"{own} {number.value:.1e} ± {number.half_width:.1e}"
+                    for own, number in finest.items()
+                    if number.low <= 0.0 and number.value > ROUND_OFF
+                ]
+                if untold:
+                    why = f"{name} not told from none, in no ratio: {', '.join(untold)}"
+                    found.append(LeftOut(result.case, "", why))
+    return found
+
+
 def scenes_of(results: Sequence[CaseResult], kind: str) -> list[list[CaseResult]]:
     """Group the cases of a kind by scene: each by itself, but members of a sweep together."""
     scenes: dict[str, list[CaseResult]] = {}
@@ -145,33 +164,27 @@ def _answered(solve: SolveRecord) -> bool:
     return solve.status is Status.SOLVED and bool(solve.metrics)
 
 
-def _items(result: CaseResult, metric: str, solvers: Sequence[str]) -> Iterator[_Item]:
-    """Yield what a metric stands for in a case, by solver: numbers by level, or times."""
-    own = [solve for solve in result.solves if solve.solver in solvers]
+def _items(result: CaseResult, metric: str, solvers: Sequence[str]) -> list[_Item]:
+    """Return what a metric stands for in a case, by solver: numbers by level, or times."""
     if metric == TIME:
-        yield {name: _timed(result, name) for name in solvers}
-        return
-    names = dict.fromkeys([metric])
+        return [{name: _timed(result, name) for name in solvers}]
+    return [levels for _, levels in _named_items(result, metric, solvers)]
+
+
+def _named_items(
+    result: CaseResult, metric: str, solvers: Sequence[str]
+) -> Iterator[tuple[str, dict[str, _Levels]]]:
+    own = [solve for solve in result.solves if solve.solver in solvers]
+    names = [metric]
     if metric == QUANTITIES:
-        measured = (m for solve in own for m in solve.metrics)
-        names = dict.fromkeys(m.name for m in measured if m.name not in ERROR_METRICS)
+        measured = dict.fromkeys(m.name for solve in own for m in solve.metrics)
+        names = [name for name in measured if name not in ERROR_METRICS]
     for name in names:
-        levels: dict[str, dict[int, tuple[float, Interval]]] = {}
+        found: dict[str, _Levels] = {}
         for solve in own:
-            if (number := _number(solve, name)) is not None:
-                levels.setdefault(solve.solver, {})[solve.level] = solve.size or 0.0, number
-        yield levels
-
-
-def _number(solve: SolveRecord, name: str) -> Interval | None:
-    measured = solve.metric(name)
-    if solve.status is not Status.SOLVED or measured is None:
-        return None
-    try:
-        found = error_interval(measured)
-    except NotMeasuredError:
-        return None
-    return found if math.isfinite(found.value) and math.isfinite(found.high) else None
+            if (number := interval_of(solve, name)) is not None:
+                found.setdefault(solve.solver, {})[solve.level] = solve.size or 0.0, number
+        yield name, found
 
 
 def _timed(result: CaseResult, solver: str) -> tuple[list[WorkPoint], bool]:
@@ -180,9 +193,7 @@ def _timed(result: CaseResult, solver: str) -> tuple[list[WorkPoint], bool]:
     return work_points(own, NORMS[0]), not why_times_are_no_sample([result], [solver])
 
 
-def _at_equal_size(
-    one: Mapping[int, tuple[float, Interval]], other: Mapping[int, tuple[float, Interval]]
-) -> _Both | None:
+def _at_equal_size(one: _Levels, other: _Levels) -> _Both | None:
     """Take the numbers on the finest level of both whose element sizes agree."""
     for level in sorted(set(one) & set(other), reverse=True):
         (size, mine), (beside, theirs) = one[level], other[level]

@@ -1,27 +1,15 @@
-"""The ranking of the solvers of a run: a table per question, and what was left out."""
+"""The ranking of the solvers of a run: pairs, coverage, robustness, energy, and the omissions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from verify.compare.part_account import ACCOUNT
-from verify.judge.cost import (
-    cost_comparisons,
-    data_profiles,
-    performance_profile,
-    why_times_are_no_sample,
-)
-from verify.judge.intervals import ERROR_METRICS
-from verify.judge.pairs import coverage_of, groups_of, pairs_of
-from verify.judge.standing import (
-    Item,
-    compared_by_mean,
-    compared_by_worst,
-    is_exact,
-    item_at_equal_size,
-    item_on_finest,
-)
+from verify.judge.convergence import ROUND_OFF
+from verify.judge.cost import why_times_are_no_sample
+from verify.judge.intervals import ERROR_METRICS, Interval, interval_of
+from verify.judge.pairs import coverage_of, groups_of, not_told, pairs_of
 from verify.result import (
     REFERENCE,
     CaseResult,
@@ -30,15 +18,13 @@ from verify.result import (
     Ranking,
     SolveRecord,
     StabilityStanding,
+    Standing,
     Status,
     Verdict,
+    finest_of,
     ranked_solvers,
 )
 
-EQUAL_SIZE, FINEST = "equal size", "finest level"
-EXACT = "where a solver is exact"
-QUANTITIES = "quantities"  # all quantities of interest of all cases together
-_MAIN = ("displacement_l2", "energy_norm", "jump_l2")
 _ANSWER = ("displacement_l2", "displacement_l2_max")
 _BLOWN_UP = 1.0 - 1e-9  # relative error: as far off as a body that does not move, to round-off
 
@@ -61,26 +47,23 @@ def rank_solvers(
     """
     solvers = ranked_solvers(results)
     found = Ranking(
-        schema=1,
+        schema=2,
         cases=[result.case for result in results],
         solvers=solvers,
         conformance={name: dict(found) for name, found in (conformance or {}).items()},
-        accuracy=accuracy_comparisons(results, solvers),
-        stability=stability_standings(results, solvers),
-        energy=energy_comparisons(results, solvers),
-        cost=cost_comparisons(results, solvers),
-        left_out=_left_out(results),
-        contended=_why_times_may_be_off(results, solvers),
         pairs=pairs_of(results, solvers),
         groups=groups_of(results, solvers),
         coverage=coverage_of(results, solvers),
-        profiles=[performance_profile(results, solvers), *data_profiles(results, solvers)],
+        stability=stability_standings(results, solvers),
+        energy=energy_comparisons(results, solvers),
+        left_out=[*_left_out(results), *not_told(results, solvers)],
+        contended=_why_times_may_be_off(results, solvers),
     )
     return asdict(found)
 
 
 def _why_times_may_be_off(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:
-    said = [f"{why}: by time all are tied" for why in why_times_are_no_sample(results, solvers)]
+    said = [f"{why}: times tie" for why in why_times_are_no_sample(results, solvers)]
     known = {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
     return sorted({*said, *(n for n in known if not any(why.startswith(n) for why in said))})
 
@@ -115,67 +98,77 @@ def _uncompared(result: CaseResult) -> str:
 def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
     """Compare what is kept on the finest level of each case; the worst case counts.
 
-    Momenta count only where nothing acts from outside: elsewhere they have to change.
+    Momenta count only where nothing acts from outside: elsewhere they have to change. Numbers at
+    round-off are as good as zero.
     """
     comparisons = []
     for metric in ACCOUNT:
-        items = [
-            item_on_finest(result, metric, solvers)
+        cases = [
+            result
             for result in results
             if any(s.metric(metric) for s in result.solves if s.solver in solvers)
             and not ("momentum" in metric and _acted_on(result))
         ]
-        if (found := compared_by_worst(metric, "finest level", solvers, items)) is not None:
+        if (found := _by_worst(metric, solvers, cases)) is not None:
             comparisons.append(found)
     return comparisons
+
+
+def _by_worst(
+    metric: str, solvers: Sequence[str], cases: Sequence[CaseResult]
+) -> Comparison | None:
+    left_out: list[LeftOut] = []
+    found: dict[str, list[tuple[Interval, str]]] = {}
+    for result in cases:
+        finest = finest_of(result.solves)
+        for solver in solvers:
+            last = finest.get(solver)
+            if last is None:
+                left_out.append(LeftOut(result.case, solver, "was not run on this case"))
+            elif (number := interval_of(last, metric)) is None:
+                left_out.append(LeftOut(result.case, solver, _why(last, metric)))
+            else:
+                found.setdefault(solver, []).append((number, result.case))
+    if not found:
+        return None
+    items = len({case for own in found.values() for _, case in own})
+    return Comparison(metric, items, _standings(solvers, found, items), left_out)
+
+
+def _standings(
+    solvers: Sequence[str], found: Mapping[str, Sequence[tuple[Interval, str]]], items: int
+) -> list[Standing]:
+    worst = {name: max(own, key=lambda pair: pair[0].value) for name, own in found.items()}
+    spans = {name: _above_round_off(number) for name, (number, _) in worst.items()}
+    whole = {name: span for name, span in spans.items() if len(found[name]) == items}
+    ranks = {
+        name: 1 + sum(other.high < own.low for other in whole.values())
+        for name, own in whole.items()
+    }
+    standings = []
+    for solver in solvers:
+        rank, span = ranks.get(solver), spans.get(solver)
+        tied = rank is not None and list(ranks.values()).count(rank) > 1
+        ends = (span.value, span.low, span.high) if span else (None,) * 3
+        where = worst[solver][1] if span else ""
+        standings.append(Standing(solver, rank, tied, *ends, len(found.get(solver, [])), where))
+    return sorted(standings, key=lambda s: (s.rank or inf, inf if s.value is None else s.value))
+
+
+def _above_round_off(found: Interval) -> Interval:
+    low = found.low if found.value > ROUND_OFF else 0.0
+    return Interval(found.value, low, max(found.high, ROUND_OFF))
+
+
+def _why(solve: SolveRecord, name: str) -> str:
+    if solve.status is not Status.SOLVED:
+        return f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
+    said = solve.notes.get(name) or solve.notes.get("comparison") or "not measured"
+    return f"level {solve.level}: {said}"
 
 
 def _acted_on(result: CaseResult) -> bool:
     return bool(result.scene.get("supports") or result.scene.get("loads"))
-
-
-def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
-    """Compare errors: the main norms, those that a case judges, and the quantities of interest.
-
-    Parameters
-    ----------
-    results : sequence of CaseResult
-    solvers : sequence of str
-        Those that are ranked.
-
-    Returns
-    -------
-    list of Comparison
-        For each metric one at equal size and one on the finest level. Items in which a solver is
-        exact to round-off have no ratios: they are compared by the largest number of each solver
-        on its finest level.
-    """
-    judged = {v.metric for r in results for v in r.verdicts if v.metric in ERROR_METRICS}
-    metrics = [*_MAIN, *sorted(judged - {*_MAIN, *ACCOUNT}), QUANTITIES]
-    comparisons = []
-    for metric in metrics:
-        for view, item_of in ((EQUAL_SIZE, item_at_equal_size), (FINEST, item_on_finest)):
-            items = [
-                item_of(result, name, solvers)
-                for result in results
-                for name in _names(result, metric, solvers)
-            ]
-            if (found := compared_by_mean(metric, view, solvers, items)) is not None:
-                comparisons.append(found)
-        # of the view above that came last: on the finest level
-        exact = [i for i in items if isinstance(i, Item) and len(i.found) > 1 and is_exact(i)]
-        if (found := compared_by_worst(metric, EXACT, solvers, exact)) is not None:
-            comparisons.append(found)
-    return comparisons
-
-
-def _names(result: CaseResult, metric: str, solvers: Sequence[str]) -> list[str]:
-    """Return what a metric stands for in a case: itself, or the names of the quantities."""
-    own = [m for s in result.solves if s.solver in solvers for m in s.metrics]
-    if metric == QUANTITIES:
-        named = {m.name for m in own if m.name not in ERROR_METRICS and m.reference}
-        return sorted(named)
-    return [metric] if any(m.name == metric for m in own) else []
 
 
 def stability_standings(

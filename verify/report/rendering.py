@@ -48,7 +48,7 @@ from verify.report.notation import (
     solver_title,
     spread_text,
 )
-from verify.report.page import page_view, rank
+from verify.report.page import page_view
 from verify.report.pictures import CasePictures, case_pictures
 from verify.report.plots import Palette, Style
 from verify.report.run_directory import (
@@ -61,6 +61,7 @@ from verify.report.run_directory import (
     load_record,
     load_run,
 )
+from verify.report.which import rank
 
 PICTURES = "report-pictures"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
