@@ -1,4 +1,4 @@
-"""Claims about rankings beside pairs: robustness, energy, and what is in no number."""
+"""Claims about rankings beside pairs: robustness, energy, and the omissions."""
 
 import pytest
 
@@ -83,7 +83,7 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
     assert by["x"]["refused"] == 1
     said = [solve("a", "x", 0, 0.1, notes={"pieces inside out": "near (0.1, 0.2) m"})]
     (one,) = rank_solvers([case_of("a", said)])["stability"]
-    assert one["inside_out"] == 1  # what is no number is no zero either
+    assert one["inside_out"] == 1  # a text is no zero either
 
 
 def moved(case, solver, drift):

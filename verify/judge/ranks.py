@@ -149,9 +149,9 @@ def _standings(
     for solver in solvers:
         rank, span = ranks.get(solver), spans.get(solver)
         tied = rank is not None and list(ranks.values()).count(rank) > 1
-        ends = (span.value, span.low, span.high) if span else (None,) * 3
-        where = worst[solver][1] if span else ""
-        standings.append(Standing(solver, rank, tied, *ends, len(found.get(solver, [])), where))
+        value, low, high = (span.value, span.low, span.high) if span else (None, None, None)
+        count, where = len(found.get(solver, [])), worst[solver][1] if span else ""
+        standings.append(Standing(solver, rank, tied, value, low, high, count, where))
     return sorted(standings, key=lambda s: (s.rank or inf, inf if s.value is None else s.value))
 
 
