@@ -82,6 +82,9 @@ BROKEN = [
     ({"geometry": {"kind": "polygon", "corners": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]},
       "mesh": {"sizes": [0.1]}},
      "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"),
+    ({"mesh": {"cells": [[4, 1]], "position": 3}},
+     "mesh.position: 1 elements along an axis of level 0; positions other than 0 need at "
+     "least two"),
     ({"supports": []}, "supports: a static scene needs at least one"),
     ({"supports": held(components=["x", "z"])}, "supports[0].components: z in a 2D scene"),
     ({"supports": [{"where": "boundary", "displacement": [0.0]}]},
@@ -413,6 +416,8 @@ BROKEN_ALONE = [
     ({"geometry": {"kind": "skin", "shape": "face", "elements": 10, "layers": 2}},
      "layers belong to a skin with a thickness"),
     ({"mesh": {"pattern": "given", "sizes": [0.1]}}, "a given mesh has neither sizes nor cells"),
+    ({"mesh": {"pattern": "unstructured", "sizes": [0.1], "position": 2}},
+     "position: 2; only structured meshes, of rectangles and boxes, have others than 0"),
     ({"mesh": {"sizes": [0.1], "refine": 1}}, "refine belongs to a given mesh"),
     ({"mesh": {}}, "a mesh has either sizes or cells"),
     ({"mesh": {"pattern": "unstructured", "cells": [[4, 4]]}},

@@ -8,7 +8,7 @@ from its unknowns and seconds; docs/theory/reference.md states the accuracy.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, prod, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -272,15 +272,10 @@ def mesh_of_level(scene: Scene, level: int) -> tuple[float, float] | None:
         return len(points) * 2.0 ** (scene.cell_dimension * level), size / 2**level
     if not isinstance(body, Rectangle | Box | Polygon):
         return None
-    if scene.mesh.cells is not None or isinstance(body, Rectangle | Box):
-        assert not isinstance(body, Polygon)
+    if not isinstance(body, Polygon):
+        counts = scene.mesh.divisions(body, level)
         sides = np.subtract(body.upper, body.lower)
-        if scene.mesh.cells is not None:
-            counts = list(scene.mesh.cells[level])
-        else:
-            assert scene.mesh.sizes is not None
-            counts = [ceil(side / scene.mesh.sizes[level] * (1 - 1e-9)) for side in sides]
-        return float(prod(n + 1 for n in counts)), float(max(sides / counts))
+        return float(np.prod(counts + 1.0)), float(max(sides / counts))
     assert scene.mesh.sizes is not None
     size = scene.mesh.sizes[level]
     return _nodes(scene, size), size

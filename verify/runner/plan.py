@@ -14,7 +14,12 @@ from verify.printable import duration_text
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.cost import LevelCost, case_cost, coarser_reference, finer_costs
 from verify.runner.directory import Job, RunDirectory, load_record, stored_record
-from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
+from verify.runner.fingerprint import (
+    code_of_solver,
+    digest_of,
+    physics_digest,
+    reference_digest,
+)
 from verify.runner.loading import Loaded
 from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
 from verify.runner.selection import Options
@@ -169,12 +174,14 @@ def plan_case(
     coarser = 1
     if options.within and kept is None:
         scene, coarser = coarser_reference(scene, options.within)
-    physics, solvers = physics_digest(scene), solvers_of(scene, options)
+    solvers = solvers_of(scene, options)
+    asked, judging = physics_digest(scene), reference_digest(scene)
     found = {name: loaded.get(name, Loaded()) for name in solvers}
 
     def job_of(name: str, level: int) -> Job:
         parameters = parameters_of(name, options.parameters)
         code = [code_of_solver(name), found[name].source]
+        physics = judging if name == REFERENCE else asked
         given = [physics, name, level, options.repetitions, parameters, code]
         return Job(
             case=scene.name,
@@ -268,7 +275,7 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
         except UnsupportedSceneError:  # the comparison says so
             continue
         scenes[model] = other
-        physics = physics_digest(other)
+        physics = reference_digest(other)
         jobs += [
             Job(
                 case=scene.name,

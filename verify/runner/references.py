@@ -49,7 +49,7 @@ from verify.runner.fingerprint import (
     code_of_solver,
     digest_of,
     file_digest,
-    physics_digest,
+    reference_digest,
 )
 from verify.scene import Scene
 from verify.solution import read_solution, write_solution
@@ -126,7 +126,7 @@ class Entry:
 
 def current_key(scene: Scene, level: int, parameters: dict[str, Any]) -> str:
     """Return the key under which today's code keeps the reference of `scene`."""
-    return digest_of([physics_digest(scene), level, parameters, code_of_solver(REFERENCE)])
+    return digest_of([reference_digest(scene), level, parameters, code_of_solver(REFERENCE)])
 
 
 def read_entry(content: Any, where: str) -> Entry:
@@ -201,7 +201,7 @@ class ReferenceCache:
                     shutil.copyfile(file, partial / file.name)
                 entry = Entry(
                     key=key,
-                    physics=physics_digest(scene),
+                    physics=reference_digest(scene),
                     code=code_of_solver(REFERENCE),
                     case=scene.name,
                     level=job.level,
@@ -239,7 +239,7 @@ class ReferenceCache:
 
     def find(self, scene: Scene) -> list[Entry]:
         """Return the current entries of `scene`, by level."""
-        physics = physics_digest(scene)
+        physics = reference_digest(scene)
         own = [e for e in self.entries() if e.physics == physics and not e.outdated]
         return sorted(own, key=lambda entry: entry.level)
 
@@ -427,7 +427,7 @@ class ReferenceBundle:
 
     def key(self, scene: Scene, level: int) -> str:
         """Return what identifies the solve that `take` gives."""
-        return digest_of([physics_digest(scene), level, self.digest])
+        return digest_of([reference_digest(scene), level, self.digest])
 
     def take(self, scene: Scene, job: Job) -> SolveRecord:
         """Unpack the reference for `job` into its folder.
@@ -455,7 +455,7 @@ class ReferenceBundle:
         return {name: whole[name] for name in entry.files}
 
     def _of(self, scene: Scene) -> list[Entry]:
-        physics = physics_digest(scene)
+        physics = reference_digest(scene)
         own = {entry.level: entry for entry in self._entries if entry.physics == physics}
         return [own[level] for level in sorted(own)]
 

@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr
 from verify.geometry.planar import inside_polygon, polygon_defect
 from verify.geometry.simplices import distance_to_outline, feet
 from verify.scene.mesh_file import FileBody, read_body
+from verify.scene.mesh_position import POSITIONS, mesh_position
 from verify.scene.strict import (
     Count,
     Point2,
@@ -295,6 +296,11 @@ class MeshLevels(Strict):
         description="given: how often the mesh of the file is refined uniformly, each a level "
         "more; a curved boundary stays as the file has it",
     )  # fmt: skip
+    position: int = Field(
+        strict=True, default=0, ge=0, lt=POSITIONS,
+        description="structured: 0 as asked, else another mesh of nearly equal size: one element "
+        "more or less along each axis, falling diagonals, moved inner nodes",
+    )  # fmt: skip
 
     rules: ClassVar[Rules] = (
         ("", lambda m: m.pattern == "given" and (m.sizes or m.cells),
@@ -302,6 +308,8 @@ class MeshLevels(Strict):
         ("", lambda m: m.pattern != "given" and none_or_both("sizes", "cells")(m),
          "a mesh has either sizes or cells"),
         ("", lambda m: m.refine and m.pattern != "given", "refine belongs to a given mesh"),
+        ("position", lambda m: m.pattern != "structured" and m.position,
+         "{}; only structured meshes, of rectangles and boxes, have others than 0"),
         ("", lambda m: m.cells and m.pattern == "unstructured",
          "cells belong to a structured mesh; give sizes"),
         ("", lambda m: not all(_finer(b, a) for a, b in pairwise(m.cells or [])),
@@ -315,6 +323,17 @@ class MeshLevels(Strict):
         """Number of levels."""
         given = self.pattern == "given"
         return 1 + self.refine if given else len(self.sizes or self.cells or [])
+
+    def divisions(self, body: Rectangle | Box, level: int) -> Array:
+        """Numbers of elements along each axis of a structured mesh, (d,) int."""
+        if self.cells is not None:
+            counts = np.array(self.cells[level])
+        else:
+            assert self.sizes is not None
+            sides = np.subtract(body.upper, body.lower)
+            # a size that divides the side up to round-off is that size
+            counts = np.ceil(sides / self.sizes[level] * (1 - 1e-9)).astype(int)
+        return counts + mesh_position(self.position).more
 
 
 class ReferenceLevels(Strict):

@@ -179,8 +179,8 @@ def _boundary(scene: SceneTables) -> list[Array]:
     body, mesh = scene.geometry, scene.mesh
     if isinstance(body, Rectangle | Box) and mesh.pattern == "structured":
         lower, upper = np.array(body.lower), np.array(body.upper)
-        sizes = [np.ceil((upper - lower) / h * (1 - 1e-9)).astype(int) for h in mesh.sizes or []]
-        return [_faces(lower, upper, np.array(counts)) for counts in mesh.cells or sizes]
+        levels = range(mesh.count)
+        return [_faces(lower, upper, mesh.divisions(body, level)) for level in levels]
     if isinstance(body, Rectangle | Polygon):
         outline = body.outline()
         return [np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)]

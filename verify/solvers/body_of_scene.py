@@ -30,6 +30,7 @@ from verify.scene import (
     ToolPathCut,
     read_mesh,
 )
+from verify.scene.mesh_position import moved_mesh
 from verify.solution import Regularisation
 from verify.solvers.runs import grid_of, timeline_of
 from verify.xfem.arrays import XfemError
@@ -70,7 +71,10 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     if counts is not None:
         assert isinstance(geometry, Rectangle | Box)
         make = rectangle_mesh if isinstance(geometry, Rectangle) else box_mesh
-        return make(counts, geometry.lower, geometry.upper), size
+        mesh = make(counts, geometry.lower, geometry.upper)
+        if number := scene.mesh.position:
+            mesh = SimplexMesh(*moved_mesh(mesh.points, mesh.cells, counts, number))
+        return mesh, size
     try:
         from reference.meshing import background_mesh as unstructured
     except ImportError as error:

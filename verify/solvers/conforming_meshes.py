@@ -36,6 +36,7 @@ from verify.scene import (
     read_mesh,
 )
 from verify.scene.acceptance import FractureQuantity
+from verify.scene.mesh_position import moved_mesh
 from verify.scene.tool_path import Cut
 from verify.solvers.runs import grid_of
 
@@ -155,10 +156,12 @@ def _background(scene: Scene, level: int) -> tuple[Array, Cells]:
         assert isinstance(geometry, Rectangle | Polygon)
         return background_mesh(geometry.outline(), size)
     if isinstance(geometry, Box):
-        return structured_tetrahedra(geometry.lower, geometry.upper, tuple(counts))
-    assert isinstance(geometry, Rectangle)
-    n, m = counts
-    return structured_triangles(geometry.lower, geometry.upper, (n, m))
+        mesh = structured_tetrahedra(geometry.lower, geometry.upper, tuple(counts))
+    else:
+        assert isinstance(geometry, Rectangle)
+        n, m = counts
+        mesh = structured_triangles(geometry.lower, geometry.upper, (n, m))
+    return moved_mesh(*mesh, counts, scene.mesh.position)
 
 
 def _realised(scene: Scene, level: int) -> Realised | None:

@@ -363,13 +363,8 @@ def grid_of(scene: Scene, level: int) -> tuple[list[int] | None, float]:
     if asked.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
         assert asked.sizes is not None
         return None, asked.sizes[level]
+    counts = asked.divisions(geometry, level)
     sides = np.subtract(geometry.upper, geometry.lower)
-    if asked.cells is not None:
-        counts = np.array(asked.cells[level])
-    else:
-        assert asked.sizes is not None
-        # a size that divides the side up to round-off is that size
-        counts = np.ceil(sides / asked.sizes[level] * (1 - 1e-9)).astype(int)
     return counts.tolist(), float((sides / counts).max())
 
 
