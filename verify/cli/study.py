@@ -9,6 +9,7 @@ Examples
   verify study calibration --quick --out studies
   verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming --out studies
   verify study budget statics/tissue_strip --tolerance 0.05 --out studies
+  verify study positions --solver xfem --solver conforming --out studies
 
 Writes NAME.json, NAME.csv and NAME.html into the directory. Exit code 0 whatever the
 findings say: they compare methods, most of which are known to fail somewhere.
@@ -265,6 +266,47 @@ def iterations(
     return _written("iterations", answer, study)
 
 
+def positions(
+    cases: Annotated[
+        Sequence[str], Arg("names, patterns or files; none: six scenes of the study", "CASE")
+    ] = (),
+    *,
+    solvers: Annotated[
+        Sequence[str],
+        Arg(
+            "solver, with parameters of its solves; repeat for several (default: xfem and "
+            "conforming)",
+            _SOLVER,
+            ("--solver",),
+        ),
+    ] = (),
+    positions: Annotated[int, Arg("meshes of each scene, up to 16", "N", read=count)] = 16,
+    level: Annotated[
+        int | None,
+        Arg("mesh level that is solved (default: that of the study, else the coarsest)", "K"),
+    ] = None,
+    answer: Answer,
+) -> int:
+    """How much of a difference of two solvers is where the cut passes the mesh."""
+    from verify.runner.selection import select_cases
+    from verify.scene.mesh_position import POSITIONS
+    from verify.study.measured_scenes import variant_of
+    from verify.study.positions import SCENES, positions_study
+
+    if positions > POSITIONS:
+        raise InputError(f"{positions}; a mesh has {POSITIONS}", "--positions")
+
+    def study(making: "Making") -> "Study":
+        names = list(dict.fromkeys(variant_of(s).label for s in solvers or ("xfem", "conforming")))
+        levels = [
+            (scene, SCENES.get(scene.name, 0) if level is None else level)
+            for scene in select_cases(cases or list(SCENES), None, "heavy")
+        ]
+        return positions_study(levels, names, positions, making)
+
+    return _written("positions", answer, study)
+
+
 def _over_scenes(
     study: "Callable[..., MeasuredStudy]",
     cases: Sequence[str],
@@ -316,4 +358,6 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
     return 0
 
 
-ACTIONS = Actions((slivers, energy, thesis, calibration, cost, budget, iterations), metavar="STUDY")
+ACTIONS = Actions(
+    (slivers, energy, thesis, calibration, cost, budget, iterations, positions), metavar="STUDY"
+)

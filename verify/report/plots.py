@@ -321,6 +321,44 @@ def bars(title: str, parts: Sequence[Bar], said: str) -> Drawing:
         return drawing(figure, said)
 
 
+@dataclass(frozen=True)
+class Strip:
+    """Ratios of one row of a figure, their median, and a range of them."""
+
+    name: str
+    ratios: Sequence[float]
+    median: float
+    low: float
+    high: float
+
+
+def strips(title: str, rows: Sequence[Strip], palette: Palette) -> Drawing:
+    """Return a row of points for each strip on one logarithmic axis, the first on top.
+
+    The median and the range are drawn over the points, which are spread across the row.
+    """
+    with panel(title, width=5.4, height=0.75 + 0.34 * len(rows)) as (figure, axes):
+        width, height = figure.get_size_inches()
+        axes.set_position((1.85 / width, 0.3 / height, 3.4 / width, (height - 0.62) / height))
+        axes.set_title(title, loc="left", x=-1.8 / 3.4, fontsize=9)
+        log_axis(axes, "x", log_range([1.0, *(one for row in rows for one in row.ratios)]))
+        axes.axvline(1.0, color="#333", linewidth=0.8)
+        for place, row in enumerate(rows):
+            style, golden = palette[row.name], 0.618034
+            across = [place + 0.6 * ((i * golden) % 1.0 - 0.5) for i in range(len(row.ratios))]
+            axes.plot(row.ratios, across, color=style.colour, marker="o", markersize=2.2,
+                      markeredgewidth=0.0, alpha=0.4, linestyle="none")  # fmt: skip
+            axes.plot([row.low, row.high], [place, place], color="#111", linewidth=1.6)
+            axes.plot([row.median], [place], color="#111", marker="o", markersize=5)
+        axes.set_yticks(range(len(rows)), ["\n".join(wrap(row.name, 26)) for row in rows],
+                        fontsize=8)  # fmt: skip
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.grid(False, axis="y")
+        axes.tick_params(axis="y", length=0)
+        said = "; ".join(f"{r.name} {r.median:.3g} ({r.low:.3g} to {r.high:.3g})" for r in rows)
+        return drawing(figure, f"{title}: {said}.")
+
+
 def _can_be_drawn(place: tuple[Any, Any]) -> bool:
     return all(isinstance(v, int | float) and 1 / _DRAWABLE < v < _DRAWABLE for v in place)
 

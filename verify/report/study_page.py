@@ -20,11 +20,23 @@ from verify.report.notation import (
     solver_title,
 )
 from verify.report.page import origin_facts
-from verify.report.plots import Bar, Palette, Series, bars, loglog, profile_panel, scatter
+from verify.report.plots import (
+    Bar,
+    Palette,
+    Series,
+    Strip,
+    bars,
+    loglog,
+    profile_panel,
+    scatter,
+    strips,
+)
 from verify.report.rendering import as_html, as_markdown, print_page
 
-_STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
+_STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations",
+            "positions")  # fmt: skip
 _SCHEMA = 1
+_ALL = "all"  # scenes, of a study of positions
 
 
 def studies_in(directory: Path) -> list[str]:
@@ -56,6 +68,7 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         "record": record,
         "counts": Counter(finding["verdict"] or "SHOWN" for finding in record["findings"]),
         "origin": origin_facts(record),
+        "answer": record.get("answer", []),
         **study_view(kind, record),
     }
     if form == "markdown":
@@ -77,6 +90,7 @@ def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
         "calibration": lambda: {"scatters": _scatters(record["trials"])},
         "thesis": lambda: _thesis(record),
         "iterations": lambda: {"panels": _iterations(record["settings"])},
+        "positions": lambda: _positions(record),
     }
     return views[kind]()
 
@@ -92,6 +106,39 @@ def _iterations(settings: Sequence[Mapping[str, Any]]) -> list[Drawing | None]:
         series = _series(shown, "substeps", "seconds", key, "{} per step".format)
         panels.append(loglog(title, "seconds", series, palette))
     return panels
+
+
+def _positions(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ratios to one solver as strips, and tables of them, over all scenes and each."""
+    measure, palette = record["measure"], Palette()
+    panels, tables = [], []
+    for metric in dict.fromkeys(pair["metric"] for pair in record["pairs"]):
+        own = listed(record["pairs"], metric=metric, rival=measure)
+        strip = []
+        for pair in listed(own, scene=_ALL):
+            (found,) = listed(record["ratios"], metric=metric, solver=pair["solver"])
+            ends = pair["ratio"], pair["low"], pair["high"]
+            strip.append(Strip(solver_title(pair["solver"]), found["ratios"], *ends))
+        title = f"{metric_title(metric)}, over that of {solver_title(measure)}"
+        panels.append(strips(title, strip, palette) if strip else None)
+        places = [_ALL, *record["scenes"]]
+        rows = []
+        for solver in dict.fromkeys(pair["solver"] for pair in own):
+            known = {pair["scene"]: pair for pair in listed(own, solver=solver)}
+            cells = [_ratio(known[place]) if place in known else "–" for place in places]
+            rows.append([solver_title(solver), *cells])
+        heads = [
+            "solver",
+            *(f"{p}, level {record['scenes'][p]}" if p != _ALL else p for p in places),
+        ]
+        said = "median (90 % of the ratios); bold where that range excludes 1"
+        tables.append(Table(f"{title}: {said}", heads, rows, "", True))
+    return {"panels": panels, "tables": tables}
+
+
+def _ratio(pair: Mapping[str, Any]) -> Cell:
+    text = f"{pair['ratio']:.2f} ({pair['low']:.2f} to {pair['high']:.2f})"
+    return Cell(text, strong=pair["differs"])
 
 
 def _series(

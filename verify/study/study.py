@@ -79,9 +79,13 @@ class Study:
         """Return the lines of its table, all with the same keys."""
         raise NotImplementedError
 
+    def tables(self) -> dict[str, list[dict[str, Any]]]:
+        """Return further tables by their names, for files of their own."""
+        return {}
+
 
 def write_study(directory: Path, kind: str, study: Study, command: str) -> Path:
-    """Write ``<kind>.json`` and ``<kind>.csv``; each file is replaced in one step.
+    """Write ``<kind>.json``, ``<kind>.csv`` and further tables; each file is replaced in one step.
 
     Parameters
     ----------
@@ -114,9 +118,9 @@ def write_study(directory: Path, kind: str, study: Study, command: str) -> Path:
     }
     target = directory / f"{kind}.json"
     write_json(document, target)
-    listed = study.rows()
-    table = csv_text(list(listed[0]) if listed else [], listed)
-    write_whole(directory / f"{kind}.csv", table)
+    for name, listed in {kind: study.rows(), **study.tables()}.items():
+        table = csv_text(list(listed[0]) if listed else [], listed)
+        write_whole(directory / f"{name}.csv", table)
     return target
 
 
