@@ -61,7 +61,7 @@ def test_median_and_range_by_hand():
 
 
 def test_scenes_are_joined_ratio_by_ratio_and_not_mean_by_mean():
-    """Ratios 1/2 thrice and 3 once: the median of all is 1/2, that of the scenes' medians 7/4."""
+    """Ratios 1/2 thrice and 3 once: the median of all is 1/2, of the two medians 7/4."""
     study = study_of({"a": [(1.0, 2.0), (2.0, 4.0), (3.0, 6.0)], "b": [(0.3, 0.1)]})
     whole = pair(study, "all", "mine", "conforming")
     assert (whole["ratio"], whole["count"], whole["scenes"]) == (0.5, 4, 2)

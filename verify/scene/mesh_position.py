@@ -64,7 +64,7 @@ def moved_mesh(
     Returns
     -------
     points : (n, d) array
-        Those of the boundary are where they were.
+        The boundary keeps its nodes.
     cells : (m, d + 1) array
         Oriented as before.
     """

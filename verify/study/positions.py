@@ -67,9 +67,9 @@ class PositionsStudy(Study):
     errors : list of dict
         ``scene``, ``position``, ``solver``, ``metric``, ``value`` and the ends of its interval.
     pairs : list of dict
-        ``scene`` (or "all"), ``metric``, ``solver``, ``rival``, ``ratio`` (the median of error over
-        error of the rival), ``low``, ``high``, ``differs`` (1 is not between these), ``count`` of
-        ratios, ``scenes`` that they are from.
+        ``scene`` (or "all"), ``metric``, ``solver`` and ``rival``. The ``ratio`` is the median of
+        error over error of the rival; it ``differs`` where 1 is not from ``low`` to ``high``. There
+        is also the ``count`` of ratios and the number of ``scenes`` with any.
     ratios : list of dict
         To the measure: ``metric``, ``solver`` and all its ``ratios``.
     missing : list of dict
