@@ -346,7 +346,7 @@ def strips(title: str, rows: Sequence[Strip], palette: Palette) -> Drawing:
         for place, row in enumerate(rows):
             style, golden = palette[row.name], 0.618034
             across = [place + 0.6 * ((i * golden) % 1.0 - 0.5) for i in range(len(row.ratios))]
-            axes.plot(row.ratios, across, color=style.colour, marker="o", markersize=2.2,
+            axes.plot(row.ratios, across, color=style.colour, marker="o", markersize=2.8,
                       markeredgewidth=0.0, alpha=0.4, linestyle="none")  # fmt: skip
             axes.plot([row.low, row.high], [place, place], color="#111", linewidth=1.6)
             axes.plot([row.median], [place], color="#111", marker="o", markersize=5)

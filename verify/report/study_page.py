@@ -137,7 +137,7 @@ def _positions(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _ratio(pair: Mapping[str, Any]) -> Cell:
-    text = f"{pair['ratio']:.2f} ({pair['low']:.2f} to {pair['high']:.2f})"
+    text = f"{pair['ratio']:.3g} ({pair['low']:.3g} to {pair['high']:.3g})"
     return Cell(text, strong=pair["differs"])
 
 

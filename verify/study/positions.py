@@ -258,7 +258,7 @@ def _answer(
     said = []
     for differ, words in ((True, "differ"), (False, "are not told apart")):
         names = [
-            f"{p['solver']} {p['ratio']:.2f} ({p['low']:.2f} to {p['high']:.2f})"
+            f"{p['solver']} {p['ratio']:.3g} ({p['low']:.3g} to {p['high']:.3g})"
             for p in _against(pairs, METRICS[0], measure)
             if p["differs"] == differ
         ]
