@@ -18,7 +18,7 @@ statics
     `solve_static` in linear kinematics, `static_equilibrium` at finite rotation
 motion
     `InternalForce` and `side_wise_mass` make a `DynamicBody`; `CentralDifferences` and
-    `EnergyMomentum` are schemes, `run` takes steps, `critical_step` limits those of the first
+    `EnergyMomentum` are schemes, `run` takes steps, `critical_step` limits the steps of the first
 
 Example
 -------
@@ -45,29 +45,29 @@ level set, depth, extent
     of a cut: signed distance from it; distance inward from its ends; where that is positive
     (docstring of `cuts`). But ``mesh.extent`` is the size of the mesh
 realised cut
-    the zero set of the level set as the mesh interpolates it, as far as it splits cells
+    the zero set of the level set as the mesh interpolates it, in the cells that the cut splits
 zero point
     where the level set of a cut, linear on an edge, is zero
 piece
     what the cuts leave of a cell on one side; a cell that no cut splits is one piece. Its *label*
-    tells the side of each cut (±1), 0 where the cut does not split it. The label is geometry; what
-    is apart is told by dof nodes alone
+    tells the side of each cut (±1), 0 where the cut does not split it. The label is geometry; dof
+    nodes alone tell which pieces are connected
 part
-    the pieces of a cell that share all dof nodes: cuts that end on one another leave such pieces,
+    the pieces of a cell that share all dof nodes. Cuts that end on one another leave such pieces,
     and so does a cut through a single cell
 solid
     of pieces: more than round-off of their cell (of bodies and materials: not a membrane)
 dof node, unknown
     one displacement vector. A node of the mesh has one for each piece of material around it that
-    the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes. These are
-    the *side-wise* unknowns, against those of an enrichment, u and a
+    the cuts keep apart: the first n are the mesh nodes, the others are phantom nodes. These are the
+    *side-wise* unknowns; an enrichment has u and a in their place
 free body
-    pieces that hang together by shared dof nodes; a cut through the whole makes two of one
+    pieces connected by shared dof nodes; a cut through the whole makes two of one
 share, fraction
     without further words, of the volume of a cell
 fixed, held
-    a component of a dof node is *fixed* if supports prescribe it; what such components keep in
-    place, a node or a body, is *held*
+    a component of a dof node is *fixed* if supports prescribe it; a node or body that such
+    components keep in place is *held*
 sliver
     a piece with a small share in the volume of its cell
 corner
@@ -78,23 +78,22 @@ membrane
     triangles in space, without bending stiffness
 
 Shapes of arrays: n nodes, m cells, p pieces, N dof nodes, B blocks of a matrix; other letters only
-tell which lengths are equal. The dimension d is that of points and displacements, and d + 1 the
-number of corners of a cell; of a membrane, points have 3 components and cells 3 corners. Kernels
-for all of them count corners by c. Units are SI; in the plane they are per metre of thickness.
+tell which lengths are equal. Points and displacements have d components, cells d + 1 corners; of a
+membrane, points have 3 components and cells 3 corners. Kernels for all of them count corners by c.
+Units are SI; in the plane they are per metre of thickness.
 
-In an order of reading, in which each module imports only those before it (but `cuts`, which hands
-on what `faceted_cuts` defines, and is easier read first):
+The modules in an order of reading; each imports only modules before it. The exception is `cuts`,
+which re-exports `faceted_cuts` and is easier read first:
 
 `arrays`, `mesh`
-    types of arrays, checks of what a user gives and what is raised; simplices, their neighbours and
-    gradients
+    types of arrays, checks of arguments, exceptions; simplices, their neighbours and gradients
 `cuts`, `faceted_cuts`
     what a cut is: a plane or polygon, what a tool sweeps, a polyline, a triangulated surface. The
     solver asks a cut two things only
 `zero_points`, `clip`, `crossing`, `pieces`
-    exact division of cells at zero points of level sets; through which cells a cut goes, and which
-    cells cuts part that end on one another. Begin with the docstring of `pieces`, which says what
-    the others are for; leave the junctions of `crossing` out at first
+    exact division of cells at zero points of level sets; which cells a cut goes through; junctions,
+    where cuts end on one another. Begin with the docstring of `pieces`, which says what the others
+    are for; leave the junctions out at first
 `join`, `phantom`
     which pieces share dof nodes (by contact across faces), and on which side of the cuts pieces and
     dof nodes lie; the result: standard finite elements with weights
@@ -110,17 +109,17 @@ on what `faceted_cuts` defines, and is easier read first):
     a body in motion, and its schemes
 
 Extensions, to be skipped at first: none of the modules above needs them (a contract of the imports
-holds that). Of what a user calls, two need a word. ``static_equilibrium`` is ``LoadPath.follow``:
-for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum.step`` is that of
-``NewtonIntegrator`` in `implicit`, with another force and matrix.
+holds that). Two functions of the package lead there. ``static_equilibrium`` is ``LoadPath.follow``:
+for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum`` inherits its
+``step`` from ``NewtonIntegrator`` in `implicit`, with another force and matrix.
 
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
 `rigid_motion`, `stability`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability, slack membranes
 `energy_balance`, `energy_momentum`, `real_time`, `release`
-    energies of a motion; a scheme that keeps energy and momentum, one of a linear solve per step;
-    the state of a body that is cut on the way, and forces that fade where it lets go
+    energies of a motion; a scheme that keeps energy and momentum; one with a single linear solve
+    per step; the state of a body that is cut on the way, and the tie forces behind the cut
 `subdivision`
     the cut body as a conforming mesh
 `closing`

@@ -1,21 +1,18 @@
 """Cell aggregation: nodes that only slivers use follow the linear field of a root cell.
 
 Badia, Verdugo & Martín, *The aggregated unfitted finite element method for elliptic problems*,
-Comput. Methods Appl. Mech. Engrg. 336 (2018), for the pieces of a body: a piece that is small
-reaches a root, a piece that is not, through the faces that it shares with its neighbours on its
-own side of all cuts. The field stays continuous on each side and every affine field stays in
-the space, so that patch tests hold and rigid motion costs nothing. Differences: there a node
-follows the root of the one cell that owns it; here, of the roots of all small pieces around it,
-the one that continues its field over the shortest way. And a small piece that reaches no root keeps
-its unknowns.
+Comput. Methods Appl. Mech. Engrg. 336 (2018), applied to pieces. A *root* is a piece that is not
+small. A small piece reaches its root through faces, from neighbour to neighbour on its own side of
+all cuts. The field stays continuous on each side. Every affine field stays in the space, so patch
+tests hold and rigid motion costs nothing. In the paper a node follows the root of the one cell that
+owns it. Here it follows, among the roots of all small pieces around it, the one with the shortest
+extrapolation. And a small piece that reaches no root keeps its unknowns.
 
-How far a field is continued to a point is measured by its *reach*, Σ|λ_i| of the barycentric
-coordinates λ of the point in the root: one inside, the larger the farther away, and the norm of the
-extrapolation.
+The *reach* of a point is Σ|λ_i|, λ its barycentric coordinates in the root: the norm of the
+extrapolation to it. It is one inside the root and grows with the distance.
 
-Values at the corners of the pieces are u = C û, û those of the dof nodes. Force, stiffness, mass
-and load are those of the corners, and then f̂ = Cᵀf(C û), K̂ = CᵀKC, M̂ = CᵀMC: elements know nothing
-of it.
+Values at the corners of the pieces are u = C û, with û at the dof nodes. Elements give force f,
+stiffness K and mass M at the corners. The dof nodes have f̂ = Cᵀf(C û), K̂ = CᵀKC and M̂ = CᵀMC.
 """
 
 from dataclasses import dataclass, replace
@@ -59,17 +56,17 @@ class Aggregation:
         return csr_array(self.extension.T)
 
     def mass(self, of_corners: Mass) -> "AggregatedMass":
-        """Mass CᵀMC."""
+        """Make the mass CᵀMC."""
         matrix = csr_array(self.restriction @ of_corners.matrix @ self.extension)
         matrix.sum_duplicates()
         weights = self.restriction @ of_corners.weights
         return AggregatedMass(matrix, None, weights, of_corners, self)
 
     def pattern(self, couplings: Ints) -> "AggregatedPattern":
-        """Sparsity of CᵀKC, with further couplings (k, 2) of dof nodes.
+        """Make the sparsity of CᵀKC, with further couplings (k, 2) of dof nodes.
 
-        From K̂_ij = Σ C_ai C_bj K_ab, block by block: each corner block (a, b) is a term of as many
-        blocks (i, j) as the corners a and b follow nodes.
+        From K̂_ij = Σ C_ai C_bj K_ab, block by block. The corner block (a, b) adds to every block
+        (i, j) such that corner a follows node i and corner b follows node j.
         """
         C, corners = self.extension, self.corners
         of_corners = block_pattern(corners.cells, corners.node_count)
@@ -101,9 +98,9 @@ class AggregatedPattern(BlockPattern):
     Attributes
     ----------
     of_corners : BlockPattern
-        That of K.
+        Sparsity of K.
     folding : (B, B_corners) csr_array
-        Share of each block of K in those of CᵀKC.
+        Share of each block of K in each block of CᵀKC.
     """
 
     of_corners: BlockPattern
@@ -128,8 +125,8 @@ class AggregatedMass(Mass):
     """CᵀMC: the mass of the corners on unknowns that some of them follow, u = C û.
 
     It couples the unknowns of root cells that others follow, and is diagonal elsewhere if M is.
-    Lumped anew it would not bound the explicit step: from K ≤ ω²M follows CᵀKC ≤ ω²CᵀMC, and
-    nothing of other masses.
+    Lumping it would lose the bound of the explicit step: K ≤ ω²M implies CᵀKC ≤ ω²CᵀMC, and nothing
+    for other masses.
 
     Attributes
     ----------
@@ -143,11 +140,11 @@ class AggregatedMass(Mass):
 
     @property
     def keeps_element_steps(self) -> bool:
-        """Whether no cut makes the explicit step smaller than that of the smallest element."""
+        """Whether the step of the smallest uncut element is stable, whatever the cuts."""
         return self.of_corners.keeps_element_steps
 
     def solve(self, forces: Floats) -> Floats:
-        """M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
+        """Compute M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
         coupled, factor = self._coupled
         found = forces / self.matrix.diagonal()[:, None]
         if len(coupled):
@@ -164,9 +161,9 @@ class AggregatedMass(Mass):
         return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
 
     def project(self, corner_values: Floats, held: Bools, values: Floats) -> Floats:
-        """Values (N, d) nearest to those at the corners in the mass, given where held (N, d).
+        """Project corner values on the dof nodes (N, d) in the norm of the mass, except where held.
 
-        Of a velocity: linear and angular momentum of every part without a support stay.
+        Of a velocity it keeps the linear and angular momentum of every part without a support.
         """
         moment = self.aggregation.restriction @ self.of_corners.apply(corner_values)
         found = np.where(held, values, 0.0)
@@ -190,7 +187,7 @@ def aggregate(
         Without aggregation.
     small : (p,) bool array
     supported : (N,) bool array
-        Dof nodes that keep their unknown, those of supports.
+        Dof nodes of supports, which keep their unknown.
 
     Returns
     -------
@@ -217,10 +214,10 @@ def aggregate(
 
 
 def _reached(phantom: PhantomMesh, small: Bools) -> tuple[Ints, Ints]:
-    """Pairs (k,), (k,) of small pieces and a root each, layer by layer away from the roots.
+    """Find pairs (k,), (k,) of small pieces and a root each, layer by layer away from the roots.
 
-    A piece takes the root from which its own corners are continued over the shortest way, among
-    those of its neighbours one layer closer.
+    Among the roots of its neighbours one layer closer, a piece takes the one with the least reach
+    to its own corners.
     """
     contacts = face_contacts(phantom, near=True)
     first, second = np.concatenate(contacts), np.concatenate(contacts[::-1])
@@ -238,7 +235,7 @@ def _reached(phantom: PhantomMesh, small: Bools) -> tuple[Ints, Ints]:
 
 
 def _best(phantom: PhantomMesh, key: Ints, root: Ints, reach: Floats) -> Ints:
-    """Row of the best root for each key: least reach, then largest, then by place."""
+    """Choose a row for each key: its root has the least reach, then the largest size."""
     place = phantom.piece_centroids[root]
     place = np.round(place / phantom.mesh.extent, _DIGITS)
     size = np.round(phantom.fraction[root], _DIGITS)
@@ -247,7 +244,7 @@ def _best(phantom: PhantomMesh, key: Ints, root: Ints, reach: Floats) -> Ints:
 
 
 def _coordinates(phantom: PhantomMesh, points: Floats, root: Ints) -> Floats:
-    """(q, k, d + 1) barycentric coordinates of points (q, k, space) in the cells of the roots."""
+    """Compute barycentric coordinates (q, k, d + 1) of points (q, k, space) in the roots."""
     mesh, cell = phantom.mesh, phantom.parent[root]
     origin = mesh.points[mesh.cells[cell, 0]]
     at = np.einsum("qks,qis->qki", points - origin[:, None], mesh.gradients[cell])
@@ -258,10 +255,10 @@ def _coordinates(phantom: PhantomMesh, points: Floats, root: Ints) -> Floats:
 def _continued(
     phantom: PhantomMesh, alone: Bools, sliver: Ints, root: Ints
 ) -> tuple[Ints, Floats, Ints]:
-    """Nodes (k,) that follow a root, weights (k, d + 1) of its corners, and the root (k,).
+    """Find nodes (k,) that follow a root, weights (k, d + 1) of its corners, and the root (k,).
 
-    Off the plane of the root triangle of a membrane there is no such field: nodes there are left
-    alone.
+    Off the plane of the root triangle of a membrane there is no such field; nodes there follow
+    none.
     """
     row, corner = np.nonzero(alone[phantom.cells[sliver]])
     node, root = phantom.cells[sliver[row], corner], root[row]

@@ -1,4 +1,4 @@
-"""Types of arrays, checks of the arrays and words that a user gives, and what is raised.
+"""Types of arrays, checks of arguments, and exceptions.
 
 `what` and `name` say in the message which argument is wrong.
 """
@@ -53,7 +53,7 @@ def check_choice(given: str, choices: Any, what: str) -> None:
 
 
 def real_array(given: ArrayLike, what: str) -> Floats:
-    """Real numbers of any shape, as a copy: the caller may change the array afterwards.
+    """Copy real numbers of any shape: the caller may change the array afterwards.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def real_array(given: ArrayLike, what: str) -> Floats:
 
 
 def finite_array(given: ArrayLike, what: str, *shapes: tuple[int | None, ...]) -> Floats:
-    """Finite real numbers in one of some shapes, a copy; None stands for any length.
+    """Copy finite real numbers in one of some shapes; None stands for any length.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def finite_array(given: ArrayLike, what: str, *shapes: tuple[int | None, ...]) -
 
 
 def index_array(given: ArrayLike, what: str) -> Ints:
-    """Integers of any shape, as a copy; an empty list may be of any type.
+    """Copy integers of any shape; an empty list may be of any type.
 
     Raises
     ------

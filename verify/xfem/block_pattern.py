@@ -71,7 +71,7 @@ class BlockPattern:
 
 
 def block_pattern(cells: Ints, node_count: int) -> BlockPattern:
-    """Sparsity of a mesh: nodes are coupled when a cell contains both.
+    """Make the sparsity of a mesh: nodes are coupled when a cell contains both.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def block_pattern(cells: Ints, node_count: int) -> BlockPattern:
 
 @njit(cache=True)
 def _pattern(cells, first, around):
-    """Rows, columns and targets; `around` holds the cells of node n from first[n] on."""
+    """Make rows, columns and targets; `around` holds the cells of node n from first[n] on."""
     (count, corners), nodes = cells.shape, len(first) - 1
     mark, used = np.full(nodes, -1), 0
     starts = np.zeros(nodes + 1, dtype=np.int32)
@@ -134,7 +134,7 @@ def _pattern(cells, first, around):
 
 @njit(cache=True)
 def _order(keys, count):
-    """Stable order of keys in 0…count − 1, by counting."""
+    """Sort keys in 0…count − 1 stably, by counting."""
     fill, order = np.zeros(count + 1, dtype=np.int64), np.empty(len(keys), dtype=np.int32)
     for key in keys:
         fill[key + 1] += 1
@@ -146,7 +146,7 @@ def _order(keys, count):
 
 
 def body_pattern(phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPattern:
-    """Sparsity of a body; its first cells are the pieces.
+    """Make the sparsity of a body; its first cells are the pieces.
 
     Parameters
     ----------
@@ -162,14 +162,14 @@ def body_pattern(phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPa
 
 
 def _with_pairs(cells: Ints, pairs: Ints) -> Ints:
-    """Cells, then for each pair (i, j) a cell [i, j, j, …], which couples the same two nodes."""
+    """Append for each pair (i, j) a cell [i, j, j, …], which couples the two nodes."""
     if len(pairs) == 0:
         return cells
     return np.concatenate([cells, pairs[:, [0] + [1] * (cells.shape[1] - 1)]])
 
 
 def pattern_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> Ints:
-    """Blocks (k,) at the given rows (k,) and columns (k,).
+    """Find blocks (k,) at the given rows (k,) and columns (k,).
 
     Raises
     ------
@@ -185,7 +185,7 @@ def pattern_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> Ints:
 
 
 def find_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> tuple[Ints, Bools]:
-    """Blocks (k,) at the given rows and columns (k,), and whether the pattern has them (k,)."""
+    """Find blocks (k,) at given rows and columns (k,), and whether the pattern has them (k,)."""
     of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
     keys = of_row * pattern.node_count + pattern.columns
     wanted = rows * pattern.node_count + columns
@@ -200,9 +200,9 @@ def add_mass(blocks: Floats, places: Ints, values: Floats, scale: float) -> None
 
 
 def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
-    """Entries (k,) of the blocks, flattened, in rows and columns of fixed components (N, d).
+    """Find entries (k,) of the blocks, flattened, in rows and columns of fixed components (N, d).
 
-    Those on the diagonal of the matrix are left out.
+    Entries on the diagonal of the matrix are left out.
     """
     rows = np.repeat(np.arange(len(fixed)), np.diff(pattern.starts))
     some = fixed.any(axis=1)
@@ -216,16 +216,15 @@ def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
 def constrain(
     pattern: BlockPattern, fixed: Bools, blocks: Floats, held: Ints | None = None
 ) -> None:
-    """Decouple the fixed components: zero their rows and columns but for the diagonal.
+    """Decouple the fixed components: zero their rows and columns except the diagonal.
 
     Parameters
     ----------
     pattern : BlockPattern
     fixed : (N, d) bool array
     blocks : (B, d, d) float array
-        Changed in place; the diagonal entries stay, so that scaling stays meaningful, but for
-        those that are not positive (zero or its round-off across a flat membrane, less than that
-        across a compressed one), which become one.
+        Changed in place. Positive diagonal entries stay, so that scaling stays meaningful. Those
+        that are zero or negative, as across a flat or compressed membrane, become one.
     held : (k,) int array, optional
         From `held_entries`, if that is known.
     """

@@ -1,8 +1,8 @@
 """Body in motion: elasticity, mass, damping, supports and loads of a cut body, and its state.
 
-Each time integration advances M (v₁ − v₀) = h (f_ext − f_int − f_visc + reactions) with forces of
-its own choice, or balances them with an inertia of its own. A step returns those forces, so that
-the energy balance closes for any scheme without knowing which one it was.
+Each scheme advances M (v₁ − v₀) = h (f_ext − f_int − f_visc + reactions), and chooses at which
+instants it takes the forces. Some replace the left-hand side by an inertia of their own. A step
+returns its forces, so that the energy balance closes for every scheme.
 """
 
 from collections.abc import Callable
@@ -84,7 +84,7 @@ class MovingSupports:
     motion: Callable[[float], tuple[Floats, Floats]]
 
     def at(self, time: float) -> tuple[Floats, Floats]:
-        """Prescribed displacement and velocity (N, d).
+        """Evaluate the prescribed displacement and velocity (N, d).
 
         Raises
         ------
@@ -115,15 +115,15 @@ class Contact(Protocol):
     def couplings(self) -> Ints: ...  # noqa: D102
 
     def energy(self, displacement: Floats) -> float:
-        """Energy in joules at a displacement (N, d)."""
+        """Compute the energy in joules at a displacement (N, d)."""
         ...
 
     def force(self, displacement: Floats) -> Floats:
-        """Slope (N, d) of the energy, in newtons."""
+        """Compute the slope (N, d) of the energy, in newtons."""
         ...
 
     def touching(self, displacement: Floats) -> Bools:
-        """Whether faces press on each other, (f, q)."""
+        """Tell whether faces press on each other, (f, q)."""
         ...
 
     def add_stiffness(self, pattern: BlockPattern, blocks: Floats, touching: Bools | bool) -> None:
@@ -255,13 +255,13 @@ class DynamicBody:
         self.moving = isinstance(supports, MovingSupports)
 
     def step_solver(self, tolerance: float) -> LinearSolver:
-        """Make the linear solver of implicit steps; the tolerance is that of iterations."""
+        """Make the linear solver of implicit steps; the tolerance is for iterative ones."""
         phantom, held = self.force.phantom, self.fixed.all(axis=1)
         solid = phantom.mesh.dim == 3
         return self.force.kernels.step(self.pattern, self.shape[1], held, solid, tolerance)
 
     def rest(self) -> MotionState:
-        """Undeformed and at rest at time 0, apart from what the supports prescribe."""
+        """Make the undeformed state at rest at time 0; supports prescribe their components."""
         state = MotionState(np.zeros(self.shape), np.zeros(self.shape))
         displacement, velocity = self.prescribed(0.0)
         state.displacement[self.fixed] = displacement[self.fixed]
@@ -269,14 +269,14 @@ class DynamicBody:
         return state
 
     def prescribed(self, time: float) -> tuple[Floats, Floats]:
-        """Displacement and velocity (N, d) of the supports at a time."""
+        """Compute the displacement and velocity (N, d) of the supports at a time."""
         if isinstance(self.supports, MovingSupports):
             return self.supports.at(time)
         assert self.supports is not None
         return self.supports.values, np.zeros(self.shape)
 
     def external(self, time: float) -> Floats:
-        """Weight, load and tie forces (N, d) at a time, in newtons.
+        """Sum weight, load and tie forces (N, d) at a time, in newtons.
 
         Raises
         ------
@@ -295,9 +295,9 @@ class DynamicBody:
         return total if self.tie is None else total + self.tie(time)
 
     def viscous(self, velocity: Floats, at: Configuration | None) -> Floats:
-        """Damping force C v (N, d), K with the rotations of a configuration.
+        """Compute the damping force C v (N, d), K with the rotations of a configuration.
 
-        None will do without damping of the stiffness.
+        The configuration may be None if β = 0.
         """
         if self.damping.mass == 0.0 and self.damping.stiffness == 0.0:
             return np.zeros(self.shape)
@@ -322,7 +322,7 @@ class StepForces:
     inertia : (N, d) float array, optional
         What the step has balanced with them, where that is not M (v₁ − v₀)/h.
     loaded_at : tuple of (share, weight)
-        Instants of the step, as shares of it, at which the external forces are those of the body,
+        Instants of the step, as shares of it, at which it takes the external forces of the body,
         and the weight of each.
     """
 
@@ -353,7 +353,7 @@ class Integrator(Protocol):
 
 
 def check_no_contact(body: DynamicBody, scheme: str) -> None:
-    """Check that a body has no contact, for a scheme that has none.
+    """Check that a body has no contact, for a scheme that cannot treat it.
 
     Raises
     ------
@@ -409,7 +409,7 @@ class FreeMass:
             self._solvers = [_supported(body, k) for k in range(body.shape[1])]
 
     def solve(self, forces: Floats) -> Floats:
-        """Accelerations (N, d) of forces (N, d), zero where held; writes on the forces."""
+        """Compute accelerations (N, d) of forces (N, d), zero where held; writes on the forces."""
         forces[self._body.fixed] = 0.0
         if self._solvers is None:
             return self._body.mass.solve(forces)
@@ -418,7 +418,7 @@ class FreeMass:
 
 
 def couples_supports(body: DynamicBody) -> bool:
-    """Whether an acceleration of held components moves free ones through the mass."""
+    """Tell whether an acceleration of held components moves free ones through the mass."""
     if body.mass.diagonal is not None:
         return False
     rows, columns, _ = body.mass.entries
@@ -426,7 +426,7 @@ def couples_supports(body: DynamicBody) -> bool:
 
 
 def _supported(body: DynamicBody, component: int) -> SuperLU:
-    """Factor of the mass of the free nodes in one component."""
+    """Factorise the mass of the free nodes in one component."""
     free = diags_array((~body.fixed[:, component]).astype(float))
     held = diags_array(body.fixed[:, component].astype(float))
     return splu(csc_array(free @ body.mass.matrix @ free + held))

@@ -1,10 +1,10 @@
 """Division of simplices by linear level sets, into sub-simplices with exact volume shares.
 
-The part of a simplex on one side of a plane is a staircase of simplices: the plus vertices p and
-the minus vertices m span a product, every lattice path through which gives one sub-simplex. The
-vertices are corners or points z_pm = s p + r m of the zero set, with r = φ_p/(φ_p − φ_m) and
-s = −φ_m/(φ_p − φ_m). Along a path each vertex brings in one new corner, so the determinant is
-triangular and the volume share is a *product* of positive r and s: no cancellation however thin
+The part of a simplex on one side of a plane is a staircase of simplices. Take the grid of all pairs
+of a plus vertex p and a minus vertex m; every lattice path through it gives one sub-simplex. Its
+vertices are corners, or points z_pm = s p + r m of the zero set. Here r = φ_p/(φ_p − φ_m) and s =
+−φ_m/(φ_p − φ_m). Along a path each vertex brings in one new corner, so the determinant is
+triangular. The volume share is then a *product* of positive r and s: nothing cancels, however thin
 the sliver. Paths follow the order of the corners; with corners ordered by their global number the
 sub-simplices of neighbours match on shared faces.
 
@@ -14,9 +14,10 @@ A triangle with a above, b and c below, and zero points ab, ac, has three of the
     below   b ab ac   s_ab r_ac
     below   b c ac    s_ac
 
-The first zero point of a path lies on an edge from a corner that is there, a or b or c, and brings
-in the other end: m with r, p with s. Each step to a next m brings that in with its r, to a next p
-with its s. The quadrilateral ab ac c b has the diagonal b–ac: from the smaller corner number.
+The first zero point of a path lies on an edge from the corner before it (a, b or c). It brings in
+the other end of that edge: m with r, p with s. Each step to a next m brings that m in with its r, a
+step to a next p with its s. The quadrilateral ab ac c b has the diagonal b–ac: from the smaller
+corner number.
 
 Where a cut ends, the cells that it divides have points on faces and edges that their undivided
 neighbours do not know of. Bisected at these (`bisected`), the neighbours match again.
@@ -37,7 +38,7 @@ from verify.xfem.zero_points import ZeroPoints
 
 _Path = list[tuple[int, int]]
 
-# Share in the volume of its cell up to which a piece is of round-off size: what is lost in the sum
+# Share in the volume of its cell up to which a piece is of round-off size: less is lost in the sum
 # of the volumes of the pieces.
 ROUND_OFF_SHARE = np.finfo(float).eps
 
@@ -99,7 +100,7 @@ def staircase(corners: int) -> Staircase:
 def _sub_simplices(
     above: list[int], below: list[int]
 ) -> Iterator[tuple[int, _Path, list[tuple[int, int, int]]]]:
-    """(side, vertices, factors) of all sub-simplices."""
+    """Yield (side, vertices, factors) of all sub-simplices."""
     end = len(above) - 1, len(below) - 1
     for side, own in ((1, above), (-1, below)):
         for first in range(len(own)):
@@ -113,7 +114,7 @@ def _sub_simplices(
 
 
 def _lattice_paths(start: tuple[int, int], end: tuple[int, int]) -> Iterator[_Path]:
-    """Monotone paths from start to end, one step in one direction at a time."""
+    """Yield monotone paths from start to end, one step in one direction at a time."""
     down, right = end[0] - start[0], end[1] - start[1]
     for turns in combinations(range(down + right), down):
         path = [start]
@@ -150,7 +151,7 @@ class Simplices:
 
     @staticmethod
     def of_cells(piece: Ints, cells: Ints) -> "Simplices":
-        """Whole cells (q, c) as simplices."""
+        """Take whole cells (q, c) as simplices."""
         count, corners = cells.shape
         eye = np.broadcast_to(np.eye(corners), (count, corners, corners))
         return Simplices(piece, cells, eye, np.ones(count), np.ones(count, dtype=np.int8))
@@ -169,7 +170,7 @@ class Simplices:
 
 
 def staircase_entries(plus: Bools) -> tuple[Ints, Ints]:
-    """Entries (k,) of the staircase for simplices with signs (q, c); the simplex (k,) of each."""
+    """Find entries (k,) of staircase for simplices with signs (q, c); the simplex (k,) of each."""
     stairs = staircase(plus.shape[1])
     pattern = plus @ (1 << np.arange(plus.shape[1]))
     count = stairs.start[pattern + 1] - stairs.start[pattern]
@@ -189,7 +190,7 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> S
     cut : (p,) int array
         Cut that divides each piece; any if none does.
     below : (p,) int array
-        Piece that takes what is on the minus side of each piece; −1 if that is not divided.
+        Piece that takes the minus side of each piece; −1 if that is not divided.
     """
     touched = np.flatnonzero(below[simplices.piece] >= 0)
     piece = simplices.piece[touched]
@@ -234,7 +235,7 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> S
 
 
 def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices:
-    """Bisect simplices at those of the given points that lie on their edges.
+    """Bisect simplices at the given points that lie on their edges.
 
     Parameters
     ----------
@@ -252,7 +253,7 @@ def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices
     done, rest = simplices[~some], simplices[some]
     pairs = np.array(list(combinations(range(simplices.points.shape[1]), 2)))
     while len(rest):
-        # of the points on its edges, every simplex is bisected at that which comes first
+        # a simplex is bisected at the first of the points on its edges
         edges = _edge_keys(*rest.points[:, pairs.T].transpose(1, 0, 2))
         place = np.minimum(np.searchsorted(key, edges), len(key) - 1)
         first = np.where(key[place] == edges, rank[place], none)
@@ -265,7 +266,7 @@ def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices
 
 
 def facets_between(parent: Ints, piece: Ints, points: Ints) -> tuple[Ints, Ints, Ints]:
-    """Facets (f, d) of sub-simplices between two pieces of one cell, and both pieces (f,), (f,).
+    """Find facets (f, d) of sub-simplices between two pieces of a cell, and both pieces (f,), (f,).
 
     It relies on sub-simplices of a cell that match facet by facet: `divided` makes them so by the
     order of corners, `bisected` beside the ends of cuts.
@@ -289,7 +290,7 @@ def _edge_keys(one: Ints, other: Ints) -> Ints:
 
 
 def _halves(simplices: Simplices, zero: ZeroPoints, at: Ints, edge: Ints) -> Simplices:
-    """Halves of simplices at points (q,), by place in `ends`, on their edges (q, 2) of corners."""
+    """Halve simplices at points (q,), by place in `ends`, on their edges (q, 2) of corners."""
     row, ends = np.arange(len(simplices)), zero.ends[at]
     turned = simplices.points[row, edge[:, 0]] != ends[:, 0]
     plus, minus = np.where(turned[:, None], edge[:, ::-1], edge).T
@@ -340,7 +341,7 @@ class Partition:
 
     @staticmethod
     def whole(cells: Ints, chosen: Ints, points: ZeroPoints, snapped: int) -> "Partition":
-        """One piece of each chosen cell, before any cut."""
+        """Make one piece of each chosen cell, before any cut."""
         label = np.zeros((len(chosen), points.values.shape[1]), dtype=np.int8)
         simplices = Simplices.of_cells(np.arange(len(chosen)), cells[chosen])
         return Partition(chosen, label, simplices, points, snapped, np.arange(len(chosen)))
@@ -357,7 +358,7 @@ class Partition:
         return np.bincount(sub.piece, sub.fraction, minlength=len(self.parent))
 
     def crossed_edges(self, cut: Ints) -> tuple[Ints, Ints]:
-        """Edges (q, 2) from plus to minus that the cut of a piece crosses, and the piece (q,).
+        """Find edges (q, 2) from plus to minus that the cut of a piece crosses, and the piece (q,).
 
         Parameters
         ----------

@@ -81,7 +81,8 @@ class ClosingFaces:
     phantom : PhantomMesh
     material : Material
     cuts : sequence of Cut
-        As asked; the normals of curved ones. Without them, and in motion, those of facets serve.
+        As asked, for the normals of curved ones. Without them, and in motion, normals of facets
+        serve.
     moving : bool
         Whether the energy is a penalty, without σ; see the docstring of the module.
 
@@ -174,7 +175,7 @@ class ClosingFaces:
         self._entries: tuple[BlockPattern, csc_array, Floats] | None = None
 
     def _of_nodes(self, rows: Floats) -> csr_array:
-        """Matrix (k, N d) of rows (f, …, 2 (d + 1), d), by the displacements of the dof nodes."""
+        """Make the matrix (k, N d) of rows (f, …, 2 (d + 1), d), by displacements of dof nodes."""
         space, width = rows.shape[-1], self.nodes.shape[1] * rows.shape[-1]
         columns = self.nodes[..., None] * space + np.arange(space)
         columns = np.broadcast_to(columns.reshape(len(rows), 1, width), (*rows.shape[:2], width))
@@ -191,28 +192,28 @@ class ClosingFaces:
         return np.unique(np.sort(pairs.reshape(-1, 2), axis=1), axis=0)
 
     def trial_stress(self, displacement: Floats) -> Floats:
-        """σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
+        """Compute σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
         trial = (self._trial @ displacement.ravel()).reshape(self.weights.shape)
         return trial + self.stiffness[:, None] * self.slide
 
     def slid(self, displacement: Floats) -> Floats:
-        """Gap (f, q) in metres by which curved faces open as they slide; see `slide`."""
+        """Compute gap (f, q) in metres by which curved faces open as they slide; see `slide`."""
         if self._bend is None:
             return self.slide
         return (self._bend @ displacement.ravel()).reshape(self.weights.shape)
 
     def pressure(self, displacement: Floats) -> Floats:
-        """Pressure (f, q) between the faces in pascal; zero where they are apart."""
+        """Compute the pressure (f, q) between the faces in pascal; zero where they are apart."""
         return np.maximum(0.0, -self.trial_stress(displacement))
 
     def energy(self, displacement: Floats) -> float:
-        """Energy in joules beside the elastic one, negative where faces that are apart bear σ."""
+        """Return the energy in joules beside the elastic one; open faces that bear σ lower it."""
         own = self._mean @ displacement.ravel()
         squares = self.pressure(displacement) ** 2 - own[:, None] ** 2
         return float(np.sum(self._per_stiffness * squares)) / 2.0
 
     def force(self, displacement: Floats, tied: bool = False) -> Floats:
-        """Slope (N, d) of the energy, in newtons; or with the normal jump of all faces tied."""
+        """Return the slope (N, d) of the energy, in newtons; or with all normal jumps tied."""
         traction = self.trial_stress(displacement)
         if not tied:
             traction = np.minimum(traction, 0.0)
@@ -221,7 +222,7 @@ class ClosingFaces:
         return total.reshape(displacement.shape)
 
     def touching(self, displacement: Floats) -> Bools:
-        """Whether faces press on each other, (f, q)."""
+        """Tell whether faces press on each other, (f, q)."""
         return self.trial_stress(displacement) < 0.0
 
     def add_stiffness(
@@ -244,7 +245,7 @@ class ClosingFaces:
         blocks += (of_points @ closed.astype(float) - own).reshape(blocks.shape)
 
     def _stiffness_of_points(self, pattern: BlockPattern, space: int) -> tuple[csc_array, Floats]:
-        """Entries (B d², f q) of the blocks by each point that touches, and of −∫ σ²/γ (B d²,)."""
+        """Find entries (B d², f q) of blocks by each point that touches, and of −∫ σ²/γ (B d²,)."""
         rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
         blocks = pattern_places(pattern, rows.ravel(), columns.ravel()).reshape(rows.shape)
         axes = np.arange(space**2).reshape(space, space)
@@ -301,7 +302,7 @@ def _curved(flat: Floats, points: Floats, step: Floats, cuts: Sequence[Cut]) -> 
 
 
 def _faces_of_pieces(parts: Ints) -> Ints:
-    """Most of the faces that one of the two pieces (f, 2) of each facet has; a face is a pair."""
+    """Count faces of both pieces (f, 2) of each facet, and return the larger; a face is a pair."""
     pairs, which = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
     count = np.bincount(pairs.ravel(), minlength=parts.max(initial=0) + 1)
     return count[pairs].max(axis=1)[which.ravel()]
@@ -359,7 +360,7 @@ class _Closing:
         return elastic + self.faces.energy(u) - float(np.vdot(self.load, u))
 
     def residual(self, u: Floats) -> tuple[Floats, float]:
-        """Residual (N, d), and the largest of the forces in it."""
+        """Compute the residual (N, d), and the largest of the forces in it."""
         internal, contact = self.force.evaluate(u)[0], self.faces.force(u)
         scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
         return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
@@ -373,7 +374,7 @@ class _Closing:
         return self.solver.solve(residual)
 
     def tied(self, values: Floats) -> Floats:
-        """Displacement (N, d) with all faces tied, from the prescribed one."""
+        """Solve for the displacement (N, d) with all faces tied, from the prescribed one."""
         force = self.force.evaluate(values)[0]
         force += self.faces.force(values, tied=True)
         residual = np.where(self.fixed, 0.0, self.load - force)
@@ -423,7 +424,7 @@ class _Closing:
 def solve_closed(
     force: InternalForce, faces: ClosingFaces, supports: Supports, load: Floats | None = None
 ) -> ClosedSolution:
-    """Equilibrium with linear kinematics of a body whose faces may touch and not overlap.
+    """Solve for the equilibrium, in linear kinematics, of a body whose faces may touch.
 
     It begins with all faces tied in the normal direction.
 

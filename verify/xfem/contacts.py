@@ -17,7 +17,7 @@ from verify.xfem.phantom import PhantomMesh
 
 
 def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]:
-    """Pairs of pieces (k,), (k,), of neighbouring cells, that share all dof nodes of a face.
+    """Find pairs of pieces (k,), (k,), of neighbouring cells, that share all dof nodes of a face.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]
 
 
 def sibling_contacts(phantom: PhantomMesh, cells: Ints) -> tuple[Ints, Ints, Floats]:
-    """Pairs of pieces (k,), (k,) in the given cells, and the area (k,) of the cut between them.
+    """Find pairs of pieces (k,), (k,) in given cells, and the area (k,) of the cut between them.
 
     Each pair comes in both orders, and once for each facet of sub-simplices that they have in
     common; its area is in m^(d − 1).
@@ -147,7 +147,7 @@ def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints]:
 
 
 def extension_of(node: Ints, rows: Ints, columns: Ints, weights: Floats) -> csr_array:
-    """Old unknowns (N,) from the new ones: those that are kept, and those that follow others.
+    """Map new unknowns to the old ones (N,), of which some are kept and some follow others.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def extension_of(node: Ints, rows: Ints, columns: Ints, weights: Floats) -> csr_
     rows : (k,) int array
         Unknowns that follow others.
     columns, weights : (k, m) array
-        Which new ones, and with what weights; those of weight zero are left out.
+        Which new ones, and with what weights; entries of weight zero are left out.
     """
     kept = np.flatnonzero(node >= 0)
     entries = np.concatenate([np.ones(len(kept)), weights.ravel()])

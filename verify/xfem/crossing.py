@@ -1,14 +1,13 @@
-"""Through which pieces a cut goes, and which pieces cuts part that end on one another.
+"""Which pieces a cut goes through, and which cells are junctions.
 
-A cut divides the pieces that it goes through. That is read off the zero points on the edges of a
-piece: are they inside the extent of the cut? A branch on a stem that goes through is decided so,
-too: it splits what the stem leaves.
+A cut divides the pieces that it goes through: the zero points on the edges of such a piece lie
+inside the extent of the cut. The same test serves a branch on a stem that goes through: the branch
+splits the pieces that the stem leaves.
 
-At a junction cuts end on one another inside an element: each of them alone divides nothing there,
-and yet together they part the material. There every cut divides whatever its plane crosses. Of the
-facets between the pieces that this leaves, those inside the extent of a cut keep apart; pieces that
-meet in another facet are one part. Several cuts make a junction of a cell if that leaves more parts
-than what each goes through by itself.
+At a junction cuts end on one another inside an element. Each of them alone divides nothing there,
+and yet together they part the material. There every cut divides whatever its plane crosses. Then
+facets inside the extent of a cut keep their two pieces apart; pieces that meet in another facet are
+one part. A cell is a junction if this leaves more parts than the cuts that go through it alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -51,7 +50,7 @@ class Crossing(NamedTuple):
 
 
 def level_and_depth(cut: Cut, points: Floats) -> tuple[Floats, Floats]:
-    """Level set (n,) and depth (n,) of a cut at points (n, d), in metres.
+    """Compute the level set (n,) and depth (n,) of a cut at points (n, d), in metres.
 
     Raises
     ------
@@ -71,7 +70,7 @@ def level_and_depth(cut: Cut, points: Floats) -> tuple[Floats, Floats]:
 
 
 def levels_and_depths(cuts: Sequence[Cut], of: Ints, points: Floats) -> tuple[Floats, Floats]:
-    """Level set (n,) and depth (n,) at points (n, d), each of one of the cuts, in metres.
+    """Compute level set (n,) and depth (n,) at points (n, d), each of one of the cuts, in metres.
 
     Raises
     ------
@@ -93,10 +92,10 @@ def crossed_through(
     tip: TipRule,
     reached: Reached | None = None,
 ) -> tuple[Bools, Bools]:
-    """Which pieces (p,) their cuts go through, and in which (p,) they end by the rule `inside`.
+    """Tell which pieces (p,) their cuts go through, and in which (p,) they end by rule `inside`.
 
-    By the other rules they end in none. A piece is gone through if all of its zero points are
-    inside the extent (`inside`), if one is (`through`), or if their mean is (`nearest`).
+    By the other rules they end in none. A cut goes through a piece by its zero points. By `inside`
+    all must be inside the extent, by `through` one, by `nearest` their mean.
 
     Parameters
     ----------
@@ -134,7 +133,7 @@ def crossed_through(
 
 
 def _mostly_crossed(cuts: Sequence[Cut], positions: Floats, crossing: Crossing) -> Bools:
-    """Which pieces their cuts cross as far as the centre of the section."""
+    """Tell which pieces have the centre of their section inside the extent of their cut."""
     pairs, first = np.unique(np.stack([crossing.piece, crossing.zero]), axis=1, return_index=True)
     count = np.bincount(pairs[0], minlength=crossing.pieces)
     found = np.flatnonzero(count)
@@ -169,7 +168,7 @@ def junction_cuts(
     sizes: Floats,
     known: Bools | None = None,
 ) -> Bools:
-    """Which cuts (m, cuts) part which cells at a junction.
+    """Tell which cuts (m, cuts) part which cells at a junction.
 
     Parameters
     ----------
@@ -205,7 +204,7 @@ def junction_cuts(
     more = parts > np.bincount(partition.parent[partition.solid], minlength=len(sizes))
     if known is not None:
         more |= known & suspects
-    # of the cuts those that keep two parts asunder
+    # of the cuts the ones that keep two parts apart
     forced = np.zeros_like(meets)
     apart = part[facets.first] != part[facets.second]
     facet, cut = np.nonzero(inside & apart[:, None])
@@ -217,7 +216,7 @@ def junction_cuts(
 def pieces_of_one_part(
     partition: Partition, cuts: Sequence[Cut], boxes: Floats, sizes: Floats, cells: Bools
 ) -> Ints:
-    """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
+    """Find pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
     if not cells.any():
         return np.empty((0, 2), dtype=np.int64)
     facets = _inner_facets(partition, cells)
@@ -235,7 +234,7 @@ def _add_meeting_cuts(meets: Bools, partition: Partition, known: Bools | None) -
 
 
 def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
-    """Facets between sub-simplices in different solid pieces of one of some cells (m,)."""
+    """Find facets between sub-simplices in different solid pieces of one of some cells (m,)."""
     sub = partition.simplices
     sub = sub[
         cells[partition.parent[sub.piece]] & partition.solid[sub.piece] & (sub.fraction > 0.0)
@@ -246,7 +245,7 @@ def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
 def _inside_extent(
     partition: Partition, facets: _Facets, cuts: Sequence[Cut], boxes: Floats, sizes: Floats
 ) -> Bools:
-    """Which facets lie inside the extent of each cut that has their pieces on its two sides."""
+    """Tell which facets lie inside extent of each cut that has their pieces on its two sides."""
     label, zero = partition.label, partition.points
     found = np.zeros((len(facets.points), len(cuts)), dtype=bool)
     facet, cut = np.nonzero(label[facets.first] * label[facets.second] < 0)
@@ -267,7 +266,7 @@ def _inside_extent(
 def reached(
     cuts: Sequence[Cut], boxes: Floats, zero: ZeroPoints, own: Ints, points: Ints, size: Floats
 ) -> Bools:
-    """Which points past the end of a cut it reaches all the same: it ends on another cut there.
+    """Tell which points past the end of a cut belong to it, as it ends on another cut there.
 
     A cut that is bent inside an element is realised a little beside where it was given. A branch
     that ends on the given one goes on to the realised one, over the points between the two.
@@ -278,9 +277,9 @@ def reached(
                  its end, on   point  realised stem
               the given stem
 
-    So a point × counts if the stem as given and as realised lie on its two sides, the end is on the
-    given stem, and what is just inside of the end lies beyond the given stem, seen from ×.
-    Plain branches need this as well as junctions.
+    So a point × counts under three conditions. The stem as given and the stem as realised lie on
+    its two sides; the end is on the given stem; and the branch just inside its end lies beyond the
+    given stem, seen from ×. Plain branches need this as well as junctions.
 
     Parameters
     ----------
@@ -316,7 +315,7 @@ def reached(
 
 
 def _end(cuts: Sequence[Cut], of: Ints, points: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Nearest ends (q, space) of cuts to points past them, and unit vectors that lead inwards.
+    """Find the ends (q, space) of cuts nearest to points past them, and unit vectors inwards.
 
     The depth t is a distance from the end, negative here: its slope is that direction, and the end
     x − t ∇t/‖∇t‖. Where two ends are equally near, the difference quotient is a mean of both.

@@ -38,11 +38,11 @@ class Cut(Protocol):
     """A surface (3D) or curve (2D) that separates material."""
 
     def level_set(self, points: Floats) -> Floats:
-        """Signed distance (n,) of points (n, d), in metres."""
+        """Compute the signed distance (n,) of points (n, d), in metres."""
         ...
 
     def depth(self, points: Floats) -> Floats:
-        """Distance (n,) to the nearest end of the cut, negative past it, in metres."""
+        """Compute the distance (n,) to the nearest end of the cut, negative past it, in metres."""
         ...
 
 
@@ -83,13 +83,13 @@ class Plane:
         object.__setattr__(self, "normal", direction / length)
 
     def level_set(self, points: Floats) -> Floats:
-        """Signed distance to the plane."""
+        """Compute the signed distance to the plane."""
         at = finite_array(points, "plane: points", (None, len(self.point)))
         distance: Floats = (at - self.point) @ self.normal
         return distance
 
     def depth(self, points: Floats) -> Floats:
-        """Infinite: a plane has no end."""
+        """Return infinity: a plane has no end."""
         return np.full(len(points), np.inf)
 
 
@@ -121,7 +121,7 @@ class ImplicitCut:
 
 @dataclass(frozen=True)
 class PolygonPatch:
-    """A flat polygon in space; its level set is that of its plane.
+    """A flat polygon in space; its level set is the distance to its plane.
 
     Parameters
     ----------
@@ -166,11 +166,11 @@ class PolygonPatch:
         object.__setattr__(self, "_outline", Polyline(self._in_plane(polygon), closed=True))
 
     def level_set(self, points: Floats) -> Floats:
-        """Signed distance to the plane of the polygon."""
+        """Compute the signed distance to the plane of the polygon."""
         return self.plane.level_set(points)
 
     def depth(self, points: Floats) -> Floats:
-        """Distance to the outline in the plane, negative outside."""
+        """Compute the distance to the outline in the plane, negative outside."""
         return self._outline.level_set(
             self._in_plane(finite_array(points, "polygon: points", (None, 3)))
         )
@@ -189,7 +189,7 @@ def _tangents(normal: Floats) -> tuple[Floats, Floats]:
 def boxes_of(cuts: Sequence[Cut], space: int) -> Floats:
     """Lower and upper corners (cuts, 2, space) of boxes around the extents of cuts, in metres.
 
-    Of what is not known to have an end they are infinite.
+    Boxes of cuts without an end, or whose end is not known, are infinite.
     """
     boxes = np.tile([[-np.inf], [np.inf]], (len(cuts), 1, space))
     for box, cut in zip(boxes, cuts, strict=True):
@@ -230,8 +230,8 @@ class ToolPath:
     Raises
     ------
     XfemError
-        If shapes do not match, a number is not finite, time runs backwards, the blade turns back
-        on its path, or a path in the plane intersects itself (begin a new stroke instead).
+        If shapes do not match, a number is not finite or time runs backwards. If the blade turns
+        back on its path, or a path in the plane intersects itself: begin a new stroke instead.
     """
 
     blades: Floats
@@ -253,7 +253,7 @@ class ToolPath:
     def of_tip(
         cls, tips: ArrayLike, times: ArrayLike, depth: ArrayLike | None = None
     ) -> "ToolPath":
-        """Path of a straight blade, given by its tip and, in space, the vector to its other end.
+        """Make the path of a straight blade by its tip and, in space, the vector to its other end.
 
         Parameters
         ----------
@@ -297,13 +297,13 @@ class ToolPath:
         return Sweep(self)
 
     def travel_at(self, time: float) -> float:
-        """How far the blade has come at a time, in metres; negative before the first."""
+        """Return the travel of the blade at a time, in metres; negative before the first."""
         if time < self.times[0]:
             return -1.0
         return float(np.interp(time, self.times, self.travel))
 
     def time_at(self, travel: ArrayLike) -> Floats:
-        """When the blade first comes that far, in seconds."""
+        """Find the time at which the blade first reaches a travel, in seconds."""
         wanted = np.clip(np.asarray(travel, dtype=float), 0.0, self.length)
         at = np.searchsorted(self.travel, wanted)
         # a blade that waits has been there since it arrived
@@ -321,8 +321,8 @@ class ToolPath:
 class Sweep(FacetCut):
     """The surface swept by a path, as a cut.
 
-    In the plane the positive side is on the left of the path, in space it is that of (direction
-    of motion) × (blade).
+    In the plane the positive side is on the left of the path. In space (direction of motion) ×
+    (blade) points to it.
     """
 
     path: ToolPath
@@ -334,11 +334,11 @@ class Sweep(FacetCut):
         return self.path.surface.arrays
 
     def level_set(self, points: Floats) -> Floats:
-        """Signed distance (n,) to what is swept, to its tangent plane past the rim."""
+        """Compute signed distance (n,) to the swept surface, to its tangent plane past the rim."""
         return super().level_set(points) if self.path.sweeps else self.probed(points)[:, 0]
 
     def probed(self, points: Floats) -> Floats:
-        """(n, 3): level set, depth, and how far the blade has come as it passes, in metres."""
+        """Return (n, 3): level set, depth, and the travel of the blade as it passes, in metres."""
         if self.path.sweeps:
             return super().probed(points)
         # nothing is swept: one side everywhere, and no point of the cut anywhere
@@ -374,12 +374,12 @@ def _sweep_surface(blades: Floats, travel: Floats) -> SweepSurface:
 
 
 def _facets(blades: Floats, travel: Floats) -> tuple[Floats, Floats, Ints]:
-    """Vertices, their travel, and the facets that have a length or an area."""
+    """Make vertices, their travel, and the facets that have a length or an area."""
     count, width, space = blades.shape
     ids = np.arange(count * width).reshape(count, width)
     for k in range(1, count):
-        # a point of the blade that stays, up to round-off of the path, is one vertex: what turns
-        # around it is connected
+        # a point of the blade that stays, up to round-off of the path, is one vertex: the facets
+        # that turn around it are connected
         still = np.linalg.norm(blades[k] - blades[k - 1], axis=1) <= _STILL * travel[-1]
         ids[k, still] = ids[k - 1, still]
     points = blades.reshape(-1, space)

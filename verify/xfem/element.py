@@ -1,22 +1,22 @@
 """Isotropic elasticity; force and tangent of corotational linear elements, per cell of a cut body.
 
-With b_i the material gradient of shape function i, w the volume of a piece,
-F = I + Σ u_i b_iᵀ = R U and E = sym(Rᵀ F) − I, the potential is w (μ‖E‖² + ½λ tr² E). The force
-f_i = w P b_i, P = R (2μE + λ tr(E) I), is its gradient as long as R is the nearest rotation; R = I
-is linear elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative of P by F:
+Let b_i be the material gradient of shape function i and w the volume of a piece. Let F = I + Σ u_i
+b_iᵀ = R U and E = sym(Rᵀ F) − I. The piece stores w (μ‖E‖² + ½λ tr² E). The gradient is the force
+f_i = w P b_i, P = R (2μE + λ tr(E) I), if R is the nearest rotation. R = I is linear elasticity. A
+tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative of P by F:
 
     rotation-fixed   A = μ (δ_kl δ_nm + R_km R_ln) + λ R_kn R_lm,
     consistent       A = 2μ δ_kl δ_nm + λ R_kn R_lm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm.
 
-The second follows from P = 2μF + (λ tr(E) − 2μ) R, as RᵀF is symmetric. The first is that of P at a
-fixed R, where P is linear in E: its product with a vector v is the force of E = sym(Rᵀ ∇v), that
-without I. A law that is not linear in E would need another `add_force` for it.
+The second follows from P = 2μF + (λ tr(E) − 2μ) R, as RᵀF is symmetric. The first holds R fixed, so
+that P is linear in E: its product with a vector v is the force of E = sym(Rᵀ ∇v), without I. A law
+that is not linear in E would need another `add_force` for it.
 
-A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane, and in
-the first A with δ_kl − n_k n_l for δ_kl, n the turned normal. It
-has no stiffness against the displacement φ along n but w (∇φ · S ∇φ) of its tension S, the second
-Piola–Kirchhoff stress with principal values (2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches
-λ_k. The geometric stiffness takes its positive part alone, so that it has no negative mode.
+A membrane (`Elements.is_membrane`) is the same with F and I restricted to its tangent plane. In the
+first A, δ_kl becomes δ_kl − n_k n_l, n the turned normal. Against a displacement φ along n it has
+only the geometric stiffness w (∇φ · S ∇φ) of its tension S. S is the second Piola–Kirchhoff stress.
+Its principal values at the stretches λ_k are (2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k. The geometric
+stiffness takes the positive part of S alone, so that it has no negative mode.
 """
 
 from dataclasses import dataclass
@@ -64,13 +64,13 @@ class Material:
     law: Law = "hooke"
 
     def of_cells(self, count: int) -> tuple[Floats, Floats]:
-        """λ and μ (m,) of so many cells of the uncut mesh, in pascal.
+        """Return λ and μ (m,) of the cells of the uncut mesh, in pascal.
 
         Raises
         ------
         XfemError
-            If there is neither one value nor one for each, one is not finite, or a change of shape
-            or of size in the plane stores no energy (μ ≤ 0, λ ≤ -μ).
+            If there is neither one value nor one for each, or one is not finite. If a change of
+            shape, or of size in the plane, stores no energy (μ ≤ 0, λ ≤ -μ).
         """
         for name, values in (("λ", self.lam), ("μ", self.mu)):
             finite_array(values, name, (), (count,))
@@ -84,7 +84,7 @@ class Material:
 
 
 def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
-    """Lamé parameters from Young's modulus and Poisson's ratio.
+    """Convert Young's modulus and Poisson's ratio to Lamé parameters.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Elements(NamedTuple):
 
 
 def elements_of(phantom: PhantomMesh, material: Material) -> Elements:
-    """Elements of a cut body.
+    """Collect the elements of a cut body.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def elements_of(phantom: PhantomMesh, material: Material) -> Elements:
 def deform(elements, displacement, unit, F):
     """Write `unit` I + ∇u to F (p, d, d), restricted to the tangent plane of membranes.
 
-    The displacement is that of the corners, (N_corners, d).
+    The displacement (N_corners, d) is given at the corners.
     """
     cells, parent, gradients, _, normals, _, _, axes, corners, is_membrane = elements
     d, c = len(axes), len(corners)
@@ -348,9 +348,9 @@ def restricted(elements: Elements) -> Floats:
 def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floats, Bools]:
     """Return ∂R/∂F (p, d, d, d, d) of nearest rotations; zero where there is none.
 
-    With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b,
-    H = tr(U) I − U in space and tr(U) in the plane. For dR = Σ ω_a G_a keeps RᵀF symmetric, so that
-    S_b : (dRᵀF + RᵀdF) = 0, which is Σ H_ba ω_a = G_b : dF with H_ba = S_b : (S_a U).
+    With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b.
+    Here H = tr(U) I − U in space, tr(U) in the plane. Reason: dR = Σ ω_a G_a keeps RᵀF symmetric,
+    so S_b : (dRᵀF + RᵀdF) = 0. That is Σ H_ba ω_a = G_b : dF with H_ba = S_b : (S_a U).
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floa
 
 
 def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats, int]:
-    """Second derivative of the potential by F, (p, d, d, d, d) per volume.
+    """Compute the second derivative of the potential by F, (p, d, d, d, d) per volume.
 
     Cells whose rotation is not differentiable have the rotation-fixed moduli; the second value
     is how many they are.
@@ -411,14 +411,14 @@ def turned_normals(elements: Elements, R: Floats) -> Floats:
 
 
 def tension_moduli(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
-    """Moduli A (p, 3, 3, 3, 3) of the geometric stiffness, as of a tangent of `element`."""
+    """Compute moduli A (p, 3, 3, 3, 3) of the geometric stiffness, as of a tangent of `element`."""
     n = turned_normals(elements, R)
     # A_knlm = n_k n_l S_nm
     return np.einsum("pk,pl,pnm->pknlm", n, n, positive_tension(elements, R, F, least))
 
 
 def tension_forces(elements: Elements, R: Floats, F: Floats, vectors: Floats) -> Floats:
-    """Geometric stiffness times vectors (p, 3, 3) at the corners of cells: forces (p, 3, 3)."""
+    """Multiply vectors (p, 3, 3) at corners by the geometric stiffness: forces (p, 3, 3)."""
     n, S = turned_normals(elements, R), positive_tension(elements, R, F, 0.0)
     b, w = elements.gradients[elements.parent], elements.volumes
     # f_i = w n (b_i · S ∇φ), ∇φ = Σ_j b_j (n · v_j)
@@ -427,9 +427,9 @@ def tension_forces(elements: Elements, R: Floats, F: Floats, vectors: Floats) ->
 
 
 def positive_tension(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
-    """Positive part (p, 3, 3) of the tension of membranes, α I + β U in the tangent plane.
+    """Compute positive part (p, 3, 3) of the tension of membranes, α I + β U in the tangent plane.
 
-    Principal values below `least` times μ are taken as that: without it what is slack has no
+    Smaller principal values are replaced by `least` times μ: without it slack cells have no
     stiffness.
     """
     lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]

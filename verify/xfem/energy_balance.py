@@ -1,16 +1,17 @@
 """Energy balance of a motion, step by step, for any integration scheme.
 
-A step is p = f_ext − f_int − f_visc + r with the reactions r at the supports and the inertia p,
-M Δv/h unless the scheme says otherwise. Multiplied by Δu this is an identity, whatever scheme has
-chosen the forces; with T the kinetic and W the strain energy:
+A step is p = f_ext − f_int − f_visc + r with the reactions r at the supports. The inertia p is M
+Δv/h unless the scheme says otherwise. Multiplied by Δu this is an identity for the forces of any
+scheme; with T the kinetic and W the strain energy:
 
     ΔT + ΔW − Δu·f_ext − Δu·r + Δu·f_visc + D = − Δu·(residual at free components),
 
     D = (Δu·p − v̄·M Δv) + (Δu·f_int − ΔW),   v̄ = ½ (v₀ + v₁).
 
-D is what the scheme itself dissipates (negative: produces). The first part of it at what moving
-supports hold is work of theirs: they may take up another velocity at once. The right-hand side is
-what the step leaves unsolved; if it is not round-off, the forces are not those of the motion.
+D is the energy that the scheme itself dissipates (negative: produces). At components held by moving
+supports the first part of D is work of the supports, which may change their velocity at once. The
+right-hand side is the work of the residual; if it is not round-off, the forces do not belong to the
+motion.
 """
 
 from dataclasses import dataclass
@@ -144,7 +145,7 @@ class BalanceRecorder:
         self._rows.append(self._row(state))
 
     def _stored(self, state: MotionState) -> tuple[float, float]:
-        """Strain energy, and the share of a ghost penalty or of contact in it."""
+        """Compute the strain energy, and the share of a ghost penalty or of contact in it."""
         force = self.body.force
         _, strain = force.evaluate(state.displacement)
         penalty, contact = force.penalty_energy(state.displacement), self.body.contact
@@ -189,7 +190,7 @@ def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: in
     Raises
     ------
     StepFailedError
-        From the step that failed; the state is that of the last good one.
+        From the step that failed; the state is left as the last good step ended.
     XfemError
         If the number of steps is negative.
 

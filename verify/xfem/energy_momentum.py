@@ -7,8 +7,9 @@ Per volume the potential is, with t the trace of the stretch and d the dimension
 
     W = μ (‖F‖² − 2t + d) + ½λ (t − d)²,
 
-quadratic in F but for t. Its discrete gradient needs only a T with T : (F₁ − F₀) = t₁ − t₀ that is
-R in the limit and has T Fₘᵀ symmetric, so that angular momentum is kept, Fₘ = (F₀ + F₁)/2. Then
+quadratic in F but for t. Let Fₘ = (F₀ + F₁)/2. The discrete gradient of W needs a T with T : (F₁ −
+F₀) = t₁ − t₀ that is R in the limit. T Fₘᵀ must be symmetric, so that angular momentum is kept.
+Then
 
     P = 2μ (Fₘ − T) + λ (½(t₀ + t₁) − d) T.
 
@@ -63,7 +64,7 @@ class StepEnds(NamedTuple):
     R1: Floats
 
     def of(self, some: Bools) -> "StepEnds":
-        """Return those of some elements."""
+        """Return the ends of some elements."""
         return StepEnds(*(X[some] for X in self))
 
     @property
@@ -73,7 +74,7 @@ class StepEnds(NamedTuple):
 
 
 def averaged_stress(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
-    """Stress P (p, d, d) averaged over a step; elements that need the substitute are marked.
+    """Average the stress P (p, d, d) over a step; mark elements that need the substitute.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def averaged_stress(elements: Elements, ends: StepEnds, substituted: Bools) -> F
 
 
 def averaged_moduli(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
-    """∂P/∂F₁ (p, d, d, d, d), the last two indices those of F₁; not symmetric.
+    """Differentiate P by F₁: (p, d, d, d, d), the last two indices of F₁; not symmetric.
 
     Arguments as the last call of `averaged_stress` left them: `substituted` is read, too.
     """
@@ -116,7 +117,7 @@ def _inner(A: Floats, B: Floats) -> Floats:
 
 
 def _factors(elements: Elements, ends: StepEnds) -> tuple[Floats, Floats, Floats]:
-    """λ, μ and c, each (p, 1, 1)."""
+    """Compute λ, μ and c, each (p, 1, 1)."""
     lam, mu = (x[elements.parent, None, None] for x in (elements.lam, elements.mu))
     t0, t1 = ends.traces
     dim = len(elements.corners) - 1
@@ -124,7 +125,7 @@ def _factors(elements: Elements, ends: StepEnds) -> tuple[Floats, Floats, Floats
 
 
 def _secant(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
-    """T (p, d, d); elements that need the substitute are marked."""
+    """Compute T (p, d, d); mark elements that need the substitute."""
     t0, t1 = (t[:, None, None] for t in ends.traces)
     if len(elements.axes) == 2:
         defined = t0 + t1 > 0.0
@@ -165,7 +166,7 @@ def _plain_slope(elements: Elements, ends: StepEnds, T: Floats, some: Bools) -> 
 
 
 def _substitute(ends: StepEnds) -> tuple[Floats, Floats]:
-    """T and dT of the substitute."""
+    """Compute T and dT of the substitute."""
     F0, F1, _, R1 = ends
     t0, t1 = ends.traces
     G = F0 + F1
@@ -195,9 +196,10 @@ class EnergyMomentum(NewtonIntegrator):
     """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
 
     The internal force is a discrete gradient of the potential; the docstring of the module has the
-    equations. Its stiffness is not symmetric, and differs from half of that at the end by the
-    square of the turn in a step. Corrections take half of that at the end, which is found in a
-    tenth of the time. After one that leaves more than half of the residual they take its own.
+    equations. Its stiffness is not symmetric. It differs from half the stiffness at the end of the
+    step by the square of the turn in a step. Corrections take this half, which is found in a tenth
+    of the time. After a correction that leaves more than half of the residual they take the full
+    derivative.
 
     Parameters
     ----------
@@ -217,7 +219,7 @@ class EnergyMomentum(NewtonIntegrator):
 
     Examples
     --------
-    A plate that turns, and swings by what that stretches it, in steps of a tenth of a radian:
+    A plate that turns, is stretched by it and swings, in steps of a tenth of a radian:
 
     >>> import verify.xfem as xfem
     >>> phantom = xfem.cut_mesh(xfem.rectangle_mesh((4, 4)), [xfem.Plane([0.6, 0.0], [1.0, 0.0])])
@@ -254,7 +256,7 @@ class EnergyMomentum(NewtonIntegrator):
         self._before, self._evaluations, self._takes_all = None, 0, False
 
     def _resistance(self, displacement: Floats) -> Resistance:
-        """Resistance averaged over the step; `substituted` is that of this evaluation."""
+        """Average the resistance over the step; `substituted` belongs to this evaluation."""
         body, force, start = self.body, self.body.force, self._start.displacement
         found = np.zeros(body.shape)
         if not force.is_corotational:
@@ -279,7 +281,7 @@ class EnergyMomentum(NewtonIntegrator):
         return Resistance(displacement, found, at)
 
     def _averaged_in_one_pass(self, displacement: Floats) -> Floats:
-        """Averaged force (N, 3); the stiffness at the end is written to the blocks."""
+        """Average the force (N, 3); write the stiffness at the end to the blocks."""
         force, before = self.body.force, self._start.displacement
         start, end = force.phantom.extend(before), force.phantom.extend(displacement)
         scale, found = self._stiffness_share, np.empty(self.body.shape)
@@ -302,7 +304,7 @@ class EnergyMomentum(NewtonIntegrator):
         return StepForces(end.force, external, viscous, loaded_at=((0.5, 1.0),))
 
     def _ends(self, after: Configuration) -> StepEnds:
-        """Both ends of the step."""
+        """Return both ends of the step."""
         if self._before is None:
             self._before = self.body.force.configuration(self._start.displacement)
         return StepEnds(self._before.F, after.F, self._before.R, after.R)

@@ -56,13 +56,13 @@ class _Step(NamedTuple):
 class LoadPath:
     """Equilibria on the way from load factor 0 to 1.
 
-    A step counts if its strain energy is that at its start and the work of its reactions and loads
-    by the trapezoidal rule, up to a quarter, and hardly any volume turned inside out. It may store
-    less than that where supports move no body but rigidly, as what stiffens under dead loads does.
-    Any other step is
-    solved again in two halves. If both paths end at one energy, that counts; if not, the state of
-    less potential energy does. So a column that buckles or an arch that snaps through is found, and
-    a state that its supports could not have paid for is left or refused.
+    A step counts under two conditions. Its gain of strain energy is the work of reactions and loads
+    by the trapezoidal rule, up to a quarter; and hardly any volume turned inside out. It may store
+    less where supports move no body but rigidly, as a body that stiffens under dead loads does. Any
+    other step is solved again in two halves. If both paths end at one energy, the state counts; if
+    not, the state of less potential energy does. So a column that buckles or an arch that snaps
+    through is found. A state with more energy than its supports and loads supplied is left or
+    refused.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class LoadPath:
         self._dismissed: list[float] = []
 
     def _along_turns(self, prescribed: Callable[[float], Floats]) -> Callable[[float], Floats]:
-        """Path as given, or, where a straight one turns bodies, one that turns them on the way."""
+        """Return the path; if it is straight and turns bodies, one along rotations instead."""
         assert self._motions is not None
         whole = prescribed(1.0)
         turned = self._motions.turned_path(whole)
@@ -109,7 +109,7 @@ class LoadPath:
         return PathCheck(self._stable, self._compared, tuple(self._dismissed))
 
     def follow(self, displacement: Floats, parts: int) -> tuple[Floats, tuple[int, ...]]:
-        """Equilibrium (N, d) at load factor 1, and the corrections of every step.
+        """Find the equilibrium (N, d) at load factor 1, and the corrections of every step.
 
         Raises
         ------
@@ -204,7 +204,7 @@ class LoadPath:
         )
 
     def _strains(self, start: Floats, since: float, until: float) -> bool:
-        """Whether supports turn parts of a body far against one another on the way."""
+        """Tell whether supports turn parts of a body far against one another on the way."""
         if self._motions is None:
             return False
         within = [k / _SAMPLES for k in range(1, _SAMPLES) if since < k / _SAMPLES < until]
@@ -236,7 +236,7 @@ class LoadPath:
         return _Step(found, count, energy, potential, excess, allowed, trusted)
 
     def _floor(self) -> float:
-        """Round-off of an energy, J."""
+        """Compute the round-off of an energy, J."""
         phantom = self._force.phantom
         size = float(np.ptp(phantom.mesh.points, axis=0).max())
         return ROUND_OFF * self._newton.largest_stiffness * size**2
@@ -263,9 +263,9 @@ class StaticEquilibrium(NamedTuple):
     iterations : tuple of int
         Corrections of each load step of the path that counts.
     check : PathCheck
-        What was done so that it counts.
+        Checks that it has passed.
     solvers : frozenset of {"direct", "iterative"}
-        What has solved the linear systems.
+        Which solvers the linear systems took.
     """
 
     displacement: Floats
@@ -283,17 +283,16 @@ def static_equilibrium(
     load: Floats | None = None,
     load_steps: int = 1,
 ) -> StaticEquilibrium:
-    """Displacement with f_int(u) = load, u given on the fixed components.
+    """Solve f_int(u) = load, with u given on the fixed components.
 
-    Every body follows the rigid motion of its supports; Newton's method finds the rest. Where a
-    correction does not make the residual smaller, or the consistent tangent is not positive
-    definite, a line search on the potential energy follows (Armijo), along corrections by as much
-    of the rotational part as leaves it positive definite. Past a limit point (a column that
-    buckles, an arch that snaps through) that ends in an equilibrium beyond.
+    Every body follows the rigid motion of its supports; Newton's method finds the rest. A
+    correction may leave the residual as large, or the consistent tangent may not be positive
+    definite. Then a line search on the potential energy follows (Armijo). Its corrections take as
+    much of the rotational part as leaves the tangent positive definite. Past a limit point (a
+    column that buckles, an arch that snaps through) that ends in an equilibrium beyond.
 
-    A load step counts if the work of its reactions and loads accounts for its energy, or if its two
-    halves end at the same energy; see `LoadPath`. The last state counts if its consistent tangent
-    is positive definite; an unstable one is left along its softest mode.
+    `LoadPath` says which load steps count. The last state counts if its consistent tangent is
+    positive definite; an unstable one is left along its softest mode.
 
     Parameters
     ----------
@@ -310,9 +309,9 @@ def static_equilibrium(
     Raises
     ------
     NotInEquilibriumError
-        If a load step does not converge in 64 parts either, or its energy is more than the work
+        If a load step does not converge in 64 parts either. If its energy is more than the work
         done and no other path confirms it. Where cells have collapsed on the way, it says so: the
-        force is not continuous there, and there may be none that balances the load.
+        force is not continuous there, and there may be no equilibrium.
     SingularStiffnessError
         If something is not held.
     XfemError
@@ -342,7 +341,7 @@ def static_equilibrium(
 
     def wanted(factor: float) -> Floats:
         values = np.zeros(shape) if prescribed is None else prescribed(factor)
-        if values.shape == shape:  # what is not fixed may be anything
+        if values.shape == shape:  # free components may be anything
             values = np.where(fixed, values, 0.0)
         return finite_array(values, "prescribed displacement", shape)
 

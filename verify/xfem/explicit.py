@@ -5,9 +5,9 @@ same instant. All of them are free of any linear solve if the mass is diagonal. 
 is 2/ω_max, exact or by a bound per element.
 
 In nonlinear motion a step below the critical one is not enough. Central differences turn a mode by
-an angle θ per step, 2 sin(θ/2) = ωh, and the time grid itself exchanges energy between any three
-modes whose angles sum to 2π, and any four. No three do while ω_max h < √3, no four while
-ω_max h < √2 (Mandziuk & Schlick 1995; Schlick et al. 1998): `RESONANCE_FREE` of the critical step.
+an angle θ per step, 2 sin(θ/2) = ωh. The time grid exchanges energy between any three or four modes
+whose angles sum to 2π. No three do while ω_max h < √3, no four while ω_max h < √2 (Mandziuk &
+Schlick 1995; Schlick et al. 1998). The latter is the share `RESONANCE_FREE` of the critical step.
 """
 
 from dataclasses import replace
@@ -41,7 +41,7 @@ class _Explicit:
 
     def __init__(self, body: DynamicBody, step_size: float, at_once: bool = False) -> None:
         """Prepare a body and a step in seconds; or, at once, no step but an acceleration."""
-        # the stiffness of contact over the mass of a sliver ε grows like 1/ε: no step is stable
+        # stiffness of contact over mass grows like 1/ε at a sliver of share ε: no step is stable
         if not at_once:
             check_no_contact(body, type(self).__name__)
         self.body = body
@@ -80,7 +80,7 @@ class _Explicit:
 
 
 def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
-    """Acceleration (N, d) in m/s² that balances all forces of a state; zero where held.
+    """Compute the acceleration (N, d) in m/s² that balances all forces of a state; zero where held.
 
     Raises
     ------
@@ -101,9 +101,8 @@ class CentralDifferences(_Explicit):
     ----------
     body : DynamicBody
     step_size : float
-        In seconds; stable below `verify.xfem.explicit.critical_step` if linear. Damping
-        is taken at the velocity of the start in the first half of a step, at that of its middle in
-        the second.
+        In seconds; stable below `verify.xfem.explicit.critical_step` if linear. Damping takes the
+        velocity of the start in the first half of a step, of the middle in the second half.
 
     Examples
     --------
@@ -126,7 +125,7 @@ class CentralDifferences(_Explicit):
         self._end: tuple[MotionState, Floats, StepForces] | None = None
 
     def _start(self, state: MotionState) -> tuple[Floats, StepForces]:
-        """Acceleration at the start, reused from the last step if this one continues it."""
+        """Return the acceleration at the start, from the last step if this one continues it."""
         if self._end is not None and self.body.damping == RayleighDamping():
             end, acceleration, forces = self._end
             goes_on = end.time == state.time and np.array_equal(
@@ -184,7 +183,7 @@ class SymplecticEuler(_Explicit):
 class ForwardEuler(SymplecticEuler):
     """(2.43–44) as printed: unstable at every step without damping; a negative control.
 
-    Parameters are those of `SymplecticEuler`, with whose velocity before the step it moves.
+    It moves with the velocity before the step. Parameters as for `SymplecticEuler`.
     """
 
     _moves_with_new_velocity = False
@@ -200,7 +199,7 @@ def critical_step(
     fixed: Bools | None = None,
     tolerance: float = 1e-6,
 ) -> float:
-    """Critical step of the assembled body, by a Lanczos iteration on Lᵀ K L, M⁻¹ = L Lᵀ.
+    """Compute critical step of the assembled body, by a Lanczos iteration on Lᵀ K L, M⁻¹ = L Lᵀ.
 
     The scaling on both sides keeps the iteration accurate with slivers, whose mass and stiffness
     go to zero together.
@@ -279,7 +278,7 @@ def _largest(A: csr_array, tolerance: float) -> float:
 
 
 def _largest_general(K: csr_array, M: csr_array, tolerance: float) -> float:
-    """Largest λ of K x = λ M x, M not diagonal.
+    """Compute the largest λ of K x = λ M x, M not diagonal.
 
     Scaled to a unit diagonal of M first: slivers make its raw condition number 1/ε.
     """
@@ -297,10 +296,10 @@ def _largest_general(K: csr_array, M: csr_array, tolerance: float) -> float:
 def element_critical_steps(
     mesh: SimplexMesh, material: Material, density: ArrayLike, strain: float = 0.0
 ) -> NDArray:
-    """Critical step (m,) of each uncut element alone, with its mass lumped.
+    """Compute the critical step (m,) of each uncut element alone, with its mass lumped.
 
-    The smallest is a lower bound of the step of any cut body with side-wise mass, because a
-    piece has the stiffness and the mass of its element times the same factor.
+    The smallest bounds from below the step of any cut body with side-wise mass: a piece has
+    stiffness and mass of its element, times the same factor.
 
     Parameters
     ----------
@@ -314,15 +313,15 @@ def element_critical_steps(
 
             2μ|sym|² + λ tr² + Σ_{i<j} s_ij² [μ + (λ tr(U − I) − 2μ)/(u_i + u_j)],
 
-        s = RᵀδF − δFᵀR: the linear stiffness, turned, and a stiffness against rotation that
-        grows with the stretch. Its largest value is added here, so that the bound holds for the
-        consistent tangent at any rotation, as long as no stretch exceeds 1 + strain.
+        s = RᵀδF − δFᵀR: the linear stiffness, turned, and a stiffness against rotation that grows
+        with the stretch. Its largest value is added here. So the bound holds for the consistent
+        tangent at any rotation, as long as no stretch exceeds 1 + strain.
 
     Raises
     ------
     XfemError
-        If the strain is outside 0…2, where the largest factor is that of equal stretches, the
-        density is not positive and finite, or there are not as many values as cells.
+        If the strain is outside 0…2, the range in which equal stretches have the largest factor. If
+        the density is not positive and finite, or there are not as many values as cells.
     """
     if not 0.0 <= strain <= 2.0:
         raise XfemError(f"strain {strain!r} in reach; expected 0 to 2")
@@ -347,10 +346,10 @@ def element_critical_steps(
 
 
 def _against_rotation(mesh: SimplexMesh, lam: NDArray, mu: NDArray, strain: float) -> NDArray:
-    """Largest factor of |skew|² in the second derivative for stretches up to 1 + strain.
+    """Compute largest factor of |skew|² in the second derivative for stretches up to 1 + strain.
 
-    All stretches at their largest. A membrane (d = 2 in space) in tension resists rotation of its
-    plane with T/u |n·δF|², which the linear stiffness with its μ and twice the factor cover.
+    All stretches are at their largest. A membrane (d = 2 in space) in tension resists rotation of
+    its plane with T/u |n·δF|². The linear stiffness with its μ and twice the factor cover that.
     """
     factor: NDArray = (2.0 * mu + mesh.dim * lam) * strain / (1.0 + strain)
     return 2.0 * factor if mesh.is_membrane else factor

@@ -4,12 +4,12 @@ Facets are here the segments or triangles of the cut, not the sides of cells. Th
 the cut ends: the vertices or edges that belong to one facet only.
 
 The side of a point is told by the normal of the nearest face, edge or vertex, angle-weighted at
-vertices (Bærentzen & Aanæs 2005). Where the nearest feature is on the rim, the level set is that
-of the tangent plane there.
+vertices (Bærentzen & Aanæs 2005). Where the nearest feature is on the rim, the level set is the
+distance to the tangent plane there.
 
-For kernels a facet is a (k, s) array of corners: k = 2 for a segment, k = 3 for a triangle, in
-s = 2 or 3 dimensions. Its nearest point is given by barycentric weights that are *exactly* zero on
-corners that do not take part, so that face, edge and vertex are told apart without a tolerance.
+For kernels a facet is a (k, s) array of corners: k = 2 for a segment, k = 3 for a triangle, in s =
+2 or 3 dimensions. Its nearest point is given by barycentric weights. They are *exactly* zero on
+corners that do not take part, so face, edge and vertex are told apart without a tolerance.
 """
 
 import math
@@ -92,8 +92,8 @@ def _nearest_on_triangle(x, corners, weights):
 def nearest_on_facet(x, corners, weights):
     """Write the weights (k,) of the point of a facet nearest to x; k = 1 is a point of the rim.
 
-    Of a triangle abc: by the signs of (x − a)·ab, … and of the areas that the foot of x spans with
-    the edges (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+    For a triangle abc the signs of (x − a)·ab, … and of the areas between the foot of x and the
+    edges decide. Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def nearest_on_facet(x, corners, weights):
 
 @njit(cache=True)
 def _nearest(x, facets, weights, found):
-    """Nearest of facets (f, k, s) to x (s,), squared distance; its weights (k,) to `found`."""
+    """Return the squared distance of x (s,) to facets (f, k, s), with weights (k,) in `found`."""
     facet, square = 0, np.inf
     for f in range(len(facets)):
         nearest_on_facet(x, facets[f], weights)
@@ -131,7 +131,7 @@ def _nearest(x, facets, weights, found):
 
 @njit(cache=True)
 def _probed(points, facets, deep):
-    """(n, 3): level set, and if it is to be deep the depth and the travel."""
+    """Return (n, 3): the level set and, if `deep`, the depth and the travel."""
     corners, rim = facets.corners, facets.rim
     size, space = corners.shape[1:]
     out, off = np.zeros((len(points), 3)), np.empty(space)
@@ -178,14 +178,14 @@ class FacetArrays(NamedTuple):
     Attributes
     ----------
     corners : (t, k, k) float array
-        In metres; the last axis is that of the coordinates.
+        In metres; the last axis counts coordinates.
     normals : (t, k) float array
         Of length one.
     feature_normals : (t, 2^k, k) float array
-        At the features of the facet: number Σ 2^j over the corners j that do not belong to one.
-        0 is the facet itself. Of a segment 2 and 1 are corners 0 and 1. Of a triangle 1, 2, 4 are
-        the edges opposite to corners 0, 1, 2, and 6, 5, 3 those corners. Of length one; at an edge
-        where the cut ends that of the facet.
+        At the features of the facet: number Σ 2^j over the corners j that do not belong to one. 0
+        is the facet itself. Of a segment 2 and 1 are corners 0 and 1. Of a triangle 1, 2, 4 are the
+        edges opposite to corners 0, 1, 2, and 6, 5, 3 those corners. Of length one; at an edge
+        where the cut ends the normal of the facet.
     feature_rim : (t, 2^k) bool array
         Whether the cut ends there.
     rim : (r, k - 1, k) float array
@@ -265,15 +265,15 @@ class FacetCut:
         raise NotImplementedError
 
     def level_set(self, points: Floats) -> Floats:
-        """Signed distance (n,) to the facets, to their tangent plane past the rim."""
+        """Compute the signed distance (n,) to the facets, to their tangent plane past the rim."""
         return _probed(self._checked(points), self.arrays, False)[:, 0]
 
     def depth(self, points: Floats) -> Floats:
-        """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
+        """Return the distance (n,) to the rim along the tangent, negative past it."""
         return self.probed(points)[:, 1]
 
     def probed(self, points: Floats) -> Floats:
-        """(n, 3): level set, depth, and of a sweep the travel at the nearest point, in metres."""
+        """Return (n, 3): level set, depth, and the travel of a sweep there, in metres."""
         found: Floats = _probed(self._checked(points), self.arrays, True)
         return found
 
@@ -285,8 +285,8 @@ class FacetCut:
 class Polyline(FacetCut):
     """A polyline in the plane.
 
-    The positive side is on the left when one walks along it. Past an open end the level set is
-    that of the last segment's line.
+    The positive side is on the left when one walks along it. Past an open end the level set is the
+    distance to the line of the last segment.
 
     Parameters
     ----------
@@ -351,7 +351,7 @@ def _check_segments(vertices: Floats, closed: bool) -> None:
 
 @njit(cache=True)
 def _first_intersection(starts, ends, axis, order, closed):
-    """First pair of segments, not neighbours, that have a point in common; their number if none.
+    """Find the first two segments, not neighbours, that meet; their number if there are none.
 
     Segments come in the `order` in which they begin along the axis: each is held against those
     that begin before its end.
@@ -384,7 +384,7 @@ def _first_intersection(starts, ends, axis, order, closed):
 
 @njit(cache=True)
 def _side(a, b, x):
-    """Twice the area of the triangle a b x, positive on the left of a b."""
+    """Compute twice the area of the triangle a b x, positive on the left of a b."""
     return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0])
 
 
@@ -402,8 +402,8 @@ class TriangulatedSurface(FacetCut):
     Raises
     ------
     XfemError
-        If a triangle has no area, or an edge is used twice in the same direction (orientation
-        not consistent, or more than two triangles at an edge).
+        If a triangle has no area, or an edge is used twice in the same direction: orientations
+        differ, or more than two triangles share the edge.
 
     Examples
     --------

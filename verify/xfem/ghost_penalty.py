@@ -124,7 +124,7 @@ class GhostPenalty:
         return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
     def mass(self, mass: Mass, density: Floats | float) -> Mass:
-        """Mass with the counterpart γ Σ ρ h³ A |⟦∂v/∂n⟧|²; not diagonal any more.
+        """Add the counterpart γ Σ ρ h³ A |⟦∂v/∂n⟧|² to a mass; the result is not diagonal.
 
         It does not act on rigid motion: total mass, weight and momenta stay.
         """
@@ -134,7 +134,7 @@ class GhostPenalty:
         return Mass(csr_array(mass.matrix + extra), None, mass.weights)
 
     def _of_faces(self, values: NDArray) -> Floats:
-        """Larger of the values of both cells at each face."""
+        """Take the larger of the values of both cells at each face."""
         each = np.broadcast_to(values, len(self.phantom.mesh.cells))
         larger: Floats = each[self._cells].max(axis=0)
         return larger

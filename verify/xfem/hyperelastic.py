@@ -7,20 +7,19 @@ With J = det F the potential per volume is ½μ(‖F‖² − d) + H(J), and its
     neo_hookean          H = −μ ln J + ½λ ln² J
     stable_neo_hookean   H = −μ (J − 1) + ½(λ + μ)(J − 1)²
 
-Both have Hooke's tangent at rest. The second is that of Smith, de Goes & Kim (ACM TOG 37, 2018)
-without the term that keeps ‖F‖ = 0 stable, as Macklin & Müller (MIG 2021) have it: it is finite for
-cells that are inside out. The first is not: its energy is infinite where J ≤ 0.
-
-In the plane (strain) the stretch across is 1, and ‖F‖² − d and J are those of the two axes.
+Both have Hooke's tangent at rest. The second is from Smith, de Goes & Kim (ACM TOG 37, 2018). As in
+Macklin & Müller (MIG 2021) it lacks the term that keeps ‖F‖ = 0 stable. It is finite for inverted
+cells. The first is not: its energy is infinite where J ≤ 0. In plane strain the stretch across is
+1, and ‖F‖² − d and J count the two axes.
 
 The stress averaged over a step, of which the work is the change of the energy, is
 
     P = μ Fₘ + (H₁ − H₀)/(J₁ − J₀) C,   C : (F₁ − F₀) = J₁ − J₀,   C Fₘᵀ symmetric,
 
 so that angular momentum is kept (Gonzalez, CMAME 190, 2000), Fₘ = (F₀ + F₁)/2. In the plane J is
-quadratic, and C = cof Fₘ. In space det C is cubic in C = FᵀF, so that with Simpson's mean K of
-cof C from C₀ to C₁, J₁² − J₀² = K : (C₁ − C₀) exactly, and C = 2 Fₘ K/(J₀ + J₁). For a piece that
-is inside out at an end Simpson's mean of cof F itself stands in: it keeps the energy alone.
+quadratic, and C = cof Fₘ. In space det C is cubic in C = FᵀF. Let K be Simpson's mean of cof C from
+C₀ to C₁. Then J₁² − J₀² = K : (C₁ − C₀) exactly, and C = 2 Fₘ K/(J₀ + J₁). For a piece that is
+inverted at an end Simpson's mean of cof F itself stands in: it keeps the energy alone.
 """
 
 from typing import NamedTuple
@@ -47,9 +46,9 @@ def _cofactors(F, C):
 
 @njit(cache=True)
 def add_hyperelastic_force(elements, stable, F, force):
-    """Add the internal forces of F (p, d, d) to those of the corners (N, d); return the energy.
+    """Add the internal forces of F (p, d, d) to the corners (N, d); return the energy.
 
-    It is infinite, and the forces are no numbers, where the law knows no J ≤ 0.
+    Where J ≤ 0, a law without an energy there gives infinity, and forces that are no numbers.
     """
     cells, parent, gradients, volumes, _, lam, mu, axes, corners, _ = elements
     d, c = len(axes), len(corners)
@@ -88,9 +87,9 @@ def add_hyperelastic_force(elements, stable, F, force):
     return energy
 
 
-@njit(cache=True, error_model="numpy")  # what is pressed to nothing has moduli that are no numbers
+@njit(cache=True, error_model="numpy")  # a cell pressed to nothing has moduli that are no numbers
 def hyperelastic_moduli(elements, stable, F):
-    """Second derivative of the potential by F (p, d, d): (p, d, d, d, d) per volume."""
+    """Compute the second derivative of the potential by F (p, d, d): (p, d, d, d, d) per volume."""
     _, parent, _, _, _, lam, mu, axes, _, _ = elements
     d = len(axes)
     C = np.empty((d, d))
@@ -110,7 +109,7 @@ def hyperelastic_moduli(elements, stable, F):
                         value = rate * C[k, n] * C[q, r]
                         if k == q and n == r:
                             value += m
-                        if k != q and n != r:  # ∂cof F: what is left of F without rows k, q
+                        if k != q and n != r:  # ∂cof F: F without rows k, q
                             sign = 1.0 if (q - k - r + n) % 3 == 0 else -1.0
                             rest = F[p, 3 - k - q, 3 - n - r] if d == 3 else 1.0
                             value += sign * h * rest
@@ -170,7 +169,7 @@ def averages(law: Law, F0: Floats, F1: Floats) -> Averages:
 
 
 def moduli_of_averages(law: Law, F0: Floats, F1: Floats) -> Floats:
-    """∂P/∂F₁ (p, d, d, d, d) of the stress of `averages`, the last two those of F₁."""
+    """Differentiate the stress of `averages` by F₁: (p, d, d, d, d), the last two indices of F₁."""
     _, C, h, rate, K, J = averages(law, F0, F1)
     identity = np.eye(F0.shape[1])
     last = _cofactors_of(F1)
@@ -195,7 +194,7 @@ def moduli_of_averages(law: Law, F0: Floats, F1: Floats) -> Floats:
 
 
 def _volume_slopes(law: Law, J0: Floats, J1: Floats) -> tuple[Floats, Floats]:
-    """(H₁ − H₀)/(J₁ − J₀) and its derivative by J₁; no numbers where ln J is none."""
+    """Compute (H₁ − H₀)/(J₁ − J₀) and its derivative by J₁; no numbers where ln J is none."""
     (lam, mu, stable), total = law, J0 + J1
     if stable:
         return (lam + mu) * (0.5 * total - 1.0) - mu, 0.5 * (lam + mu)
@@ -212,7 +211,7 @@ def _volume_slopes(law: Law, J0: Floats, J1: Floats) -> tuple[Floats, Floats]:
         return mean * bulk, change * bulk + 0.5 * mean * lam / J1
 
 
-_CLOSE = 0.01  # of x: below it what the series leaves out is round-off
+_CLOSE = 0.01  # of x: below it the terms that the series leaves out are round-off
 # ∂cof F/∂F in the plane; in space its derivative by F
 _EVEN = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.cross(np.eye(3)[:, None], np.eye(3))
 _MINORS = {
@@ -222,7 +221,7 @@ _MINORS = {
 
 
 def _cofactor_slopes(A: Floats) -> Floats:
-    """∂cof A/∂A (p, 3, 3, 3, 3)."""
+    """Compute ∂cof A/∂A (p, 3, 3, 3, 3)."""
     return np.einsum("knacbd,pac->pknbd", _MINORS[3], A)
 
 

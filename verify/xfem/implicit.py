@@ -22,10 +22,10 @@ from verify.xfem.linear_solvers import LinearSolver
 
 _HALVINGS = 10
 _SLOW = 0.5  # of the residual: what a correction leaves that takes too little off
-_JUST = 1e-9  # of a step: more than the round-off of a time that some thousand steps have added up
-_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction of which nothing is known
+_JUST = 1e-9  # of a step: more than the round-off of a time summed over some thousand steps
+_INEXACT = 1e-6  # residual of conjugate gradients for a correction without a former one
 _COARSE, _FINE = 1e-2, 1e-10  # most and least of it
-_SPARE = 0.2  # of what is expected to be left anyhow: what conjugate gradients may leave
+_SPARE = 0.2  # of the residual expected after the correction: conjugate gradients may leave it
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
 
@@ -72,15 +72,15 @@ class Iterate(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """(N, d) that of the resistance."""
+        """(N, d) displacement of the resistance."""
         return self.resistance.displacement
 
 
 class NewtonIntegrator(ABC):
     """M (v₁ − v₀)/h = f_ext − f_int − f_visc with v₁ = γ (u₁ − u₀)/h − (γ − 1) v₀, solved for u₁.
 
-    With r the residual, damping α M + β K_R, K_R the rotation-fixed and K_C the consistent tangent
-    at the end, and s the `share` of the forces there, a correction Δu₁ solves A Δu₁ = r,
+    Let r be the residual, K_R the rotation-fixed and K_C the consistent tangent at the end, and s
+    the `share` of the forces there. Damping is α M + β K_R. A correction Δu₁ solves A Δu₁ = r,
 
         A = (γ/h² + s α γ/h) M + s (1 + β γ/h) K_R + s (K_C − K_R).
 
@@ -123,7 +123,7 @@ class NewtonIntegrator(ABC):
         self.solves = 0
         space = body.shape[1]
         # after `_assemble` A with the supports; after an evaluation in one pass the stiffness in A,
-        # without mass and supports; after any other whatever was there
+        # without mass and supports; after any other evaluation nothing of use
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
         self._solver = body.step_solver(_INEXACT) if solver is None else solver
         self._held = held_entries(body.pattern, body.fixed)
@@ -144,14 +144,14 @@ class NewtonIntegrator(ABC):
         """Return the forces in the balance of a step with this end."""
 
     def _prepare(self) -> None:  # noqa: B027
-        """Evaluate what is needed of the start of the step; nothing by default."""
+        """Evaluate the start of the step, if the scheme needs it; by default it does not."""
 
     def _load_at_start(self) -> Floats:
-        """External force (N, d) at the start of the step, after what jumps then."""
+        """Compute the external force (N, d) at the start of the step, after what jumps then."""
         return self.body.external(self._start.time + _JUST * self.step_size).copy()
 
     def _load_at_end(self, time: float) -> Floats:
-        """External force (N, d) of a step that ends at a time, before what jumps then."""
+        """Compute external force (N, d) of a step that ends at a time, before what jumps then."""
         return self.body.external(time - _JUST * self.step_size)
 
     def _resistance(self, displacement: Floats) -> Resistance:
@@ -222,9 +222,9 @@ class NewtonIntegrator(ABC):
     def _iterate(self, displacement: Floats) -> Iterate:
         """Evaluate the equation of a step that ends at a displacement (N, d).
 
-        Norms are of accelerations. The forces on a sliver of 1e-12, in space 1e-38 of those on its
-        neighbours, would not be seen among these: its unknowns would go anywhere, and step by step
-        they would grow until its energy is that of the body.
+        Norms are of accelerations. Forces on a sliver of share 1e-12 are in space 1e-38 of the
+        forces on its neighbours. A norm of forces would not see them: the unknowns of the sliver
+        would grow step by step, until its energy is as large as the body's.
         """
         velocity, end = self._velocity(displacement), self._resistance(displacement)
         forces = self._forces(end, velocity, self._start.time + self.step_size)
@@ -251,7 +251,7 @@ class NewtonIntegrator(ABC):
     def _newton(self, displacement: Floats) -> Iterate:
         """End of the step, from a first guess (N, d).
 
-        Whenever a correction is asked for, `now` is what was evaluated last: its blocks hold.
+        At each correction `now` is the iterate evaluated last, so its blocks are valid.
         """
         body = self.body
         prescribed, self._speed = body.prescribed(self._start.time + self.step_size)
@@ -293,7 +293,7 @@ class NewtonIntegrator(ABC):
         )
 
     def _aim(self, number: int, enough: float) -> float:
-        """Residual that conjugate gradients may leave of a correction: little less than others do.
+        """Choose the residual that conjugate gradients may leave of a correction.
 
         A correction leaves a residual because forces are not linear, about as much of it as the
         same correction of the last step (inexact Newton: Eisenstat & Walker, SIAM J. Sci.
@@ -310,7 +310,7 @@ class NewtonIntegrator(ABC):
         return min(max(_FINE, _SPARE * max(expected, enough)), _COARSE)
 
     def _round_off(self) -> Floats:
-        """(N, 1) error of the acceleration of each node for positions of size one, rounded."""
+        """Bound the error (N, 1) of the acceleration of each node, for positions of size one."""
         body = self.body
         self._blocks[:] = 0.0
         rest = body.force.configuration(np.zeros(body.shape))
@@ -321,7 +321,7 @@ class NewtonIntegrator(ABC):
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
     def _excess(self, residual: Floats, noise: Floats) -> float:
-        """Norm of the accelerations that are left beyond round-off: ‖(|M⁻¹ r| − noise)₊‖."""
+        """Return the norm of accelerations beyond round-off: ‖(|M⁻¹ r| − noise)₊‖."""
         left = np.abs(self._inverse_mass * residual) - noise
         return float(np.linalg.norm(np.maximum(left, 0.0)))
 
@@ -338,7 +338,7 @@ class NewtonIntegrator(ABC):
     def _correction(
         self, end: Resistance, residual: Floats, tolerance: float = _INEXACT, is_slow: bool = False
     ) -> Floats:
-        """Correction (N, d) of an end of the step by its residual.
+        """Solve for the correction (N, d) of an end of the step by its residual.
 
         Parameters
         ----------
@@ -402,7 +402,7 @@ class ImplicitEuler(NewtonIntegrator):
     """Implicit Euler (2.45–46), solved to the tolerance.
 
     It dissipates: a mode of frequency ω loses half of its energy in about ln 2/(ω² h), whatever its
-    amplitude. Parameters are those of `NewtonIntegrator`.
+    amplitude. Parameters as for `NewtonIntegrator`.
     """
 
     rate = 1.0
@@ -416,8 +416,8 @@ class ImplicitEuler(NewtonIntegrator):
 class Trapezoidal(NewtonIntegrator):
     """Trapezoidal rule: Newmark's method with β = ¼, γ = ½.
 
-    It keeps the energy of linear motion exactly and that of small nonlinear motion well, and is not
-    unconditionally stable at large amplitudes. Parameters are those of `NewtonIntegrator`.
+    It keeps the energy of linear motion exactly and of small nonlinear motion well. At large
+    amplitudes it is not unconditionally stable. Parameters as for `NewtonIntegrator`.
     """
 
     rate = 2.0

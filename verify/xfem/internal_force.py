@@ -1,11 +1,10 @@
 """Internal force, energy and stiffness of a cut body, linear or corotational (2.42, 2.66-70).
 
 Every piece, being a cell of the phantom-node mesh, has one polar rotation of its own.
-`verify.xfem.element` has the equations. Force and stiffness are found at the corners of the pieces,
-f and K; where corners follow others, u = C û, those of the dof nodes are f̂ = Cᵀf and K̂ = CᵀKC.
-`extend`, `restrict` and `fold` are these products; without aggregation C is the identity.
-
-What is in or behind `has_one_pass` runs with accelerated kernels only: never with `PLAIN`.
+`verify.xfem.element` has the equations. Elements give force f and stiffness K at the corners of the
+pieces. Where corners follow others, u = C û, the dof nodes have f̂ = Cᵀf and K̂ = CᵀKC. `extend`,
+`restrict` and `fold` are these products; without aggregation C is the identity. Branches on
+`has_one_pass` run with accelerated kernels only: never with `PLAIN`.
 """
 
 from collections.abc import Callable
@@ -167,7 +166,7 @@ class InternalForce:
 
     @property
     def couplings(self) -> Ints | None:
-        """(k, 2) dof nodes that the penalty alone couples, if there is one."""
+        """(k, 2) dof nodes that the penalty alone couples; None without a penalty."""
         return None if self.ghost is None else self.ghost.couplings
 
     def near(self, nodes: Ints) -> "InternalForce":
@@ -187,7 +186,7 @@ class InternalForce:
         return part
 
     def configuration(self, displacement: Floats) -> Configuration:
-        """Deformation gradients and rotations at a displacement (N, d)."""
+        """Find deformation gradients and rotations at a displacement (N, d)."""
         F = self.deformation(displacement)
         if not self.is_corotational:
             return Configuration(displacement, F, self._unturned)
@@ -199,7 +198,7 @@ class InternalForce:
         return Configuration(displacement, F, R)
 
     def deformation(self, displacement: Floats) -> Floats:
-        """Deformation gradients (p, d, d) at a displacement (N, d), of membranes as above."""
+        """Compute the deformation gradients (p, d, d) of a `Configuration` alone."""
         return self._gradient(displacement, 1.0)
 
     def _gradient(self, displacement: Floats, unit: float) -> Floats:
@@ -209,7 +208,7 @@ class InternalForce:
         return found
 
     def evaluate(self, displacement: Floats, out: Floats | None = None) -> tuple[Floats, float]:
-        """Return internal force (N, d) in newtons and energy in joules, that of a penalty included.
+        """Return internal force (N, d) in newtons and energy in joules, a penalty included.
 
         Parameters
         ----------
@@ -221,7 +220,7 @@ class InternalForce:
         return self.evaluate_at(self.configuration(displacement), out)
 
     def evaluate_at(self, at: Configuration, out: Floats | None = None) -> tuple[Floats, float]:
-        """As `evaluate`, for a configuration."""
+        """Evaluate force and energy as `evaluate`, for a configuration."""
         force = np.empty(self._shape) if out is None else out
         self._check(force=force)
         if self.law == "hooke":
@@ -236,7 +235,7 @@ class InternalForce:
         return force, energy + self.penalty_energy(at.displacement)
 
     def penalty_energy(self, displacement: Floats) -> float:
-        """Energy of the penalty in joules, which `evaluate` includes; zero without one."""
+        """Compute energy of the penalty in joules, which `evaluate` includes; zero without one."""
         if self.ghost is None:
             return 0.0
         return 0.5 * float(np.vdot(displacement, self.ghost.matrix @ displacement))
@@ -288,15 +287,15 @@ class InternalForce:
         ----------
         at : Configuration
         pattern : BlockPattern
-            Its first cells must be those of the body.
+            Its first cells must be the cells of the body.
         blocks : (B, d, d) float array
         kind : {"rotation-fixed", "geometric", "consistent", "tension"}
             K_R, with rotations held: no negative mode; K_R, of membranes with K_T, their geometric
             stiffness, which has none either; K_C, the second derivative of the potential; K_T. In
             linear kinematics all of them are K_R, but for the last.
         least : float
-            Tension over μ that every direction of a membrane is taken to have at least: without it
-            what is slack has no stiffness across its plane.
+            Least tension over μ in every direction of a membrane. Without it slack cells have no
+            stiffness across their plane.
 
         Returns
         -------
@@ -373,7 +372,7 @@ class InternalForce:
         displacement: Floats | None = None,
         kind: TangentKind = "consistent",
     ) -> Floats:
-        """(B, d, d) nodal blocks of a tangent in N/m, at a displacement or at rest."""
+        """Assemble a tangent in nodal blocks (B, d, d), N/m, at a displacement or at rest."""
         at = self.configuration(np.zeros(self._shape) if displacement is None else displacement)
         blocks = np.zeros((len(pattern.columns), self._shape[1], self._shape[1]))
         self.add_stiffness(at, pattern, blocks, 1.0, kind)
@@ -401,7 +400,7 @@ class InternalForce:
         Parameters
         ----------
         pattern : BlockPattern
-            Its first cells must be those of the body.
+            Its first cells must be the cells of the body.
         displacement, velocity : (N, d) float array
         implicit : float
             In seconds; with zero the velocity is not read.
@@ -411,7 +410,7 @@ class InternalForce:
         blocks : (B, d, d) float array
             Overwritten.
         whole : bool
-            Without it what is below the diagonal may be anything.
+            Without it blocks below the diagonal may be anything.
         rotational : float
             Without a meaning in linear kinematics, where K_C is K_R.
 
@@ -484,7 +483,7 @@ class InternalForce:
 
 
 def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:
-    """Pieces (k,) whose deformation gradient has a negative determinant.
+    """Find pieces (k,) whose deformation gradient has a negative determinant.
 
     Raises
     ------

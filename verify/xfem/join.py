@@ -1,22 +1,23 @@
 """Degrees of freedom that pieces share: by contact across faces, not by sign vectors.
 
-Two (piece, local node) pairs at one node are the same dof node when the pieces, in cells that share
-a face with that node, touch across the face, in an area (2D: a length). What touches in a corner
-or an edge only is apart, as pieces that turn about a hinge are no body, and a piece without volume
-joins nothing. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along
-faces all follow from this one rule.
+Take two pieces in cells that share a face, and a node of the face. Both have the same dof node
+there if they touch across the face, in an area (2D: a length). Pieces that touch in a corner or an
+edge only are apart: they could turn about it. A piece without volume joins nothing. Tips, mouths,
+parallel, crossing and branching cuts, cuts through nodes and along faces all follow from this one
+rule.
 
 A tip closes so: the face between the last divided cell and the whole one ahead has two regions, one
 on either side of the cut. The whole cell has one piece, label 0, that touches across both. Hence
 both sides share the dof nodes of that face, and the jump is zero on it. So a cut through a single
 cell inside the mesh makes two pieces and no unknown.
 
-Inside a cell pieces are apart, but for those of one part (`Partition.one_part`). The ends of cuts
-enter there, and by which cells they divide: regions of faces are those of the whole level sets.
+Inside a cell pieces are apart, except pieces of one part (`Partition.one_part`). The ends of cuts
+enter there, and by the choice of divided cells. Regions of faces ignore them: whole level sets
+bound the regions.
 
-The *side* of a piece is told for all cuts, its *label* (0 for cuts that do not split it off) for
-some: it is the side of its centroid, as a cut that leaves a piece of a split cell whole may have
-all nodes of the cell on its other side. The side of a dof node is that of its pieces.
+A piece has a *side* of every cut; its *label* is 0 for cuts that do not split it off. The side is
+taken at its centroid: a cut that leaves a piece whole may have all nodes of the cell on its other
+side. A dof node lies on the side of its pieces.
 """
 
 from dataclasses import dataclass
@@ -97,7 +98,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
 
 
 def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Sides]:
-    """Face (q,) and sides (q, cuts) of the regions into which cuts divide faces.
+    """Find the face (q,) and sides (q, cuts) of the regions into which cuts divide faces.
 
     Parameters
     ----------
@@ -107,12 +108,12 @@ def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Si
         Cuts that divide a cell beside the face.
     points : ZeroPoints
     """
-    # cuts come in the order of their numbers, which need not be that of the division: then points
-    # may be new here, and are added. Only sides leave this function; points tell empty regions.
+    # cuts come in the order of their numbers, not of the division: points may be new here, and are
+    # added. Only sides leave this function; points tell empty regions.
     face, side = np.arange(len(nodes)), np.zeros(dividing.shape, dtype=np.int8)
     stairs, left = staircase(nodes.shape[1]), dividing.copy()
     while left.any():
-        # of each face the first cut that is left: faces do not wait for those of other cuts
+        # of each face the first cut that is left: faces do not wait for one another
         first, some = left.argmax(axis=1), left.any(axis=1)
         left[some, first[some]] = False
         chosen = np.flatnonzero(some[face])
@@ -142,8 +143,8 @@ def _fitting(piece_cell: Ints, label: Sides, cells: Ints, side: Sides) -> Ints:
     """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts).
 
     It is one: a side of every cut leads down the divisions of a cell to exactly one piece. Hence
-    pieces of round-off size keep their rows, and those of one part stay several: their union is
-    in general no intersection of sides, so that no label would fit.
+    pieces of round-off size keep their rows, and pieces of one part stay several: their union is in
+    general no intersection of sides, so that no label would fit.
     """
     order = np.argsort(piece_cell, kind="stable")
     ends = np.cumsum(np.bincount(piece_cell))
@@ -217,7 +218,7 @@ _TIE = 1e-12
 
 @njit(cache=True)
 def piece_sides(level_sets: Floats, corners: Ints, label: Sides, weights: Floats) -> Sides:
-    """Sides (p, cuts) of the cuts on which pieces lie; plus where a centroid is on the cut.
+    """Tell the sides (p, cuts) of the cuts on which pieces lie; plus on the cut.
 
     Parameters
     ----------
@@ -251,14 +252,14 @@ def node_sides(
     piece_side: Sides,
     share: Floats,
 ) -> Sides:
-    """Sides (N, cuts) of the cuts on which the material of each dof node lies.
+    """Tell the sides (N, cuts) of the cuts on which the material of each dof node lies.
 
     For each cut, the first of these that applies:
 
-    1. all labelled pieces of the dof node are on one side: that;
+    1. all labelled pieces of the dof node are on one side: that side;
     2. it is of the node's own material, and the node is not on the cut: the side of the node;
-    3. its pieces in split cells lie on one side by the larger share, beyond round-off: that. So a
-       dof node beyond another cut lies where its pieces do, not where its node is;
+    3. its pieces in split cells lie on one side by the larger share, beyond round-off: that side;
+       a dof node beyond another cut lies where its pieces do, not where its node is;
     4. else the side of the node, plus on the cut.
 
     Parameters
@@ -271,7 +272,7 @@ def node_sides(
         Dof nodes of each piece.
     label, piece_side : (p, cuts) int8 array
     share : (p,) float array
-        Volume over that of the cell; 0 for whole cells, which have no vote.
+        Volume over the volume of the cell; 0 for whole cells, which have no vote.
     """
     on_cut = level_sets == 0.0
     side = np.where(level_sets >= 0.0, np.int8(1), np.int8(-1))[node_parent]
@@ -282,8 +283,8 @@ def node_sides(
     against = np.zeros(cells.shape, dtype=np.int64)
     np.add.at(against, piece, label[piece, cut][:, None] * level < 0.0)
     own[cells[against == 0]] = True
-    # votes are asked where a node tells nothing: of another material, or exactly on a cut, where it
-    # has its own where its pieces are
+    # pieces vote where the node does not tell: for another material than the node's own, or where
+    # the node is exactly on a cut
     asks = ~own | on_cut.any(axis=1)[node_parent]
     voters = np.flatnonzero((share > 0.0) & asks[cells].any(axis=1))
     nodes, number = np.unique(cells[voters], return_inverse=True)

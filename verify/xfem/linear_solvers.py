@@ -2,8 +2,7 @@
 
 The solvers are SciPy's: sparse LU factorisation, conjugate gradients. `Kernels` is the seam to
 `verify.accelerated`: every implementation of an operation gives the same result to round-off.
-`PLAIN` is what this package does alone, with NumPy, SciPy and plain loops; whoever builds a body
-may pass another set.
+`PLAIN` uses NumPy, SciPy and plain loops alone; the caller who builds a body may pass another set.
 """
 
 from collections.abc import Callable
@@ -50,7 +49,7 @@ class LinearSolver(Protocol):
     is_iterative: bool = False
 
     def learn(self, former: "LinearSolver") -> None:
-        """Take over what one of nearly the same matrices has found out about their cost."""
+        """Take over measured costs from a solver of nearly the same matrices."""
         return
 
     def factorize(self, blocks: Floats) -> None:
@@ -61,12 +60,12 @@ class LinearSolver(Protocol):
         SingularStiffnessError
             If it is seen not to be positive definite (of general matrices: not to be regular).
         XfemError
-            If the blocks are not those of the pattern.
+            If the blocks do not fit the pattern.
         """
         ...
 
     def solve(self, load: Floats, x: Floats | None = None) -> Floats:
-        """Solution (N, d) for a right-hand side (N, d).
+        """Solve for a right-hand side (N, d).
 
         Parameters
         ----------
@@ -91,8 +90,8 @@ class LinearSolver(Protocol):
 class SparseLU(LinearSolver):
     """LU factorisation by SuperLU.
 
-    Rows and columns are scaled by the diagonal before: those of a sliver are many orders smaller
-    than others, and a pivot among numbers of both sizes would lose them.
+    Rows and columns are scaled by the diagonal before: the entries of a sliver are many orders
+    smaller than others, and a pivot among numbers of both sizes would lose them.
 
     Parameters
     ----------
@@ -215,7 +214,7 @@ class BlockJacobiCG(LinearSolver):
 
 
 def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> Floats:
-    """Right-hand side or first guess as a float array (N, d) without gaps.
+    """Copy a right-hand side or first guess to a contiguous float array (N, d).
 
     Raises
     ------
@@ -236,7 +235,7 @@ class OnePass(Protocol):
     """Force and stiffness of corotational tetrahedra in one pass over the elements.
 
     `InternalForce.linearise` of `verify.xfem.internal_force` says what the arguments are; where
-    corners follow others, nodes and blocks are those of the corners.
+    corners follow others, nodes and blocks belong to the corners.
     """
 
     pattern: BlockPattern

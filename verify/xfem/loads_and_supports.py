@@ -1,9 +1,8 @@
-"""What acts on a cut body: forces on its volume and its boundary, and prescribed displacements.
+"""Forces on the volume and boundary of a cut body, and prescribed displacements.
 
-A load counts with the true integrals of N_i over the pieces, exact if it is constant, and not with
-the lumped V_piece/(d + 1) of the diagonal mass. The two differ on cut cells, and only the exact one
-passes patch tests under load. Displacements are prescribed on dof nodes, each on its own side of
-the cuts.
+A load takes the integrals of N_i over the pieces, exact if it is constant, not the lumped
+V_piece/(d + 1) of the diagonal mass. The two differ on cut cells, and only the exact one passes
+patch tests under load. Displacements are prescribed on dof nodes, each on its own side of the cuts.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +20,7 @@ from verify.xfem.polar import SPINS
 
 @cache
 def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
-    """Points and weights exact for polynomials up to a degree: a conical product of Gauß rules.
+    """Make points and weights exact up to a degree: a conical product of Gauß rules.
 
     Parameters
     ----------
@@ -57,7 +56,7 @@ LoadedPart = Callable[[Floats], tuple[Ints, Floats]]
 
 
 def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int = 4) -> Floats:
-    """Nodal forces (N, d) of a force per volume, in newtons (per metre of thickness in 2D).
+    """Compute nodal forces (N, d) of a force per volume, in newtons (per metre of thickness in 2D).
 
     Parameters
     ----------
@@ -103,7 +102,7 @@ def traction(
     degree: int = 4,
     loaded: LoadedPart | None = None,
 ) -> Floats:
-    """Nodal forces (N, d) of a traction on boundary facets, in newtons (per metre in 2D).
+    """Compute nodal forces (N, d) of a traction on boundary facets, in newtons (per metre in 2D).
 
     Parameters
     ----------
@@ -116,7 +115,7 @@ def traction(
     degree : int
         As in `body_force`.
     loaded : callable, optional
-        Gives what of the facets, divided where cuts cross them, is loaded; default: all.
+        Gives the loaded part of the facets, divided where cuts cross them; default: all.
 
     Raises
     ------
@@ -156,13 +155,13 @@ def traction(
 
 
 def facet_places(phantom: PhantomMesh, piece: Ints, corners: Floats) -> Floats:
-    """Places (q, k, space), m, of barycentric corners (q, k, d + 1) in the cells of pieces (q,)."""
+    """Map barycentric corners (q, k, d + 1) in pieces (q,) to places (q, k, space), m."""
     places: Floats = corners @ phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
     return places
 
 
 def facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Floats, Floats]:
-    """Material of the facets of `cells` opposite to a corner, as simplices.
+    """Divide the facets of `cells` opposite to a corner into simplices of material.
 
     A facet that a cut crosses is divided by it. Pieces (q,), barycentric coordinates (q, d, d + 1)
     of the corners, and measures (q,). Where a zero point lies on the facet, its coordinate of the
@@ -256,7 +255,7 @@ class Supports:
 
     @staticmethod
     def none(phantom: PhantomMesh) -> "Supports":
-        """No support at all."""
+        """Make supports that fix nothing."""
         shape = phantom.node_points.shape
         return Supports(np.zeros(shape, dtype=bool), np.zeros(shape))
 
@@ -276,16 +275,16 @@ class Supports:
             Nodes of the *uncut* mesh; every dof node there is prescribed. None may follow a
             root cell (aggregation): its value would be what the root says.
         values : float, (d,) array_like, or callable
-            In metres. A function is called with the positions (k, d) and the sides (k, cuts) of the
-            dof nodes, so that a field that jumps across a cut is evaluated on the right side.
+            In metres. A function takes positions (k, d) and sides (k, cuts) of the dof nodes. So a
+            field that jumps across a cut is evaluated on the right side.
         components : tuple of int, optional
             Components to fix; all by default.
 
         Raises
         ------
         XfemError
-            If these supports are of another body, nodes or components do not exist, a node has
-            material that follows a root cell, or values have a wrong shape or are not finite.
+            If these supports are of another body, or nodes or components do not exist. If a node
+            has material that follows a root cell, or values have a wrong shape or are not finite.
         """
         count, dim = len(phantom.mesh.points), self.fixed.shape[1]
         if self.fixed.shape != phantom.node_points.shape:
@@ -376,7 +375,7 @@ def check_bodies(
 
 
 def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: Ints) -> Ints:
-    """Those of the given free bodies, by number (k,), that can move rigidly."""
+    """Select from the given free bodies (k,), by number, the ones that can move rigidly."""
     found = []
     for body in bodies:
         nodes, modes = _modes_of(phantom, body)
@@ -407,7 +406,7 @@ def _loose_together(
 
 
 def _modes_of(phantom: PhantomMesh, body: int) -> tuple[Ints, Floats]:
-    """Dof nodes (k,) of a free body, and its rigid modes (k, d, modes), each of norm 1."""
+    """Find dof nodes (k,) of a free body, and its rigid modes (k, d, modes), each of norm 1."""
     nodes = np.flatnonzero(phantom.bodies == body)
     points = phantom.node_points[nodes]
     modes = _rigid_modes((points - points.mean(axis=0)) / phantom.mesh.extent)
@@ -415,7 +414,7 @@ def _modes_of(phantom: PhantomMesh, body: int) -> tuple[Ints, Floats]:
 
 
 def _rigid_modes(points: Floats) -> Floats:
-    """(k, d, modes) translations and infinitesimal rotations at points (k, d)."""
+    """Return translations and infinitesimal rotations (k, d, modes) at points (k, d)."""
     count, dim = points.shape
     shifts = np.broadcast_to(np.eye(dim), (count, dim, dim))
     return np.concatenate([shifts, np.einsum("aij,kj->kia", SPINS[dim], points)], axis=2)

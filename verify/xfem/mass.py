@@ -1,10 +1,10 @@
 """Mass of a cut body, as a scalar matrix on dof nodes (the same for every component).
 
 Side-wise lumping gives each dof node its share ρ V_piece/(d + 1) of the pieces around it. It is
-diagonal, conserves the mass of every piece exactly, and bounds the explicit step by that of the
-uncut elements, however small the pieces. The consistent mass integrates shape functions exactly.
-`verify.methods.mass_variants` has others: the lumpings that the thesis compares, and masses
-stabilised against slivers.
+diagonal and conserves the mass of every piece exactly. With it the smallest step of the uncut
+elements is stable, however small the pieces. The consistent mass integrates shape functions
+exactly. `verify.methods.mass_variants` has others: the lumpings that the thesis compares, and
+masses stabilised against slivers.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Mass:
 
     @property
     def keeps_element_steps(self) -> bool:
-        """Whether no cut makes the explicit step smaller than that of the smallest element."""
+        """Whether the step of the smallest uncut element is stable, whatever the cuts."""
         return self.diagonal is not None
 
     @cached_property
@@ -58,13 +58,13 @@ class Mass:
         return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
     def apply(self, vectors: Floats) -> Floats:
-        """M times (N, d) vectors."""
+        """Multiply (N, d) vectors by M."""
         if self.diagonal is not None:
             return self.diagonal[:, None] * vectors
         return self.matrix @ vectors
 
     def solve(self, forces: Floats) -> Floats:
-        """M⁻¹ times (N, d) forces."""
+        """Multiply (N, d) forces by M⁻¹."""
         if self.diagonal is not None:
             return forces / self.diagonal[:, None]
         if self.root is not None:
@@ -76,7 +76,7 @@ class Mass:
         return splu(csc_array(self.matrix))
 
     def weight(self, gravity: ArrayLike) -> Floats:
-        """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons.
+        """Compute the dead weight (N, d) of the unknowns under gravity (d,), in newtons.
 
         Raises
         ------
@@ -86,10 +86,10 @@ class Mass:
         return self.weights[:, None] * finite_array(gravity, "vector of gravity", (None,))
 
     def pattern(self, phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPattern:
-        """Sparsity of stiffness and mass together; its first cells are those of the body.
+        """Make the sparsity of stiffness and mass together; its first cells are the body's.
 
-        The lumpings of the thesis couple the unknowns of one node, and the mass of a ghost
-        penalty those on both sides of a face: no cell does.
+        The lumpings of the thesis couple the unknowns of one node. The mass of a ghost penalty
+        couples unknowns on both sides of a face. No cell does either.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Mass:
         return body_pattern(phantom, own)
 
     def places(self, pattern: BlockPattern) -> Ints:
-        """Block of each of the `entries` in a pattern.
+        """Find the block of each of the `entries` in a pattern.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Mass:
 
 
 def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
-    """(m,) density of the uncut cells.
+    """Return the density (m,) of the uncut cells.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
 
 
 def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
-    """Side-wise lumped mass: the diagonal Σ ρ V_piece/(d + 1) over the pieces of each dof node.
+    """Lump side-wise: the diagonal Σ ρ V_piece/(d + 1) over the pieces of each dof node.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
 
 
 def second_moments(phantom: PhantomMesh) -> Floats:
-    """(p, d + 1, d + 1) exact integrals of N_i N_j over each piece, in m^d."""
+    """Integrate N_i N_j over each piece exactly: (p, d + 1, d + 1), in m^d."""
     corners = phantom.cells.shape[1]
     whole = (np.ones((corners, corners)) + np.eye(corners)) / (corners * (corners + 1))
     moments = phantom.volumes[:, None, None] * whole
@@ -185,9 +185,9 @@ def second_moments(phantom: PhantomMesh) -> Floats:
 
 
 def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
-    """Consistent mass (2.72–75) in side-wise unknowns: ∫ρ N_i N_j over each piece.
+    """Compute the consistent mass (2.72–75) in side-wise unknowns: ∫ρ N_i N_j over each piece.
 
-    Its explicit step vanishes with the smallest piece. Parameters are those of `side_wise_mass`.
+    Its explicit step vanishes with the smallest piece. Parameters as for `side_wise_mass`.
     """
     if phantom.aggregation is not None:
         found: Mass = phantom.aggregation.mass(consistent_mass(phantom.corners, density))
@@ -196,7 +196,7 @@ def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
 
 
 def assembled_mass(phantom: PhantomMesh, density: ArrayLike, moments: Floats) -> Mass:
-    """Mass whose share of each piece is its density times `moments` (p, d + 1, d + 1)."""
+    """Make the mass whose share of each piece is its density times `moments` (p, d + 1, d + 1)."""
     moments = moments * cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
     rows = np.broadcast_to(phantom.cells[:, :, None], moments.shape)
     columns = np.broadcast_to(phantom.cells[:, None, :], moments.shape)

@@ -1,7 +1,7 @@
 """Simplicial meshes: triangles in the plane, triangles in space, tetrahedra.
 
-The dimension is a number, not a case: ``dim`` is that of the simplex, ``space`` that of its
-points. Only measures and gradients tell membranes (`SimplexMesh.is_membrane`) from the others.
+The dimension is a number, not a case: simplices have ``dim``, their points ``space``. Only measures
+and gradients tell membranes (`SimplexMesh.is_membrane`) from the others.
 
 Structured meshes of a rectangle and of a box are at the end.
 """
@@ -48,8 +48,8 @@ class SimplexMesh:
     ------
     XfemError
         If shapes or indices are wrong, a coordinate is not finite, a cell is degenerate, or a node
-        belongs to no cell; when neighbours are first asked for, if a facet is shared by more than
-        two cells or a cell is given twice.
+        belongs to no cell. When neighbours are first needed: if more than two cells share a facet
+        or a cell is given twice.
 
     Examples
     --------
@@ -96,11 +96,11 @@ class SimplexMesh:
         return corners[:, 1:] - corners[:, :1]
 
     def longest_edges(self, chosen: Ints) -> Floats:
-        """Length (q,) of the longest edge of some cells (q,), in metres."""
+        """Compute the length (q,) of the longest edge of some cells (q,), in metres."""
         return _sizes(self.points, self.cells[chosen])[0]
 
     def cells_at(self, marked: Bools) -> Ints:
-        """Cells (q,), ascending, with one of the marked nodes (n,)."""
+        """Find cells (q,), ascending, with one of the marked nodes (n,)."""
         # corner by corner: many times faster than along the short axis
         return np.flatnonzero(np.logical_or.reduce([marked[nodes] for nodes in self.cells.T]))
 
@@ -183,7 +183,7 @@ def _check(points: Floats, cells: Ints) -> None:
 
 @njit(cache=True)
 def _sizes(points, cells):
-    """Longest edge (q,) of cells, and |det| (q,) of the edges from their first node in their space.
+    """Find the longest edge (q,) and |det| (q,) of the edges from the first node of each cell.
 
     In one pass over the mesh. Of triangles in space the second is not one: 0.
     """
@@ -214,7 +214,7 @@ def _sizes(points, cells):
 
 @njit(cache=True)
 def _gradients(points, cells):
-    """Gradients (m, d + 1, d) of the shape functions of triangles or tetrahedra in their space.
+    """Compute gradients (m, d + 1, d) of shape functions of triangles or tetrahedra.
 
     ∇N_1 = e_2 × e_3 / (e_1 · e_2 × e_3) with the edges e from the first node, the others in turn.
     """
@@ -244,21 +244,21 @@ def _gradients(points, cells):
 
 
 def facets_of(cells: NDArray) -> NDArray:
-    """(m·(d + 1), d) corners of the facets of cells (m, d + 1), opposite to each corner in turn."""
+    """List the corners (m·(d + 1), d) of all facets of cells, opposite to each corner in turn."""
     corners = cells.shape[1]
     others = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
     return cells[:, others].reshape(-1, corners - 1)
 
 
 def equal_rows(rows: Ints) -> tuple[Ints, Ints]:
-    """Numbers (q,), (q,) of equal rows, each one with the next: three equal rows make two pairs."""
+    """Compute pair equal rows (q,), (q,), each one with next: three equal rows make two pairs."""
     order = np.lexsort(rows.T[::-1])
     same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
     return order[:-1][same], order[1:][same]
 
 
 def connected(count: int, first: Ints, second: Ints) -> Ints:
-    """(count,) component of each node of a graph with edges from `first` (q,) to `second` (q,)."""
+    """Label the components (count,) of a graph with edges from `first` (q,) to `second` (q,)."""
     found = np.arange(count)
     _connect(found, *(np.ascontiguousarray(ends, dtype=np.int64) for ends in (first, second)))
     return found
@@ -286,7 +286,7 @@ def _connect(root, first, second):
 
 
 def neighbours_across(cells: Ints) -> Ints:
-    """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary.
+    """Find the cell (m, d + 1) across the facet opposite to each node, -1 on the boundary.
 
     Raises
     ------
@@ -306,7 +306,7 @@ def neighbours_across(cells: Ints) -> Ints:
 
 @njit(cache=True)
 def _across_facets(cells):
-    """Neighbours as above, and a facet that more than two cells share; -1 without one.
+    """Find the neighbours as above, and a facet that more than two cells share; -1 without one.
 
     Facets are told apart by their smallest and largest node and the sum of the others, and found
     by a hash of these.
@@ -352,7 +352,7 @@ def rectangle_mesh(
     upper: ArrayLike = (1.0, 1.0),
     diagonal: Diagonal = "right",
 ) -> SimplexMesh:
-    """Triangles of a rectangle divided into equal rectangles.
+    """Divide a rectangle into equal rectangles, and these into triangles.
 
     Parameters
     ----------
@@ -397,7 +397,7 @@ def box_mesh(
     lower: ArrayLike = (0.0, 0.0, 0.0),
     upper: ArrayLike = (1.0, 1.0, 1.0),
 ) -> SimplexMesh:
-    """Tetrahedra of a box divided into equal boxes, six to a box (Kuhn's triangulation).
+    """Divide a box into equal boxes, and each into six tetrahedra (Kuhn's triangulation).
 
     All six share the diagonal from the lower to the upper corner of their box, so the mesh is
     conforming and translation invariant.
@@ -437,7 +437,7 @@ def box_mesh(
 
 
 def _grid(divisions: Sequence[int], lower: ArrayLike, upper: ArrayLike) -> tuple[Ints, Floats]:
-    """Node numbers, indexed by the place in the grid (x, y, z), and coordinates (n, d)."""
+    """Assign numbers to the nodes of a grid, by place (x, y, z); with coordinates (n, d)."""
     low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
     counts = np.asarray(divisions)
     if counts.shape != low.shape or (counts < 1).any() or counts.dtype.kind != "i":

@@ -1,8 +1,9 @@
 """The cut body as a mesh of pieces of cells: standard finite elements with a weight.
 
 Every piece of a cell becomes a whole cell of its own (phantom nodes; Hansbo & Hansbo 2004) whose
-stiffness, mass and load count by the piece's share of the volume. The space is that of the shifted
-Heaviside enrichment (2.48), in side-wise unknowns. Force, mass and solvers need not know of cuts.
+stiffness, mass and load count by the piece's share of the volume. The space is the one of the
+shifted Heaviside enrichment (2.48), in side-wise unknowns. Force, mass and solvers need not know of
+cuts.
 """
 
 from collections.abc import Sequence
@@ -55,7 +56,7 @@ class Constraint(Protocol):
     corners : PhantomMesh
         The same body with a dof node for each corner.
     extension : (N_corners, N) csr_array
-        C: corner values from those of the dof nodes; it reproduces linear fields.
+        C: corner values from values at the dof nodes; it reproduces linear fields.
     restriction : (N, N_corners) csr_array
         Cᵀ.
     node : (N_corners,) int array
@@ -72,11 +73,11 @@ class Constraint(Protocol):
     def node(self) -> Ints: ...  # noqa: D102
 
     def pattern(self, couplings: Ints) -> Any:
-        """Sparsity of CᵀKC, with further couplings (k, 2) of dof nodes."""
+        """Make the sparsity of CᵀKC, with further couplings (k, 2) of dof nodes."""
         ...
 
     def mass(self, of_corners: Any) -> Any:
-        """Mass CᵀMC of the dof nodes from that of the corners."""
+        """Make the mass CᵀMC of the dof nodes from the mass M of the corners."""
         ...
 
 
@@ -84,10 +85,10 @@ class Constraint(Protocol):
 class PhantomMesh:
     """A cut mesh.
 
-    With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no
-    unknown of their own but follow others: `cells` counts corners, and everything else here that
-    has N rows is of the dof nodes. `extend` and `restrict` lead from one to the other: arrays of N
-    rows must not be indexed by `cells`, or only by those of `corners`, the mesh before aggregation.
+    With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no unknown of
+    their own but follow others. `cells` counts corners; all arrays of N rows count dof nodes, and
+    `cells` must not index them. `extend` and `restrict` lead from one to the other. `corners` is
+    the mesh before aggregation, where both are the same.
 
     Attributes
     ----------
@@ -103,8 +104,8 @@ class PhantomMesh:
         Side of each cut that splits the parent; 0 where the cut does not split it.
     node_parent : (N,) int array
         Node of the uncut mesh. The first n dof nodes are the nodes of the mesh, each with the
-        material in which it lies (if that is of round-off size, with other material around it);
-        further ones are phantom nodes.
+        material in which it lies. If that is of round-off size, it has other material around it.
+        Further ones are phantom nodes.
     level_sets : (n, cuts) float array
         Nodal level set of each cut as used: snapped to zero within round-off, in metres.
     sub_cells : SubCells
@@ -160,11 +161,11 @@ class PhantomMesh:
         return corner
 
     def extend(self, values: Floats) -> Floats:
-        """Corner values (N_corners, d) of nodal values (N, d)."""
+        """Return corner values (N_corners, d) of nodal values (N, d)."""
         return values if self.aggregation is None else self.aggregation.extension @ values
 
     def restrict(self, forces: Floats) -> Floats:
-        """Nodal forces (N, d) that do the same work as forces at the corners (N_corners, d)."""
+        """Return nodal forces (N, d) that do the same work as forces at corners (N_corners, d)."""
         return forces if self.aggregation is None else self.aggregation.restriction @ forces
 
     @cached_property
@@ -304,8 +305,8 @@ def cut_mesh(
     Raises
     ------
     XfemError
-        If the cuts are no sequence, one is in another space than the mesh, a level set is not
-        finite, a depth is NaN, the tip rule is unknown, or `opened` has a wrong shape.
+        If the cuts are no sequence, one is in another space than the mesh, or the tip rule is
+        unknown. If a level set is not finite, a depth is NaN, or `opened` has a wrong shape.
 
     Notes
     -----
@@ -327,8 +328,8 @@ def cut_mesh(
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
 
-    # two numberings of pieces: `joined` has those of the partition, then the whole cells of the
-    # patch; the result, by cell, those of them that are solid, and the rest of the cells
+    # two numberings of pieces: `joined` has the pieces of the partition, then the whole cells of
+    # the patch; the result has its solid pieces and the rest of the cells, ordered by cell
     rows = np.flatnonzero(np.pad(solid, (0, len(joined.group) - len(solid)), constant_values=True))
     rows = rows[np.argsort(joined.piece_cell[rows], kind="stable")]
     count = np.ones(len(mesh.cells), dtype=np.int64)

@@ -16,7 +16,7 @@ face in which it lies, so that nothing else is joined across it.
 Where cuts end, or meet, inside a cell:
 
 ===================  ========================  =======================  ==========================
-what is there        who decides               labels                   who joins
+place                who decides               labels                   who joins
 ===================  ========================  =======================  ==========================
 the tip of a cut     `crossing`: not through   0: one piece             `join`: this whole cell is
                                                                         joined to both sides of
@@ -85,12 +85,12 @@ def split_cells(
     """Split every cell that a cut goes through, or that several part at a junction.
 
     The others do not appear in the result. Crossed cells are divided up to four times, each time
-    from the start and with zero points and piece numbers of their own, which do not compare:
+    from the start. Numbers of zero points and pieces do not compare from one time to the next:
 
-    1. by the rules given: cells in pieces of which a cut ends are noted;
-    2. if not all cells are opened, the same as if they were, for step 3;
-    3. cells in which a cut ends and another is, whatever the ends: which cuts make a junction;
-    4. if some do, by the rules given once more, those cuts going through the cells of junctions.
+    1. by the rules given; note the cells in which a cut ends;
+    2. if not all cells are opened, the same as if all were, for step 3;
+    3. cells with an end of a cut and another cut, whatever the ends: which cuts make a junction;
+    4. if some do, by the rules given once more; these cuts now go through the cells of junctions.
 
     On a first reading leave out `separated`, `opened` and `junction_cells`: they serve cuts that
     grow (`verify.simulator`).
@@ -106,8 +106,9 @@ def split_cells(
         the order of the cuts matters where one ends in an element that another divides: it splits
         what it finds, the element or a piece.
     separated : callable, optional
-        For a cut that grows: given the cells and labels of pieces that a cut meets but does not
-        go through, and its number, tells which it shall split: those that it split before.
+        For a cut that grows. Its arguments are cells and labels of pieces that a cut meets but does
+        not go through, and the number of the cut. It tells which of them the cut split before, and
+        splits again.
     opened : (m, cuts) bool array, optional
         Cells in which each cut may split anything; without it all.
     junction_cells : (m,) bool array, optional
@@ -116,8 +117,8 @@ def split_cells(
     Raises
     ------
     XfemError
-        If the cuts are no sequence, a level set is not finite, a depth is NaN, either has a wrong
-        shape, the tip rule is unknown, or `opened` is of another mesh.
+        If the cuts are no sequence, the tip rule is unknown, or `opened` is of another mesh. If a
+        level set is not finite, a depth is NaN, or either has a wrong shape.
     """
     check_choice(tip, TipRule, "tip rule")
     if not isinstance(cuts, Sequence):
@@ -158,7 +159,7 @@ def split_cells(
 
 
 def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
-    """Level sets (n, cuts) at the nodes, zero within round-off; how many were made zero.
+    """Evaluate level sets (n, cuts) at the nodes, zero within round-off; count the snapped ones.
 
     Raises
     ------
@@ -181,7 +182,7 @@ def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
 
 
 def _met_cells(mesh: SimplexMesh, values: Floats, boxes: Floats) -> tuple[Bools, Floats]:
-    """Which cells each cut meets (m, cuts), and the longest edges (m,) of those, in metres.
+    """Find the cells that each cut meets (m, cuts), and their longest edges (m,), in metres.
 
     A cell that is crossed by the extension of a cut only, far from the cut itself, is left out.
     """
@@ -191,9 +192,9 @@ def _met_cells(mesh: SimplexMesh, values: Floats, boxes: Floats) -> tuple[Bools,
     crossed = np.flatnonzero(meets.any(axis=1))
     sizes = np.zeros(len(mesh.cells))
     sizes[crossed] = mesh.longest_edges(crossed)
-    # A cut has to do with points at most 1.5 sizes from it: half a size to one side of a point that
-    # is on it (`REACH`), and past that within the same cell. A facet is of two cells, hence the
-    # larger size around.
+    # A cut concerns points at most 1.5 sizes from it: half a size to one side of a point on it
+    # (`REACH`), and from there within the same cell. Two cells share a facet, hence the larger size
+    # around.
     reach = np.zeros(len(mesh.points))
     np.maximum.at(reach, mesh.cells[crossed], 1.6 * sizes[crossed, None])
     for cut in np.flatnonzero(np.isfinite(boxes[:, 0, 0])).tolist():
@@ -206,7 +207,7 @@ def _met_cells(mesh: SimplexMesh, values: Floats, boxes: Floats) -> tuple[Bools,
 
 
 def _rounds(meets: Bools) -> list[tuple[Ints, Ints]]:
-    """Cells (q,) and cuts (q,) of each round: cuts that meet in no cell divide in the same one.
+    """Find cells (q,) and cuts (q,) of each round: cuts that meet in no cell divide in same one.
 
     Of those that do the one given first divides in an earlier round.
     """
@@ -293,16 +294,18 @@ def _divide(partition: Partition, cut: Ints, active: Bools) -> Partition:
         simplices=divided(partition.simplices, partition.points, cut, below),
         absorbed_by=np.concatenate([partition.absorbed_by, below[active]]),
     )
-    # halves: the one that may take, the one that it takes. The larger half of a solid piece takes
-    # the other if that is of round-off size; of a piece that is not solid, above takes below.
+    # halves: the one that may absorb, the one to be absorbed. The larger half of a solid piece
+    # absorbs the other if that is of round-off size; of a piece that is not solid, above absorbs
+    # below.
     share, solid = parted.fraction, partition.solid[above]
     halves = np.stack([above, below[active]])
     swapped = solid & (share[halves[0]] <= share[halves[1]])
     halves[:, swapped] = halves[::-1, swapped]
     small = ~solid | (share[halves[1]] <= ROUND_OFF_SHARE)
     parted.absorbed_by[halves[1, small]] = halves[0, small]
-    # what was taken before by a piece that is divided now goes to the half on whose side it lies,
-    # by the sign of its mean level set; if it is divided as well, its half below to that below
+    # a piece absorbed before, by a piece that is divided now, goes to the half on whose side it
+    # lies, by the sign of its mean level set; if it is divided as well, its half below goes to the
+    # half below
     taken = np.flatnonzero(~partition.solid & active[partition.absorbed_by])
     if len(taken):
         sub = partition.simplices
@@ -314,7 +317,7 @@ def _divide(partition: Partition, cut: Ints, active: Bools) -> Partition:
 
 
 def _bisect_beside(partition: Partition, of_cell: Ints) -> Partition:
-    """Bisect what the cut of a cell leaves whole where it ends: later cuts find matching edges.
+    """Bisect pieces that a cut leaves whole at its end, so that later cuts find matching edges.
 
     That changes sub-simplices, and no piece.
     """

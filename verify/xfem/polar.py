@@ -1,12 +1,12 @@
 """Rotation nearest to a deformation gradient: argmax over SO(d) of tr(Rᵀ F).
 
-The maximum t = tr(Rᵀ F) is the trace of the stretch; R has determinant +1 whatever the sign of
-det F, so a collapsed or inverted element has a rotation too. In the plane R is closed form. In
-space tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q (Horn, J. Opt. Soc. Am. A 4, 1987).
-Such a form has no local maximum on the sphere besides the global one, so Newton's method on SO(3)
-may start anywhere: where its Hessian tr(S) I − S, S = sym(Rᵀ F), is positive definite it has found
-the rotation, and where it is not, the eigenvector of the form (a Jacobi iteration, which cannot
-fail) is taken instead.
+The maximum t = tr(Rᵀ F) is the trace of the stretch; R has determinant +1 whatever the sign of det
+F, so a collapsed or inverted element has a rotation too. In the plane R is closed form. In space
+tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q (Horn, J. Opt. Soc. Am. A 4, 1987). Such a
+form has no local maximum on the sphere besides the global one, so Newton's method on SO(3) may
+start anywhere. It has found the rotation where its Hessian tr(S) I − S, S = sym(Rᵀ F), is positive
+definite. Elsewhere the eigenvector of the form replaces it, by a Jacobi iteration, which cannot
+fail.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ SPINS[3] = SPINS[3].transpose(0, 2, 1)
 
 
 def nearest_rotations(F: Floats) -> Floats:
-    """Rotations (p, d, d) nearest to deformation gradients (p, d, d), also singular or inverted."""
+    """Find the rotations (p, d, d) nearest to F (p, d, d), also singular or inverted."""
     R = np.empty(F.shape)
     if F.shape[1] == 2:
         rotations_in_plane(F, R)
@@ -34,7 +34,7 @@ def nearest_rotations(F: Floats) -> Floats:
 
 
 def adjugate(A: Floats) -> tuple[Floats, Floats]:
-    """Adjugates and determinants of symmetric matrices (p, 3, 3)."""
+    """Compute adjugates and determinants of symmetric matrices (p, 3, 3)."""
     cofactors = np.cross(A[:, [1, 2, 0]], A[:, [2, 0, 1]])
     return cofactors, np.einsum("pk,pk->p", A[:, 0], cofactors[:, 0])
 

@@ -1,8 +1,8 @@
 """Implicit Euler with one linearisation per step: the scheme of real-time simulation.
 
-(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v) (Baraff & Witkin, SIGGRAPH 1998), K the
-rotation-fixed tangent, of membranes with the geometric stiffness: symmetric positive definite, so
-that the step always has a solution.
+(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v) (Baraff & Witkin, SIGGRAPH 1998). K is the
+rotation-fixed tangent, of membranes with the geometric stiffness. The matrix is symmetric positive
+definite, so that the step always has a solution.
 """
 
 import numpy as np
@@ -112,9 +112,9 @@ class RealTimeEuler:
     def _solve(self) -> None:
         """Write the change of velocity; iterations start from a parabola through the last three.
 
-        That takes one iteration in five off steps of a millisecond, one in eight off those of ten,
-        and adds one in twenty where steps are so long that nothing goes on as it was (measured
-        with the bodies of the benchmarks).
+        Measured with the bodies of the benchmarks, it saves one iteration in five at steps of a
+        millisecond and one in eight at ten. At steps too long for the motion to be smooth it adds
+        one in twenty.
         """
         last, before, first = self._changes
         self._change[:] = 3.0 * (last - before) + first
@@ -123,7 +123,7 @@ class RealTimeEuler:
         self._changes[0][:] = self._change
 
     def follow(self, other: "RealTimeEuler", source: Ints) -> None:
-        """Go on from the steps of a body before a cut: iterations start from where its would.
+        """Go on from the steps of a body before a cut: take over its last changes of velocity.
 
         Parameters
         ----------

@@ -1,24 +1,24 @@
-"""State of a body that is cut while it moves, and forces that fade where the cut lets go.
+"""State of a body that is cut while it moves, and the tie forces behind the cut.
 
-The parts of a piece start with the motion of that piece: every new dof node takes over the
-value of the dof node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).
-The field does not change, so energy and momenta do not either.
+The parts of a piece start with the motion of that piece. Every new dof node takes over the value of
+the dof node that the same corner had before: a = 0 and ȧ = 0 in the terms of the thesis. The field
+does not change, so energy and momenta do not either.
 
 Where cells are aggregated the inherited field is not in the space: nodes that follow a root cell
-from now on are where it puts them. The velocity is the nearest one in the mass, so that every part
-keeps its momenta; displacements of the other nodes stay. Kinetic energy is lost, strain energy
-changes, both by what the field of the slivers was off the root's.
+from now on move to where it puts them. The velocity is the nearest one in the norm of the mass, so
+that every part keeps its momenta; displacements of the other nodes stay. Kinetic energy is lost and
+strain energy changes, as the field of the slivers differed from the root's.
 
-A dof node of the old body that several of the new one descend from is let go. Each of these is
-held on by a dead force r_i = M_i a + f_int + f_visc − f_ext with the acceleration of before, so
-that no acceleration jumps; Σ r_i = 0, as the old node was in balance. The force fades with a
-factor from 1 to 0 and takes the energy that the cut sets free (Menouillard & Belytschko, Int. J.
-Numer. Meth. Engng 81, 2010, for nodes of a mesh). Its couple δ × r turns a body; that is accounted
-for. Released at once (a factor of 0) the energy is left as waves of the length of an element.
+The cut *releases* an old dof node that becomes several new ones. Each new one gets a *tie force*
+r_i = M_i a + f_int + f_visc − f_ext, with the acceleration a of before; it is a dead force. So no
+acceleration jumps; Σ r_i = 0, as the old node was in balance. The force fades with a factor from 1
+to 0 and takes the energy that the cut sets free (Menouillard & Belytschko, Int. J. Numer. Meth.
+Engng 81, 2010, for nodes of a mesh). Its couple δ × r turns a body; that is accounted for. Without
+it (a factor of 0) the energy stays as waves of the length of an element.
 
-Of aggregated cells all this is so of the corners, u = C û, and Cᵀr acts on the dof nodes. Forces by
-which slivers follow their roots, and those of a penalty, act on all parts of a node together. They
-are no part of r: what another space makes of them is not the cut's, and not held.
+In aggregated cells all this holds for the corners, u = C û, and Cᵀr acts on the dof nodes. Forces
+by which slivers follow their roots, and penalty forces, act on all parts of a node together. They
+are no part of r: they change with the space, not by the cut.
 """
 
 from collections.abc import Callable
@@ -66,7 +66,7 @@ def inherit_state(
 
 
 def ancestors(old: PhantomMesh, new: PhantomMesh) -> Ints:
-    """Corner of the old body from which each corner (N_corners,) of the new one comes.
+    """Find the corner of the old body from which each corner (N_corners,) of the new one comes.
 
     Corners are dof nodes where no cells are aggregated.
 
@@ -97,7 +97,7 @@ def ancestors(old: PhantomMesh, new: PhantomMesh) -> Ints:
 
 
 def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> Ints:
-    """(p,) piece of the old body of which each new piece is a part."""
+    """Find the piece (p,) of the old body of which each new piece is a part."""
     starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
     counts = np.diff(starts)
     piece = starts[new.parent]
@@ -118,7 +118,7 @@ def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> Ints:
 
 @dataclass(frozen=True)
 class Release:
-    """Dead forces of one release.
+    """Tie forces of one release.
 
     Attributes
     ----------
@@ -142,10 +142,10 @@ class Release:
     spread: float = 0.0
 
     def handed_on(self, source: Ints, weights: Floats, time: float) -> "Release | None":
-        """Give the same of a body that is cut further; None if nothing is left of it.
+        """Carry these forces over to a body that is cut further; None if none is left.
 
-        Where a node is parted its force is, in proportion to masses: any parts will do, as what
-        the release of its own needs is found with these in place.
+        The parts of a node share its force in proportion to masses. Any shares would do: the
+        release of the node itself is found with these forces in place.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class TieForces:
     _known: dict[float, list[Floats]] = field(default_factory=dict, repr=False, compare=False)
 
     def _factors(self, time: float) -> list[Floats]:
-        """Give the factors of each release; those of one time, asked for again and again, once."""
+        """Evaluate the factors of each release; repeated calls at one time evaluate them once."""
         if time not in self._known:
             self._known.clear()
             self._known[time] = [one.factor(time) for one in self.releases]
@@ -212,7 +212,7 @@ class TieForces:
         return self.phantom.restrict(total)
 
     def still(self, time: float) -> "TieForces | None":
-        """Give what holds anything at a time or later; None if nothing does."""
+        """Keep the releases whose forces act at a time or later; None if none does."""
         pairs = zip(self.releases, self._factors(time), strict=True)
         releases = tuple(one for one, factor in pairs if factor.any())
         if len(releases) == len(self.releases):
@@ -253,7 +253,7 @@ def tie_forces(
     fading: Callable[[Ints, float], Callable[[float], Floats]],
     parting: Callable[[PhantomMesh, Ints, Ints], Ints],
 ) -> TieForces | None:
-    """Find the forces that hold what has been released from a body that is cut further.
+    """Find the tie forces of nodes that a further cut has released.
 
     Parameters
     ----------
@@ -295,11 +295,11 @@ def tie_forces(
 
 
 def _balance(forces: Floats, nodes: Ints, source: Ints, held: Bools, weights: Floats) -> float:
-    """Spread in proportion to masses what the forces (N, d) on parts of one node sum up to.
+    """Make the forces (N, d) on the parts of each node sum to zero; parts share by their mass.
 
-    That is round-off, but where loads or masses (EVS, GEVS) are shared out anew, as those of hooks
-    are, and where slivers follow others or are penalised. What supports hold has a sum. Gives the
-    largest that is spread, as a share of the largest force.
+    The sum is round-off in general. Exceptions: loads or masses (EVS, GEVS) that are shared out
+    anew, as at hooks; slivers that follow others or are penalised. Supported components are left
+    out. Return the largest that is spread, as a share of the largest force.
     """
     largest, most = float(np.abs(forces[nodes]).max(initial=0.0)), 0.0
     number = np.unique(source[nodes], return_inverse=True)[1]

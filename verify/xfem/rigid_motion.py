@@ -1,8 +1,8 @@
-"""Rigid motion of every free body that its supports ask for.
+"""Rigid motion of every free body, by its supports.
 
-A body that is turned by its supports moves rigidly first, and only what its supports want beyond
-that strains it. The energy does not see the first part, so that a turn of any angle is one step;
-the linear response to the whole of it would stretch the body by its arm times the angle.
+A body that is turned by its supports moves rigidly first. Only the motion of its supports beyond
+that strains it. Rigid motion takes no energy, so a turn of any angle is one step. The linear
+response to the whole turn would stretch the body by its arm times the angle.
 """
 
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ class RigidMotions:
         self._edges = _edges_within(phantom.corner_node[phantom.cells], np.append(whole, False))
 
     def follow(self, displacement: Floats, change: Floats) -> Floats:
-        """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.
+        """Move each body with the `change` (N, d) of its supports; return displacements (N, d).
 
         It is the least-squares motion of the nodes that are held in all components: place x goes
         to c₁ + Q (x − c₀), with c₀, c₁ the centres of those nodes before and after.
@@ -53,10 +53,10 @@ class RigidMotions:
         return moved
 
     def turned_path(self, displacement: Floats) -> Callable[[float], Floats] | None:
-        """Path to a prescribed displacement (N, d) along rotations; None if no body turns.
+        """Make the path to a prescribed displacement (N, d) along rotations; None if no body turns.
 
-        Each body turns by a share of its angle, so that it does not shrink on the way as on the
-        straight one, and what its supports want beyond that grows in proportion:
+        Each body turns by a share of its angle, so that it does not shrink as on a straight path.
+        The motion of its supports beyond that grows in proportion:
 
             x(s) = c₀ + s (c₁ − c₀) + Qˢ (X − c₀ + s e),  e = Qᵀ(X + u − c₁) − (X − c₀),
 
@@ -80,10 +80,10 @@ class RigidMotions:
     def _turns(
         self, displacement: Floats, change: Floats
     ) -> Iterator[tuple[Ints, Floats, Floats, Floats]]:
-        """Nodes of each body that turns, its rotation, and the centre of what holds it, twice.
+        """Yield of each body that turns its nodes, rotation, and two centres of its held nodes.
 
-        The centre is that before, and that after the change. Bodies that turn by little are left
-        to the linear response.
+        The centres are taken before and after the change. Bodies that turn by little are left to
+        the linear response.
         """
         if not change.any():
             return
@@ -98,7 +98,7 @@ class RigidMotions:
                 yield nodes, turn, centre, wanted
 
     def strain(self, displacement: Floats, change: Floats) -> float:
-        """Root mean square by which edges of held nodes change beyond the motion of their body.
+        """Return the root mean square strain of edges between held nodes, rigid motion apart.
 
         Parts that turn against one another by an angle θ make it 2 sin(θ/4) or less.
         """
@@ -117,10 +117,10 @@ class RigidMotions:
 
 
 def nearest_rotation(before: Floats, after: Floats) -> Floats:
-    """Rotation (d, d) that takes centred points (k, d) nearest to others, by least squares.
+    """Find the rotation (d, d) that takes centred points (k, d) nearest to others: least squares.
 
-    It is that nearest to their covariance (W. Kabsch, Acta Cryst. A 32, 1976). What the points
-    leave open (one point, points on a line) is turned as little as possible.
+    It is the rotation nearest to their covariance (W. Kabsch, Acta Cryst. A 32, 1976). Rotations
+    that the points leave open (one point, points on a line) are as small as possible.
     """
     d = before.shape[1]
     covariance = after.T @ before
@@ -128,13 +128,13 @@ def nearest_rotation(before: Floats, after: Floats) -> Floats:
     if scale == 0.0:
         return np.eye(d)
     turn = np.eye(d)
-    for _ in range(2):  # the second time what is determined is not pulled back any more
+    for _ in range(2):  # the second time rotations that are determined are not pulled back
         turn = nearest_rotations(covariance[None] / scale + _UNDETERMINED * turn)[0]
     return turn
 
 
 def part_of_rotation(turn: Floats, share: float) -> Floats:
-    """Rotation (d, d) about the same axis by a share of the angle, which is at most half a turn."""
+    """Rotate about the same axis by a share of the angle, which is at most half a turn: (d, d)."""
     d = len(turn)
     in_space = np.eye(3)
     in_space[:d, :d] = turn
@@ -144,7 +144,7 @@ def part_of_rotation(turn: Floats, share: float) -> Floats:
 
 
 def _edges_within(cells: Ints, chosen: Bools) -> Ints:
-    """Edges (e, 2) of cells both ends of which are chosen."""
+    """Find edges (e, 2) of cells both ends of which are chosen."""
     pairs = list(combinations(range(cells.shape[1]), 2))
     edges = cells[:, pairs].reshape(-1, 2)
     edges = edges[chosen[edges].all(axis=1)]

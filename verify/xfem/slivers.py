@@ -1,18 +1,17 @@
 """Policies for slivers: pieces with a small share in the volume of their cell.
 
 Scaling by nodal blocks, which the iterative solver does anyway, bounds the condition number
-whatever the slivers. What it does not cure is the compliance of a piece that hangs on a tiny share
-of an element (like 1/ε in space under a force on it) and that such a piece inverts in motion. Two
-policies do:
+whatever the slivers. It does not cure the compliance of a piece attached by a tiny share ε of an
+element, in space like 1/ε. Nor does it keep such a piece from inverting in motion. Two policies do:
 
 "drop"
     Its sibling across the cut absorbs it (`verify.xfem.contacts`): the realised cut
     moves to the nearest element faces. The halves stay separate, because no unknowns are joined.
     A sliver that holds together parts of the body that nothing else does is kept.
 "merge"
-    Cell aggregation (`verify.xfem.aggregation`): nodes that only slivers use follow the
-    linear field of a root cell on their own side of the cut, u = C û. Everything stays in its
-    place, every part of the body stays one of its own. A sliver that reaches no root is kept.
+    Cell aggregation (`verify.xfem.aggregation`): nodes that only slivers use follow the linear
+    field of a root cell on their own side of the cut, u = C û. Everything stays in its place, and
+    parts of the body stay apart. A sliver that reaches no root is kept.
 
 Ghost penalties are another remedy, see `verify.xfem.ghost_penalty`; measurements in
 ``docs/theory/slivers.md``.
@@ -40,8 +39,8 @@ SliverPolicy = Literal["keep", "drop", "merge"]
 DEFAULT_POLICY: SliverPolicy = "merge"
 DEFAULT_THRESHOLD = 0.1
 
-# Size across over that of an element, below which a loose part is a fragment. Its volume is below
-# the power d of this, which changes the energy of a body by less than a solution is accurate to.
+# Size across over the size of an element, below which a loose part is a fragment. Its volume is
+# below the power d of this share, which changes the energy by less than the error of a solution.
 _ACROSS = 1e-3
 
 
@@ -66,9 +65,9 @@ class SliverReport:
     largest : float
         Largest volume fraction, in its cell, of a dropped or aggregated sliver.
     volume_share : float
-        Volume of all dropped or aggregated slivers over that of the body.
+        Volume of all dropped or aggregated slivers over the volume of the body.
     extension : (N_old, N) csr_array
-        Unknowns before the policy from those after it; its transpose carries nodal forces.
+        Unknowns before the policy from unknowns after it; its transpose carries nodal forces.
     node : (N_old,) int array
         Unknown after the policy of each one before, −1 if it is gone.
     """
@@ -101,8 +100,8 @@ def treat_slivers(
     threshold : float
         Volume fraction in (0, ½) below which a piece is a sliver.
     supported : (N,) bool array, optional
-        Dof nodes that a support is going to hold. Aggregation leaves them their unknown, so
-        that a prescribed value is what they have; elsewhere a root decides.
+        Dof nodes that a support is going to hold. Aggregation leaves them their unknown, so that
+        they take their prescribed value.
 
     Returns
     -------
@@ -165,13 +164,13 @@ def treat_slivers(
 
 
 def _bridges(phantom: PhantomMesh, small: Bools) -> Bools:
-    """Which small pieces hold parts of the body together; the whole body only if need be."""
+    """Tell which small pieces hold parts of the body together; the whole body only if need be."""
     suspects = _torn(face_contacts(phantom, near=True), small)
     return _torn(face_contacts(phantom), small) if suspects.any() else suspects
 
 
 def _torn(contacts: tuple[Ints, Ints], removed: Bools) -> Bools:
-    """Which of the removed pieces (p,) hold together several remaining parts, across faces.
+    """Tell which of the removed pieces (p,) hold together several remaining parts, across faces.
 
     Removed pieces in contact count as one, and parts that touch in a node or an edge only as
     apart: they could turn about it.
@@ -197,7 +196,7 @@ def _largest_siblings(phantom: PhantomMesh) -> Ints:
 
 
 def _siblings(phantom: PhantomMesh, small: Bools) -> Ints:
-    """(p,) the sibling that absorbs each small piece: among the larger ones, most in contact."""
+    """Choose the sibling (p,) that absorbs each small piece: a larger one, most in contact."""
     largest = np.full(len(phantom.mesh.cells), -1)
     best = _largest_siblings(phantom)
     largest[phantom.parent[best]] = best
@@ -226,7 +225,7 @@ class Fragments:
     ----------
     count : int
     largest : float
-        Volume of the largest over that of its elements.
+        Volume of the largest over the volume of its elements.
     """
 
     count: int

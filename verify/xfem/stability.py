@@ -1,4 +1,4 @@
-"""Equilibria that are unstable, and bodies that are slack: where Newton's method needs more.
+"""Unstable equilibria, and slack membranes.
 
 An equilibrium that is not stable is left along its softest mode. A membrane that is slack has next
 to no stiffness: its tangent gets a tension that falls to nothing.
@@ -19,7 +19,7 @@ _TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
 
 
 def is_stable(newton: Newton, displacement: Floats) -> bool:
-    """Whether the consistent tangent at a displacement (N, d) is positive definite.
+    """Tell whether the consistent tangent at a displacement (N, d) is positive definite.
 
     A factorisation without pivoting exists only then; conjugate gradients, from forces in all
     directions, meet a negative curvature among the first extreme ones that they find.
@@ -51,7 +51,7 @@ def way_out(newton: Newton, place: Place, load: Floats) -> Place | None:
 
 
 def _softest_mode(newton: Newton, displacement: Floats) -> Floats | None:
-    """Mode (N, d) of negative curvature, its largest entry one; None if there is none.
+    """Compute the mode (N, d) of negative curvature, its largest entry one; None if there is none.
 
     By inverse iterations with as much of the rotational tangent as leaves it positive definite.
     """
@@ -80,8 +80,8 @@ def _random_force(newton: Newton) -> Floats:
 class Descent(Newton):
     """Newton's method down the potential energy of a membrane.
 
-    Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
-    steps lower the energy. The consistent tangent follows where it is positive definite.
+    Tangents, not forces, have a least tension; it falls as long as full steps lower the energy. The
+    consistent tangent follows where it is positive definite.
     """
 
     def __init__(self, force: InternalForce, fixed: Bools) -> None:

@@ -2,7 +2,7 @@
 
 The matrix of Newton's method is K_ρ = K_R + ρ (K_C − K_R), of the rotation-fixed and the consistent
 tangent; ρ, the `rotational` of arguments here, falls along `SHARES` until K_ρ is positive definite.
-A correction is then taken by a share, that of the line search.
+A line search then chooses the share of the correction.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ Method = Literal["auto", "direct", "iterative"]
 ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 _PHASES = ("analysis", "assembly", "factorisation", "solve")
-_MOST = 10_000  # iterations that are insisted on
+_MOST = 10_000  # iterations, where no factorisation may follow
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class StaticSolution:
     penalty_energy : float
         Energy of a ghost penalty, not part of the strain energy.
     solver : {"direct", "iterative"}
-        What has solved it.
+        Which solver has found it.
     """
 
     displacement: Floats
@@ -91,8 +91,9 @@ def solve_static(
         Nodal forces in newtons.
     solver : {"auto", "direct", "iterative"}
         Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
-        ``auto`` takes the faster one: for solids of 2000 nodes and more, without a ghost penalty,
-        what the kernels take for a step, or the factorisation after all if that does not converge.
+        ``auto`` takes the faster one. For solids of 2000 nodes and more, without a ghost penalty,
+        that is the solver of the kernels for steps. If it does not converge, a factorisation
+        follows.
     ghost : Penalty, optional
         A `verify.xfem.ghost_penalty`, added to the stiffness.
     kernels : Kernels
@@ -142,7 +143,7 @@ def solve_static(
     internal, energy = stiffness.evaluate(displacement)
     penalty = stiffness.penalty_energy(displacement)
     unbalanced = internal - force
-    # in a rigid motion all forces are round-off of the products that they are sums of
+    # in a rigid motion all forces are round-off of the products of which they are sums
     products = stiffest * np.abs(displacement).max()
     scale = max(np.abs(internal).max(), np.abs(force).max(), products, np.finfo(float).tiny)
     return StaticSolution(
@@ -173,7 +174,7 @@ class StaticSolver:
     Attributes
     ----------
     used : set of {"direct", "iterative"}
-        What has solved systems so far.
+        Which solvers have solved systems so far.
     """
 
     def __init__(
@@ -269,7 +270,7 @@ class Newton:
 
     @property
     def solvers(self) -> frozenset[str]:
-        """What has solved the linear systems, of "direct" and "iterative"."""
+        """Solvers of the linear systems so far: "direct", "iterative" or both."""
         return frozenset(self._solver.used)
 
     @property
@@ -278,7 +279,7 @@ class Newton:
         return float(np.abs(self._blocks).max(initial=0.0))
 
     def solve(self, displacement: Floats, change: Floats, load: Floats) -> tuple[Floats, int]:
-        """Equilibrium after a change of the fixed components, and the solves that it took.
+        """Find the equilibrium after a change of the fixed components, and count the solves.
 
         The first correction, for the load and the change, is taken whole. Of the others, a whole
         one by K_C counts if the residual falls; else the energy must fall.
@@ -381,7 +382,7 @@ class Newton:
         return 0.0
 
     def _is_small(self, place: Place) -> bool:
-        """Whether a residual is within the tolerance, or what round-off of positions leaves."""
+        """Tell whether a residual is within tolerance, or what round-off of positions leaves."""
         reach = np.abs(self.force.phantom.node_points + place.displacement).max()
         round_off = ROUND_OFF * self.largest_stiffness * reach
         return place.norm <= max(_TOLERANCE * place.scale, round_off)
@@ -391,7 +392,8 @@ class Newton:
     ) -> Floats:
         """Correct for the residual r, and for a change c of the fixed components.
 
-        The free components of K_ρ (δ + c) are r; those of c and the fixed ones of δ are zero.
+        The free components of K_ρ (δ + c) are r. The free components of c and the fixed ones of δ
+        are zero.
         """
         matrix = self.linearise(place.displacement, rotational, least)
         load = place.residual.copy()  # the product comes before `inverse`, which spoils the matrix
@@ -436,18 +438,17 @@ class Newton:
 
 
 def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float = 1e-3) -> Ints:
-    """Pieces (k,) whose rotation, and with it the force, is not unique, or nearly so.
+    """Find pieces (k,) whose rotation, and with it the force, is not unique, or nearly so.
 
-    That is where the two principal stretches of a plane cell cancel (of an inverted cell the
-    smallest is negative), where the two smallest do in space, and where a membrane has shrunk
-    to a line.
+    In a plane cell the two principal stretches cancel (of an inverted cell the smallest is
+    negative). In space the two smallest cancel. A membrane has shrunk to a line.
 
     Parameters
     ----------
     force : InternalForce
     displacement : (N, d) float array
     ratio : float
-        Of what is left to the largest stretch, below which a cell counts.
+        A cell counts if the sum of the two is less than this share of the largest stretch.
     """
     F = force.deformation(displacement)
     stretches = np.linalg.svd(F, compute_uv=False)

@@ -1,4 +1,4 @@
-"""The cut body as a conforming mesh: what others can read without knowing of enrichment.
+"""The cut body as a conforming mesh, for programs that know no enrichment.
 
 Whole cells, and the sub-simplices of split ones; nodes are doubled where the displacement jumps,
 and only there. Cells beside the end of a cut are bisected at the points where the cut meets their
@@ -64,8 +64,8 @@ def subdivide(phantom: PhantomMesh) -> Subdivision:
     simplices = _conforming(phantom)
     piece, ids, barycentric = simplices.piece, simplices.points, simplices.barycentric
 
-    # u(z) = Σ_i λ_i(z) u_i: a mesh node moves with one unknown, a point of the cut with those of
-    # its edge
+    # u(z) = Σ_i λ_i(z) u_i: a mesh node moves with one unknown, a point of the cut with the
+    # unknowns of its edge
     unknowns = phantom.cells[piece]
     row, corner = np.nonzero(ids >= len(mesh.points))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
@@ -104,10 +104,10 @@ def subdivide(phantom: PhantomMesh) -> Subdivision:
 
 
 def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
-    """(N, k) sparse map of a displacement at the points back to the dof nodes.
+    """Make the sparse map (N, k) of a displacement at the points back to the dof nodes.
 
-    It is exact for what `body.interpolation` has put on the points. A dof node that is no point,
-    because it lies beyond the cut, follows from the largest cell of one of its pieces.
+    It is exact for fields that `body.interpolation` has put on the points. A dof node that is no
+    point, because it lies beyond the cut, follows from the largest cell of one of its pieces.
     """
     interpolation = csr_array(body.interpolation)
     alone = np.flatnonzero(np.diff(interpolation.indptr) == 1)
@@ -130,7 +130,7 @@ def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
     cell, local = np.nonzero(unknown[dofs])
     order = np.argsort(np.abs(np.linalg.det(shares))[cell], kind="stable")
     largest = np.full(phantom.node_count, -1)
-    largest[dofs[cell, local][order]] = order  # of several the last: that of the largest cell
+    largest[dofs[cell, local][order]] = order  # of several the last: the largest cell
     chosen = largest[largest >= 0]
     cell, local = cell[chosen], local[chosen]
     back = np.linalg.inv(shares[cell])[np.arange(len(cell)), local]
@@ -141,7 +141,7 @@ def extrapolation(phantom: PhantomMesh, body: Subdivision) -> csr_array:
 
 
 def _conforming(phantom: PhantomMesh) -> Simplices:
-    """Solid simplices, bisected where a neighbour has a point that they do not have."""
+    """Bisect solid simplices where a neighbour has a point that they do not have."""
     sub, mesh = phantom.sub_cells, phantom.mesh
     whole = np.flatnonzero(~phantom.split)
     sign = np.ones(len(sub.piece), dtype=np.int8)  # not read: `_oriented` has positions
@@ -153,7 +153,7 @@ def _conforming(phantom: PhantomMesh) -> Simplices:
 
 
 def _oriented(points: Floats, cells: Ints) -> Ints:
-    """Positive orientation, where points and simplices have the same dimension."""
+    """Orient cells positively, where points and simplices have the same dimension."""
     if points.shape[1] != cells.shape[1] - 1:
         return cells
     corners = points[cells]
@@ -164,7 +164,7 @@ def _oriented(points: Floats, cells: Ints) -> Ints:
 
 
 def torn_facets(cells: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Facets where two simplices meet in space but do not share their nodes.
+    """Find facets where two simplices meet in space but do not share their nodes.
 
     Parameters
     ----------
@@ -176,7 +176,8 @@ def torn_facets(cells: Ints, places: Ints) -> tuple[Ints, Ints]:
     Returns
     -------
     nodes : (f, 2, d) int array
-        Of each facet as its two simplices have them, those at the same place in the same column.
+        Of each facet as its two simplices have them; nodes at the same place are in the same
+        column.
     beside : (f, 2) int array
         The two simplices.
     """

@@ -2,9 +2,9 @@
 
 `verify.xfem.clip` divides cells at them.
 
-An edge is a pair of numbered points: mesh nodes, or zero points of cuts applied before. Asking
-twice for the same edge and cut gives the same number, so that neighbouring elements agree on the
-position, and on the sign of every other cut there, to the last bit.
+An edge is a pair of numbered points: mesh nodes, or zero points of cuts applied before. The same
+edge and cut always give the same number. So neighbouring elements agree to the last bit on the
+position, and on the sign of every other cut there.
 
 Asking may append: `find` and `on_edges` number what they have not met before, and change nothing
 else. Points that no sub-simplex uses do no harm.
@@ -58,12 +58,12 @@ class ZeroPoints:
         self._edge, self._of, self._point = np.array([[_NEVER], [0], [0]])
 
     def shares(self, cut: Ints, plus: Ints, minus: Ints) -> tuple[Floats, Floats]:
-        """(r, s), (q,) each, of the zero points z = s·plus + r·minus on edges (plus, minus)."""
+        """Compute (r, s), (q,) each, of the zero points z = s·plus + r·minus on edges."""
         above, below = self.values[plus, cut], self.values[minus, cut]
         return above / (above - below), -below / (above - below)
 
     def find(self, cut: Ints, plus: Ints, minus: Ints) -> Ints:
-        """Numbers (q,) of the zero points of cuts (q,) on edges from φ ≥ 0 to φ < 0, (q,) each.
+        """Find numbers (q,) of zero points of cuts (q,) on edges from φ ≥ 0 to φ < 0, (q,) each.
 
         Where φ is exactly zero at the plus end, the zero point is that end. New points are
         numbered in the order of their ends, whatever the order in which they are asked for.
@@ -84,14 +84,14 @@ class ZeroPoints:
         return self._point[self._places(edge, cut)[0]]
 
     def _places(self, edge: Ints, cut: Ints) -> tuple[Ints, Bools]:
-        """Places (q,) of pairs of edge and cut among those known, and whether they are there."""
+        """Find places (q,) of pairs of edge and cut among known ones, and whether they exist."""
         at = np.searchsorted(self._edge, edge)
         while (before := (self._edge[at] == edge) & (self._of[at] < cut)).any():
             at += before
         return at, (self._edge[at] == edge) & (self._of[at] == cut)
 
     def on_edges(self, cut: Ints, points: Ints) -> Ints:
-        """Numbers (q, c, c) of the points of cuts (q,) on edges of simplices with points (q, c).
+        """Find numbers (q, c, c) of points of cuts (q,) on edges of simplices with points (q, c).
 
         Entry ab is the point between corner a, where φ ≥ 0, and b, where φ < 0; if a = b it is
         the corner itself, elsewhere 0, which is not read.
@@ -120,7 +120,7 @@ class ZeroPoints:
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], self.turn[numbers]])]
 
     def _append(self, cut: Ints, plus: Ints, minus: Ints) -> Ints:
-        """Points on edges that had none."""
+        """Assign numbers to points on edges that had none."""
         r, s = self.shares(cut, plus, minus)
         new = r > 0.0
         point = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus)
