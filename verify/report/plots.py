@@ -430,3 +430,113 @@ def profile_panel(
 
 def _gaps(curve: Sequence[float]) -> list[float]:
     return [v if abs(v) < _DRAWABLE else math.nan for v in curve]
+
+
+@dataclass(frozen=True)
+class Ranged:
+    """A number with its range, None where it has none."""
+
+    name: str
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+def ranges(
+    title: str, x_title: str, rows: Sequence[Ranged], palette: Palette, line: float,
+    within: tuple[float, float] = (0.0, math.inf),
+) -> Drawing | None:  # fmt: skip
+    """Return numbers with their ranges on a logarithmic axis, the first on top; `line` is marked.
+
+    Ranges that reach out of `within` are cut off there. None if there is nothing positive.
+    """
+    drawn = [row for row in rows if _can_be_drawn((row.value, row.value))]
+    if not drawn:
+        return None
+    with panel(title, 5.6, 0.95 + 0.24 * len(drawn)) as (figure, axes):
+        width, height = figure.get_size_inches()
+        axes.set_position((1.9 / width, 0.48 / height, 2.9 / width, (height - 0.8) / height))
+        axes.set_title(printable(title), loc="left", x=-1.8 / 2.9, fontsize=9, pad=9)
+        ends = [v for row in drawn for v in (row.low, row.value, row.high) if v is not None]
+        shown = [min(max(v, within[0]), within[1]) for v in (*ends, line)]
+        log_axis(axes, "x", log_range([v for v in shown if _can_be_drawn((v, v))]))
+        axes.set_xlabel(x_title)
+        axes.grid(True, axis="x", color=_GRID, linewidth=0.7)
+        axes.axvline(line, color="#333", linewidth=0.9)
+        for place, row in enumerate(drawn):
+            style = palette[row.name]
+            if row.low is not None and row.high is not None:
+                low, high = max(row.low, within[0], 1e-99), min(row.high, within[1])
+                axes.plot([low, high], [place, place], color=style.colour,
+                          linewidth=2.2, solid_capstyle="butt")  # fmt: skip
+            axes.plot([row.value], [place], color=style.colour, marker="o", markersize=5)
+            axes.annotate(_tick_text(row.value), (1.0, place), (4, 0), fontsize=8, va="center",
+                          xycoords=("axes fraction", "data"), textcoords="offset points",
+                          annotation_clip=False)  # fmt: skip
+        axes.set_yticks(range(len(drawn)), [row.name for row in drawn], fontsize=8)
+        axes.set_ylim(len(drawn) - 0.5, -0.5)
+        axes.tick_params(axis="y", length=0)
+        said = "; ".join(_range_text(row) for row in drawn)
+        return drawing(figure, f"{title}, {x_title}: {said}.")
+
+
+def _tick_text(value: float) -> str:
+    return _tick(float(f"{value:.3g}"), not 0.009 < value < 9999)
+
+
+def _range_text(row: Ranged) -> str:
+    beyond = "" if row.low is None else f" ({row.low:.3g} to {row.high:.3g})"
+    return f"{row.name} {row.value:.3g}{beyond}"
+
+
+def end_named(
+    title: str, x_title: str, series: Sequence[Series], palette: Palette,
+    others: Sequence[Series] = (), descending: bool = False,
+) -> Drawing | None:  # fmt: skip
+    """Return curves on logarithmic axes, each named at its end; `others` are grey, without names.
+
+    The x axis falls if `descending`. None if there is nothing positive.
+    """
+    kept = [(s, [p for p in s.places if _can_be_drawn(p)]) for s in series]
+    kept = [(s, places) for s, places in kept if places]
+    grey = [own for s in others if (own := [p for p in s.places if _can_be_drawn(p)])]
+    if not kept:
+        return None
+    with panel(title, 5.6, 3.2) as (figure, axes):
+        _logarithmic(axes, x_title, [p for own in (*(k for _, k in kept), *grey) for p in own])
+        if descending:
+            axes.invert_xaxis()
+        for own in grey:
+            axes.plot(*zip(*own, strict=True), color="#c2c2c2", linewidth=0.8, marker=".",
+                      markersize=3)  # fmt: skip
+        for s, places in kept:
+            axes.plot(*zip(*places, strict=True), **{**palette[s.name].marked, "markersize": 4})
+        _name_ends(axes, [(s.name, places[-1], palette[s.name].colour) for s, places in kept])
+        said = "; ".join(
+            f"{s.name}: " + ", ".join(f"{y:.3g} at {x:.3g}" for x, y in places)
+            for s, places in kept
+        )
+        return drawing(figure, f"{title} against {x_title}. {said}.")
+
+
+def _name_ends(axes: Axes, ends: Sequence[tuple[str, tuple[float, float], str]]) -> None:
+    """Write names right of the axes at the height of their ends, apart from each other."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    step = 11.0 / 72 / (axes.get_position().height * figure.get_figheight())  # of 8 points
+    places = [axes.transAxes.inverted().transform(axes.transData.transform(e))[1]
+              for _, e, _ in ends]  # fmt: skip
+    order = sorted(range(len(ends)), key=lambda i: places[i])
+    heights = [max(0.0, places[order[0]])]
+    for i in order[1:]:
+        heights.append(max(places[i], heights[-1] + step))
+    above = max(0.0, heights[-1] - 1.0)
+    for k in range(len(heights) - 1, -1, -1):  # push down what stands above the axes
+        most = 1.0 if k == len(heights) - 1 else heights[k + 1] - step
+        heights[k] = min(heights[k], most) if above else heights[k]
+    for i, height in zip(order, heights, strict=True):
+        name, end, colour = ends[i]
+        axes.annotate(printable(name), end, (1.04, height), xycoords="data", fontsize=8,
+                      textcoords="axes fraction", va="center", color=colour, annotation_clip=False,
+                      arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4,
+                                  "shrinkA": 0, "shrinkB": 3})  # fmt: skip

@@ -1,0 +1,288 @@
+"""Sentences of the front page: templates with thresholds, held against the numbers of the runs.
+
+`QUESTIONS` lists the sentences, `answer` evaluates them. A threshold stands beside its reason and
+was chosen before its number was seen.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from verify.errors import InputError
+from verify.report.evidence import MEASURE, Evidence, beside
+from verify.report.notation import number
+from verify.result import REFERENCE, finest_of
+
+# The cases C3 and C8 grant it to a method that cuts through elements.
+QUARTER = 1.25
+# Solves that share a core with others may take up to twice as long: no smaller factor is claimed.
+TWICE = 2.0
+# As in `verify study slivers`: a tenth is what a smaller safety factor would cost anyway.
+KEPT = 0.9
+# A step ten times smaller is lost: no explicit scheme is chosen then.
+LOST = 0.1
+# The limit of C7: the square of the angle turned in a step, a few times over.
+STILL = 5e-6
+FRAME = 1 / 60  # s: the slowest screen in use; each step of a simulator has to fit
+
+
+@dataclass(frozen=True)
+class Found:
+    """A sentence with its numbers: `needs` is the threshold in words, `holds` what came of it."""
+
+    text: str
+    numbers: str
+    needs: str
+    holds: bool
+    source: str = "arena"
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """A template: `of` returns None where the runs have no numbers for it."""
+
+    name: str
+    lacks: str
+    of: Callable[[Evidence], Found | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A question with its sentences by name, and what the runs do not show."""
+
+    question: str
+    found: dict[str, Found]
+    lacking: list[str]
+
+
+def answer(evidence: Evidence) -> list[Answer]:
+    """Fill in all sentences.
+
+    Raises
+    ------
+    InputError
+        If the numbers do not support one; with its name, its numbers, and what to do.
+    """
+    answers, wrong = [], []
+    for question, sentences in QUESTIONS.items():
+        found = {one.name: one.of(evidence) for one in sentences}
+        told = {name: one for name, one in found.items() if one is not None}
+        wrong += [
+            f"  {name}: {one.text}\n    numbers: {one.numbers}\n    needed: {one.needs}"
+            for name, one in told.items()
+            if not one.holds
+        ]
+        lacking = [one.lacks for one in sentences if found[one.name] is None]
+        answers.append(Answer(question, told, lacking))
+    if wrong:
+        raise InputError(
+            "the numbers of this run do not support:\n" + "\n".join(wrong) + "\nRewrite these "
+            "sentences so that they say what the numbers show, or remove them from QUESTIONS. Do "
+            "not move a threshold without a row in docs/theory/history.md",
+            "verify/report/conclusions.py",
+        )
+    return answers
+
+
+def _close(
+    kind: str, template: str, solver: str = "xfem", least: float = 0.0, most: float = QUARTER
+) -> Callable[[Evidence], Found | None]:
+    """Claim that the error of a solver over the measure's lies between two numbers."""
+
+    def of(evidence: Evidence) -> Found | None:
+        own = beside(evidence, kind, "displacement_l2", solver)
+        if own is None:
+            return None
+        text = template.format(number(own.ratio, 2))
+        bounds = [f"at least {least:g}"] * (least > 0.0) + [f"at most {most:g}"] * (most < np.inf)
+        return Found(text, own.written, f"medians {', '.join(bounds)}", own.within(least, most))
+
+    return of
+
+
+def _tip_functions(evidence: Evidence) -> Found | None:
+    own = beside(evidence, "tip", "energy_norm", "getfem tip=functions")
+    if own is None or own.scatter is None:
+        return None
+    text = (
+        "Tip functions, where a program has them: GetFEM's cut the energy-norm error to "
+        f"{number(own.ratio, 2)} of a conforming mesh's."
+    )
+    return Found(text, own.written, f"at most {1 / QUARTER:g}; scatter wholly below 1",
+                 own.ratio <= 1 / QUARTER and own.scatter[2] < 1.0)  # fmt: skip
+
+
+def _real_time(evidence: Evidence) -> Found | None:
+    hand = evidence.hand
+    if not hand:
+        return None
+    slowest, cells = float(hand["slowest"]), int(hand["tetrahedra"])
+    text = (
+        f"In real time, XFEM's engine cuts a hand of {number(cells)} tetrahedra at 60 frames a "
+        f"second: its slowest step took {number(1e3 * slowest, 2)} ms."
+    )
+    numbers = f"{hand['steps']} steps, {hand['cuts']} elements cut, slowest {slowest:.4f} s"
+    return Found(text, numbers, "every step within 1/60 s", slowest <= FRAME, "thesis")
+
+
+def _sofa(evidence: Evidence) -> Found | None:
+    rows = [r for r in evidence.speed if r["what"] == "step in real time, uncut"]
+    if not rows:
+        return None
+    ratios = [float(row["ratio"]) for row in rows]
+    text = (
+        f"On uncut bodies a step takes {number(min(ratios), 2)} to {number(max(ratios), 2)} times "
+        "as long as SOFA's."
+    )
+    numbers = ", ".join(f"{row['ratio']} at {row['size']}" for row in rows)
+    return Found(text, numbers, "at most 1", max(ratios) <= 1.0, "speed")
+
+
+def steps_kept(evidence: Evidence, solver: str) -> list[tuple[float, float]]:
+    """Return ε and the critical step over the uncut body's, the worst family, largest ε first."""
+    steps: dict[tuple[str, str], dict[str, float]] = {}
+    for row in evidence.slivers:
+        if row["solver"] == solver and row["value"] and float(row["size"]) > 0.0:
+            steps.setdefault((row["family"], row["size"]), {})[row["quantity"]] = float(
+                row["value"]
+            )
+    least: dict[float, float] = {}
+    for (_, size), own in steps.items():
+        cut, whole = own.get("critical explicit step"), own.get("critical explicit step, uncut")
+        if cut and whole:
+            least[float(size)] = min(cut / whole, least.get(float(size), np.inf))
+    return sorted(least.items(), reverse=True)
+
+
+def _steps(evidence: Evidence, solvers: Sequence[str]) -> Iterator[tuple[str, float, float]]:
+    for name in solvers:
+        if own := steps_kept(evidence, name):
+            yield (name, *min(own, key=lambda place: place[1]))
+
+
+def _step_kept(evidence: Evidence) -> Found | None:
+    found = list(_steps(evidence, ["xfem"]))
+    if not found:
+        return None
+    _, size, least = found[0]
+    text = (
+        f"XFEM with a mass lumped on each side of the cut: it keeps {number(least, 3)} of the "
+        "uncut body's step, however close the cut passes to nodes."
+    )
+    return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
+
+
+def _step_lost(evidence: Evidence) -> Found | None:
+    found = list(_steps(evidence, ["xfem mass=consistent", MEASURE]))
+    if len(found) < 2:
+        return None
+    (_, _, mass), (_, _, split) = found
+    text = (
+        f"A consistent mass leaves {number(mass, 2)} of it, a conforming mesh whose cut cells are "
+        f"split {number(split, 2)}."
+    )
+    numbers = ", ".join(f"{name}: {least:.2e} at ε = {size:g}" for name, size, least in found)
+    return Found(text, numbers, f"both at most {LOST:g}", max(mass, split) <= LOST, "slivers")
+
+
+def drifts(evidence: Evidence) -> dict[str, float]:
+    """Return the relative energy drift over the long run, of each solver its finest level."""
+    result = evidence.long_run
+    own = [s for s in (result.solves if result else []) if s.solver != REFERENCE]
+    found = finest_of(s for s in own if s.metric("energy_drift"))
+    return {
+        name: metric.value
+        for name, solve in found.items()
+        if (metric := solve.metric("energy_drift")) is not None
+    }
+
+
+def _still(evidence: Evidence) -> Found | None:
+    result, found = evidence.long_run, drifts(evidence)
+    if result is None or "xfem" not in found:
+        return None
+    analysis = result.scene["analysis"]
+    count = round(analysis["duration"] / analysis["time_step"])
+    held = sum(drift <= STILL for drift in found.values())
+    text = (
+        f"Over the {number(count)} steps of C7 the energy of XFEM drifts by "
+        f"{number(found['xfem'], 2)}, relative; {held} of the {len(found)} solvers that answered "
+        f"stay below {number(STILL)}."
+    )
+    numbers = ", ".join(f"{name} {number(drift, 2)}" for name, drift in found.items())
+    return Found(
+        text,
+        numbers,
+        f"XFEM at most {number(STILL)}",
+        found["xfem"] <= STILL,
+        "long" if "long" in evidence.commands else "arena",
+    )
+
+
+def _remeshing_cost(evidence: Evidence) -> Found | None:
+    own = beside(evidence, "rest", "time", "conforming mesh=remeshed", "xfem")
+    if own is None:
+        return None
+    text = (
+        f"At equal error remeshing takes {number(own.ratio, 2)} times XFEM's time, meshing "
+        "included."
+    )
+    return Found(text, own.written, f"at least {TWICE:g}", own.ratio >= TWICE)
+
+
+def _cost(evidence: Evidence) -> Found | None:
+    found = {name: beside(evidence, "rest", "time", "xfem", name) for name in _CUTTERS}
+    told = {name: one for name, one in found.items() if one is not None}
+    if not told:
+        return None
+    written = " and ".join(f"{number(o.ratio, 2)} of {t}'s" for t, o in told.items())
+    text = f"At equal error XFEM takes {written} time"
+    fitted = beside(evidence, "rest", "time", "xfem")
+    if fitted is not None:
+        text += f", and {number(fitted.ratio, 2)} times a conforming mesh's, its making included"
+    numbers = "; ".join(f"{name}: {one.written}" for name, one in told.items())
+    return Found(f"{text}.", numbers, f"at most {1 / TWICE:g} of each",
+                 all(one.ratio <= 1 / TWICE for one in told.values()))  # fmt: skip
+
+
+_CUTTERS = ("ngsxfem", "getfem")  # programs that cut through elements, as XFEM does
+
+_RUN_BOTH = "XFEM beside a conforming mesh on such scenes"
+QUESTIONS: dict[str, tuple[Sentence, ...]] = {
+    "Accuracy at rest": (
+        Sentence("through", _RUN_BOTH, _close(
+            "through", "XFEM or a conforming mesh: where cuts go through, XFEM's displacement "
+            "error is {} times a conforming mesh's.", least=1 / QUARTER)),
+    ),
+    "Accuracy at a tip": (
+        Sentence("tip", _RUN_BOTH, _close(
+            "tip", "No mesh has to know the tip: where cuts end inside elements, XFEM's error is "
+            "{} times a conforming mesh's, whose node is the tip.")),
+        Sentence("tip functions", "tip functions, on several positions of the mesh",
+                 _tip_functions),
+    ),
+    "A moving body, a blade, real time": (
+        Sentence("motion", _RUN_BOTH, _close(
+            "motion", "XFEM: in motion its error is {} times a conforming mesh's, and no mesh is "
+            "made anew.")),
+        Sentence("real time", "a blade in real time (`verify study thesis`)", _real_time),
+        Sentence("sofa", "real time beside SOFA (`make bench`)", _sofa),
+    ),
+    "Explicit steps with slivers": (
+        Sentence("step kept", "XFEM's critical step (`verify study slivers`)", _step_kept),
+        Sentence("step lost", "critical steps of other masses and meshes", _step_lost),
+    ),
+    "Long runs without drift": (
+        Sentence("drift", "10 000 steps (C7)", _still),
+    ),
+    "Why (not) remesh?": (
+        Sentence("remeshed", "remeshing beside splitting cells", _close(
+            "rest", "Not for accuracy: a new mesh for each cut has {} times the error of one whose "
+            "cut cells are split.", "conforming mesh=remeshed", 1 / QUARTER, np.inf)),
+        Sentence("remeshing time", "times of remeshing", _remeshing_cost),
+    ),
+    "What it costs": (
+        Sentence("cost", "times of ngsxfem and GetFEM", _cost),
+    ),
+}  # fmt: skip

@@ -1,0 +1,256 @@
+"""What runs and studies have left for the sentences of the front page, and ratios taken from it."""
+
+import csv
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from verify.files import read_json
+from verify.report.notation import number
+from verify.report.run_directory import load_run
+from verify.result import CaseResult, Pair, ranked_solvers
+from verify.scene import list_cases, load_scenes
+
+MEASURE = "conforming"  # what all solvers are held against
+LONG_RUN = "benchmark/c7_spinning"
+FURTHER = ("benchmark", "long")  # runs of scenes that take hours, apart from the others
+
+_SCENE = re.compile(r"benchmark/c(\d)_")
+Row = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What runs and studies have left.
+
+    Parameters
+    ----------
+    results : list of CaseResult
+        Of all runs.
+    pairs : dict of str to list of Pair
+        By the names of `subsets`.
+    groups : list of list of str
+        Programs that are one discretisation.
+    coverage : dict of str to dict
+        As in `verify.result.Ranking`.
+    positions, slivers, speed : list of dict
+        Rows of their tables; empty if there are none.
+    hand : dict
+        Steps of the real-time engine in the thesis study; empty if there are none.
+    commands : dict of str to str
+        By run or study; what is not there has none.
+    tips : frozenset of str
+        Scenes of the positions study in which a cut ends inside the body.
+    """
+
+    results: list[CaseResult]
+    pairs: Mapping[str, Sequence[Pair]] = field(default_factory=dict)
+    groups: Sequence[Sequence[str]] = ()
+    coverage: Mapping[str, Mapping[str, Sequence[int]]] = field(default_factory=dict)
+    positions: list[Row] = field(default_factory=list)
+    slivers: list[Row] = field(default_factory=list)
+    speed: list[Row] = field(default_factory=list)
+    hand: dict[str, Any] = field(default_factory=dict)
+    commands: dict[str, str] = field(default_factory=dict)
+    tips: frozenset[str] = frozenset()
+
+    @cached_property
+    def solvers(self) -> list[str]:
+        """Solvers of the runs."""
+        return ranked_solvers(self.results)
+
+    @property
+    def long_run(self) -> CaseResult | None:
+        """The result of `LONG_RUN`, if there is one."""
+        return next((r for r in self.results if r.case == LONG_RUN), None)
+
+
+def load_evidence(runs: Path, published: Path) -> Evidence:
+    """Read what `runs` holds; studies that are not there, from their tables below `published`.
+
+    Nothing is compared: pairs, groups and coverage are left to who judges. Scenes that the run
+    ``arena`` is without may be in the runs of `FURTHER`.
+
+    Raises
+    ------
+    InputError
+        If there is no run in ``arena``.
+    """
+    results: dict[str, CaseResult] = {}
+    commands, thesis = {"speed": "make bench"}, {}
+    for name in ("arena", *FURTHER):
+        if name == "arena" or (runs / name).is_dir():
+            run = load_run(runs / name)
+            new = [r for r in run.results if r.case not in results]
+            results |= {result.case: result for result in new}
+            if new:
+                commands[name] = str(run.record.get("command") or "unknown")
+    for name in ("positions", "slivers", "thesis"):
+        if (record := runs / name / f"{name}.json").is_file():
+            found = read_json(record)
+            commands[name] = str(found.get("command") or "unknown")
+            thesis = found if name == "thesis" else thesis
+
+    def table(name: str, file: str) -> list[Row]:
+        for folder in (runs / name, published / name):
+            if (folder / file).is_file():
+                commands.setdefault(name, f"see {name}/index.md")
+                return _rows(folder / file)
+        return []
+
+    positions = table("positions", "positions.csv")
+    return Evidence(
+        results=list(results.values()), positions=positions,
+        slivers=table("slivers", "slivers.csv"), speed=_rows(published / "speed.csv"),
+        hand=dict(thesis.get("hand") or {}),
+        commands=commands, tips=_with_tips({row["scene"] for row in positions}),
+    )  # fmt: skip
+
+
+def _rows(path: Path) -> list[Row]:
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def ends_inside(scene: dict[str, Any]) -> bool:
+    """Whether a cut of a scene ends inside the body."""
+    return any(cut.get("expected") in ("edge", "inner") for cut in scene.get("cuts") or [])
+
+
+def moves(result: CaseResult) -> bool:
+    """Whether the scene of a result is in motion."""
+    return (result.scene.get("analysis") or {}).get("kind") == "dynamic"
+
+
+def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Return the results that are compared together: by kind of scene, and the benchmark's scenes.
+
+    The kinds are ``"rest"`` and ``"motion"``, and at rest ``"through"`` and ``"tip"``, by where
+    cuts end. The scenes are ``"C1"`` to ``"C8"``, with those in motion apart where both are.
+    """
+    kinds = {
+        kind: [r for r in results if _is(kind, moves(r), ends_inside(r.scene))]
+        for kind in ("through", "tip", "rest", "motion")
+    }
+    return kinds | benchmark_scenes(results)
+
+
+def benchmark_scenes(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Return the members of C1 to C8 by label; those of a scene at rest and in motion apart."""
+    scenes: dict[tuple[str, bool], list[CaseResult]] = {}
+    for result in results:
+        if found := _SCENE.match(result.case):
+            scenes.setdefault((f"C{found[1]}", moves(result)), []).append(result)
+    return {
+        f"{label} motion" if moving and (label, False) in scenes else label: own
+        for (label, moving), own in sorted(scenes.items())
+    }
+
+
+def _with_tips(names: set[str]) -> frozenset[str]:
+    cases, found = list_cases(), set()
+    for name in names:
+        path = cases.get(name.partition("[")[0])
+        if path and ends_inside(load_scenes(path)[0].model_dump(mode="json", by_alias=True)):
+            found.add(name)
+    return frozenset(found)
+
+
+@dataclass(frozen=True)
+class Beside:
+    """One discretisation beside another.
+
+    Parameters
+    ----------
+    ratio, low, high : float
+        Median over the common scenes of the run, and the range over them.
+    count : int
+        Scenes.
+    scatter : tuple of float or None
+        Median and 90 % range over positions of the mesh; None where they were not studied.
+    meshes : int
+        Ratios behind it.
+    """
+
+    ratio: float
+    low: float
+    high: float
+    count: int
+    scatter: tuple[float, float, float] | None = None
+    meshes: int = 0
+
+    def within(self, least: float, most: float) -> bool:
+        """Whether the medians over scenes and over mesh positions lie between two numbers."""
+        return all(least <= middle <= most for middle in (self.ratio, *(self.scatter or ())[:1]))
+
+    @property
+    def written(self) -> str:
+        """Numbers with their ranges."""
+        text = (
+            f"{number(self.ratio, 3)} [{number(self.low, 3)}, {number(self.high, 3)}] over "
+            f"{self.count} scene{'s' if self.count != 1 else ''}"
+        )
+        if self.scatter is None:
+            return f"{text}; mesh scatter not studied"
+        middle, low, high = (number(v, 3) for v in self.scatter)
+        return f"{text}; {middle} [{low}, {high}] over {self.meshes} positions of meshes"
+
+
+def beside(
+    evidence: Evidence, kind: str, metric: str, solver: str, rival: str = MEASURE
+) -> Beside | None:
+    """Hold a solver against another; None where they have no scene in common.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    kind : {"through", "tip", "rest", "motion"}
+        Of the scenes: at rest by where their cuts end, all at rest, in motion.
+    metric : str
+        As in `verify.judge.pairs`.
+    solver, rival : str
+    """
+    pair = pair_in(evidence.pairs.get(kind, ()), metric, solver, rival)
+    if pair is None or pair.ratio is None or pair.low is None or pair.high is None:
+        return None
+    ratios = mesh_ratios(evidence, metric, solver, rival,
+                         lambda scene: _is(kind, False, scene in evidence.tips))  # fmt: skip
+    scatter = None
+    if len(ratios):
+        middle, low, high = (float(v) for v in np.quantile(ratios, [0.5, 0.05, 0.95]))
+        scatter = middle, low, high
+    return Beside(pair.ratio, pair.low, pair.high, pair.count, scatter, len(ratios))
+
+
+def _is(kind: str, moving: bool, tip: bool) -> bool:
+    return {"motion": moving, "rest": not moving, "tip": not moving and tip,
+            "through": not moving and not tip}[kind]  # fmt: skip
+
+
+def pair_in(pairs: Sequence[Pair], metric: str, solver: str, rival: str) -> Pair | None:
+    """Return a pair of solvers out of many, if it is there."""
+    asked = metric, solver, rival
+    return next((p for p in pairs if (p.metric, p.solver, p.rival) == asked), None)
+
+
+def mesh_ratios(
+    evidence: Evidence, metric: str, solver: str, rival: str, counts: Callable[[str], bool]
+) -> list[float]:
+    """Return ratios of two solvers, one for each position of the mesh of the scenes that count."""
+    values: dict[tuple[str, str], dict[str, float]] = {}
+    for row in evidence.positions:
+        if row["metric"] == metric and row["value"] and counts(row["scene"]):
+            place = values.setdefault((row["scene"], row["position"]), {})
+            place[row["solver"]] = float(row["value"])
+    return [
+        both[solver] / both[rival]
+        for _, both in sorted(values.items())
+        if {solver, rival} <= both.keys() and both[rival] > 0.0
+    ]

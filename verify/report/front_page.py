@@ -1,0 +1,175 @@
+"""The front page of the results, and that of the ranked run: answers and figures."""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from verify.files import write_whole
+from verify.report.benchmark_page import discretisations, time_plot, title_of
+from verify.report.conclusions import STILL, Answer, drifts, steps_kept
+from verify.report.evidence import FURTHER, MEASURE, Beside, Evidence, benchmark_scenes, beside
+from verify.report.notation import Drawing, number, solver_title
+from verify.report.plots import Bar, Palette, Ranged, Series, bars, end_named, ranges
+from verify.report.rendering import Beside as Pictures
+from verify.report.rendering import in_markdown
+
+PICTURES = "front-pictures"
+MOST_WORDS = 500
+_STEPS = (
+    "xfem", "snapping_subdivision", "xfem mass=gevs", "xfem mass=consistent", "subdivision",
+    MEASURE,
+)  # fmt: skip
+_FAR = 10.0  # ratios beyond it, or below its inverse, would press the others onto one line
+_OF_THE_ARENA = ("Accuracy at rest", "Accuracy at a tip", "A moving body, a blade, real time",
+                 "Why (not) remesh?", "What it costs")  # fmt: skip
+_RATIOS = {"Accuracy at rest": "through", "Accuracy at a tip": "tip",
+           "A moving body, a blade, real time": "motion"}  # fmt: skip
+_SCENES = {"through": "Cuts that go through", "tip": "Cuts that end inside", "motion": "In motion"}
+_LINK = re.compile(r"\(([\w./-]+)\)")
+
+
+def write_front(
+    evidence: Evidence, answers: Sequence[Answer], folder: Path, head: str, links: Sequence[str]
+) -> None:
+    """Write ``index.md`` with its pictures into `folder`.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    answers : sequence of Answer
+    folder : Path
+    head : str
+        What stands below the title: where the numbers come from.
+    links : sequence of str
+        Lines that lead to the other pages.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    pictures = _pictures(folder, figures(evidence))
+    lines = ["# Which way to cut?", "", head, ""]
+    for own in answers:
+        lines += [*_answered(evidence, own), *pictures.get(own.question, [])]
+        if kind := _RATIOS.get(own.question):
+            lines += _differences(evidence, kind)
+    lines += ["## All results", "", *links]
+    write_whole(folder / "index.md", "\n".join(lines) + "\n")
+
+
+def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> list[str]:
+    """Return the first lines of the page of the ranked run: answers, and coverage as bars."""
+    shown = _pictures(folder, coverage(evidence))
+    lines: list[str] = []
+    for own in answers:
+        if own.question in _OF_THE_ARENA:
+            told = " ".join(one.text for one in own.found.values() if one.source == "arena")
+            lines += [f"- **{own.question}**: {told}"] if told else []
+    return [*lines, "", " ".join(figure[0] for figure in shown.values())]
+
+
+def words_in(page: str) -> int:
+    """Count the words that a reader of a page sees before anything is unfolded."""
+    shown = re.sub(r"<details>.*?</details>", "", page, flags=re.DOTALL)
+    shown = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", shown)
+    return len(re.findall(r"[^\W_][\w'’.×−/-]*", _LINK.sub("", shown)))
+
+
+def figures(evidence: Evidence) -> dict[str, Drawing | None]:
+    """Return the figures of the front page by question; None where a run has no numbers for it."""
+    first = next(iter(benchmark_scenes(evidence.results).items()), None)
+    long_run = [Ranged(solver_title(n), v) for n, v in drifts(evidence).items() if v > 0.0]
+    return {
+        **{question: _ratios(evidence, kind) for question, kind in _RATIOS.items()},
+        "Explicit steps with slivers": end_named(
+            "Critical explicit step over the uncut body's", "distance ε of the cut from nodes",
+            [Series(solver_title(name), steps_kept(evidence, name)) for name in _STEPS],
+            Palette(), descending=True),
+        "Long runs without drift": ranges(
+            "Energy drift over the 10 000 steps of C7, and its limit", "relative", long_run,
+            Palette(), STILL),
+        "What it costs": time_plot(*first) if first else None,
+    }  # fmt: skip
+
+
+def _compared(evidence: Evidence, kind: str) -> Iterator[tuple[str, Beside]]:
+    """Yield each discretisation beside the measure."""
+    for group in discretisations(evidence):
+        if MEASURE not in group:
+            found = (beside(evidence, kind, "displacement_l2", name) for name in group)
+            if (own := next((one for one in found if one is not None), None)) is not None:
+                yield title_of(group), own
+
+
+def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
+    """Draw errors over the measure's, over positions of the mesh or else over scenes."""
+    found = list(_compared(evidence, kind))
+    studied = any(own.scatter for _, own in found)
+    rows = [
+        Ranged(name + ("*" if studied and not own.scatter else ""),
+               *(own.scatter or (own.ratio, own.low, own.high)))
+        for name, own in found if 1 / _FAR <= own.ratio <= _FAR
+    ]  # fmt: skip
+    rows.sort(key=lambda row: row.value)
+    over = (
+        "90 % over positions of the mesh (* range over scenes)" if studied else "range over scenes"
+    )
+    title = f"{_SCENES[kind]}: error over a conforming mesh's"
+    return ranges(title, f"median, {over}", rows, Palette(), 1.0, (1 / _FAR, _FAR))
+
+
+def _differences(evidence: Evidence, kind: str) -> list[str]:
+    """Say which differences positions of the mesh show, and which ratios are off the scale."""
+    found = list(_compared(evidence, kind))
+    shown = {
+        "less accurate": [n for n, own in found if own.scatter and own.scatter[1] > 1.0],
+        "more accurate": [n for n, own in found if own.scatter and own.scatter[2] < 1.0],
+        "beyond the axis": [f"{n} ({number(own.ratio, 2)})" for n, own in found
+                            if not 1 / _FAR <= own.ratio <= _FAR],
+    }  # fmt: skip
+    told = [f"{what}: {', '.join(names)}" for what, names in shown.items() if names]
+    return [f"*{'; '.join(told).capitalize()}.*", ""] if told else []
+
+
+def coverage(evidence: Evidence) -> dict[str, Drawing | None]:
+    """Return a figure for scenes at rest and one for those in motion: answered of asked."""
+    found = evidence.coverage
+    drawn: dict[str, Drawing | None] = {}
+    for kind, words in (("rest", "at rest"), ("motion", "in motion")):
+        rows = [(name, *kinds[kind]) for name, kinds in found.items() if kinds[kind][1]]
+        rows.sort(key=lambda row: -row[1] / row[2])
+        parts = [Bar(solver_title(name), done / asked, 0.0, f"{done} of {asked}")
+                 for name, done, asked in rows]  # fmt: skip
+        title = f"Scenes {words}: answered of asked"
+        said = ", ".join(f"{part.name} {part.written}" for part in parts)
+        drawn[words] = bars(title, parts, f"{title}. {said}.") if parts else None
+    return drawn
+
+
+def _pictures(folder: Path, drawn: dict[str, Drawing | None]) -> dict[str, list[str]]:
+    place = folder / PICTURES
+    place.mkdir(parents=True, exist_ok=True)
+    written = Pictures(place)
+    return {
+        question: [f"![{in_markdown(one.alt)}]({written.drawing(one)})", ""]
+        for question, one in drawn.items() if one is not None
+    }  # fmt: skip
+
+
+def _answered(evidence: Evidence, own: Answer) -> list[str]:
+    """Return a question, its sentences, what is not shown, and folded the numbers."""
+    lines = [f"## {own.question}", ""]
+    if told := " ".join(one.text for one in own.found.values()):
+        lines += [told, ""]
+    if own.lacking:
+        lines += [f"*Not shown by this run: {'; '.join(own.lacking)}.*", ""]
+    if own.found:
+        lines += ["<details><summary>Numbers and command</summary>", ""]
+        lines += [f"- **{name}**: {one.numbers}. Needed: {one.needs}."
+                  for name, one in own.found.items()]  # fmt: skip
+        sources = dict.fromkeys(one.source for one in own.found.values())
+        named = [n for s in sources for n in ((s, *FURTHER[:1]) if s == "arena" else (s,))]
+        lines += [f"- `{evidence.commands[n]}`" for n in named if n in evidence.commands]
+        lines += ["", "</details>", ""]
+    return lines
