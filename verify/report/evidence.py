@@ -82,7 +82,7 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
         If there is no run in ``arena``.
     """
     results: dict[str, CaseResult] = {}
-    commands, thesis = {"speed": "make bench"}, {}
+    commands, thesis = {"speed": "make bench"}, dict[str, Any]()
     for name in ("arena", *FURTHER):
         if name == "arena" or (runs / name).is_dir():
             run = load_run(runs / name)
