@@ -137,7 +137,6 @@ def slower(evidence):
     ("through", lambda: made(cases=changed({"xfem": (0.7, 0.1)}))),
     ("tip", lambda: made(cases=changed({"xfem": (1.3, 1.0)}))),
     ("tip functions", lambda: made(cases=changed({FUNCTIONS: (0.9, 6.0)}))),
-    ("motion", lambda: made(cases=changed({"xfem": (1.3, 1.0)}))),
     ("real time", lambda: made(hand={"slowest": 0.02, "tetrahedra": 9, "cuts": 1, "steps": 2})),
     ("sofa", lambda: made(speed=[{"what": "step in real time, uncut", "size": "",
                                   "ratio": "1.2"}])),
@@ -145,8 +144,7 @@ def slower(evidence):
     ("step lost", lambda: made(slivers=[{**r, "value": "1"} for r in made().slivers])),
     ("drift", lambda: made(cases=[*changed({})[::2],
                                   case("benchmark/c7_spinning", "through", True, drift=1e-3)])),
-    ("remeshed", lambda: made(cases=changed({REMESHED: (0.7, 5.0)}))),
-    ("remeshing time", lambda: made(cases=changed({REMESHED: (0.9, 1.0)}))),
+    ("remeshed", lambda: made(cases=changed({REMESHED: (1.4, 5.0)}), positions=shifted(0.5))),
     ("cost", lambda: made(cases=changed({"ngsxfem": (1.0, 1.0)}))),
 ])  # fmt: skip
 def test_a_sentence_without_support_stops_the_publication(name, evidence):
@@ -162,7 +160,41 @@ def test_a_sentence_without_support_stops_the_publication(name, evidence):
 def test_every_sentence_has_numbers_that_refute_it():
     marks = test_a_sentence_without_support_stops_the_publication.pytestmark
     tried = {name for name, _ in marks[0].args[1]}
-    assert tried == {s.name for own in conclusions.QUESTIONS.values() for s in own}
+    weighed = {"motion", "remeshing time"}  # say whichever of three things is so
+    assert tried | weighed == {s.name for own in conclusions.QUESTIONS.values() for s in own}
+
+
+def shifted(factor):
+    """Return positions of the mesh on which remeshing has another error."""
+    return [{**r, "value": str(float(r["value"]) * (factor if r["solver"] == REMESHED else 1.0))}
+            for r in made().positions]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "cases", "positions", "words"), [
+    ("motion", {"xfem": (0.7, 1.0)}, 1.0, "XFEM: in motion its error is 0.70"),
+    ("motion", {"xfem": (1.1, 1.0)}, 1.0, "XFEM, which needs no new mesh"),
+    ("motion", {"xfem": (2.6, 1.0)}, 1.0, "but in motion its error is 2.6 times"),
+    ("remeshed", {REMESHED: (0.7, 5.0)}, 1.0, "For accuracy: "),
+    ("remeshed", {REMESHED: (0.9, 5.0)}, 1.0, "Not for accuracy: "),
+    ("remeshed", {REMESHED: (1.4, 5.0)}, 1.5, "has even 1.4 times"),
+    ("remeshing time", {REMESHED: (1.0, 1.0)}, 1.0, "which decides nothing"),
+    ("remeshing time", {REMESHED: (1.0, 0.2)}, 1.0, "takes only 0.18 times"),
+])  # fmt: skip
+def test_a_weighed_sentence_says_which_is_better(name, cases, positions, words):
+    sentence = next(s for own in conclusions.QUESTIONS.values() for s in own if s.name == name)
+    evidence = made(changed({"xfem": (1.1, 1.0), **cases}), positions=shifted(positions))
+    found = sentence.of(evidence)
+    assert words in found.text
+    assert found.holds
+
+
+def test_a_difference_that_positions_of_the_mesh_do_not_show_is_none():
+    sentence = conclusions.QUESTIONS["Why (not) remesh?"][0]
+    wide = [{**row, "value": str(float(row["value"]) * (2.0 if int(row["position"]) < 8 else 1.0))}
+            if row["solver"] == REMESHED else row for row in made().positions]  # fmt: skip
+    cases = changed({REMESHED: (0.7, 5.0)})
+    assert sentence.of(made(cases, positions=wide)).text.startswith("Not for accuracy: ")
+    assert sentence.of(made(cases, positions=[])) is None
 
 
 def test_a_difference_is_claimed_only_where_positions_of_the_mesh_show_it():
@@ -191,7 +223,7 @@ def test_scatter_is_the_range_over_positions_of_scenes_of_the_kind():
 def test_a_run_without_a_solver_or_a_scene_leaves_the_sentence():
     answers = answer(made(cases=[case("statics/one", "through")], hand={}, speed=[], slivers=[]))
     found = {name for own in answers for name in own.found}
-    assert found == {"through", "remeshed", "remeshing time", "cost"}
+    assert found == {"through", "remeshed", "remeshing time", "cost"}  # 0.9: no difference to show
     assert answers[4].lacking == ["10 000 steps (C7)"]
 
 
