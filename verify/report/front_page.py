@@ -137,7 +137,7 @@ def coverage(evidence: Evidence) -> dict[str, Drawing | None]:
     found = evidence.coverage
     drawn: dict[str, Drawing | None] = {}
     for kind, words in (("rest", "at rest"), ("motion", "in motion")):
-        rows = [(name, *kinds[kind]) for name, kinds in found.items() if kinds[kind][1]]
+        rows = [(n, own[kind][0], own[kind][1]) for n, own in found.items() if own[kind][1]]
         rows.sort(key=lambda row: -row[1] / row[2])
         parts = [Bar(solver_title(name), done / asked, 0.0, f"{done} of {asked}")
                  for name, done, asked in rows]  # fmt: skip
