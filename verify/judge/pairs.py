@@ -218,16 +218,19 @@ def _joined(
     items: Sequence[_Item], both: Callable[[Any, Any], _Both | None], solver: str, rival: str
 ) -> _Outcome | None:
     """Compare two solvers in a scene; None if they have no item in common."""
-    met = [
-        _outcome(*numbers)
-        for item in items
-        if solver in item and rival in item
-        if (numbers := both(item[solver], item[rival])) is not None
-    ]
+    met = [_outcome(*numbers) for numbers in _met(items, both, solver, rival)]
     if not met:
         return None
     ratios = [outcome.ratio for outcome in met if outcome.ratio is not None]
     return _Outcome(int(median(one.won for one in met)), median(ratios) if ratios else None)
+
+
+def _met(
+    items: Sequence[_Item], both: Callable[[Any, Any], _Both | None], solver: str, rival: str
+) -> list[_Both]:
+    common = (item for item in items if solver in item and rival in item)
+    found = (both(item[solver], item[rival]) for item in common)
+    return [numbers for numbers in found if numbers is not None]
 
 
 def _outcome(mine: Interval, theirs: Interval) -> _Outcome:
@@ -247,12 +250,7 @@ def _agree(mine: Interval, theirs: Interval) -> bool:
 def _are_one(scenes: Sequence[Sequence[_Item]], solver: str, rival: str) -> bool:
     shared = 0
     for items in scenes:
-        met = [
-            numbers
-            for item in items
-            if solver in item and rival in item
-            if (numbers := _at_equal_size(item[solver], item[rival])) is not None
-        ]
+        met = _met(items, _at_equal_size, solver, rival)
         above = [both for both in met if max(number.value for number in both) > ROUND_OFF]
         if not all(_agree(*both) for both in above):
             return False
