@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scenes
+from scipy.spatial.transform import Rotation
 
 from verify.compare.body import body_of
 from verify.compare.errors import Rules
@@ -14,6 +15,7 @@ from verify.judge.resultants import resultants_over_time
 from verify.scene import load_scene
 from verify.solution import Solution
 from verify.solvers import find_solver
+from verify.xfem import box_mesh, rectangle_mesh
 
 
 def reaction(name, where, component, **more):
@@ -255,6 +257,36 @@ def test_the_stress_of_a_patch_is_exact_on_both_sides_of_an_inclined_cut():
         sigma = strain / 0.91 * np.outer(along, along)
         got = [found[f"{side} {c}"] for c in ("xx", "yy", "xy")]
         assert got == pytest.approx([sigma[0, 0], sigma[1, 1], sigma[0, 1]], abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["hooke", "neo_hookean", "stable_neo_hookean"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_stress_of_a_stretched_and_turned_body_is_that_of_cauchy(d, model):
+    """Principal stresses λᵢ ∂W/∂λᵢ / J of the energy of each model, turned with the body."""
+    stretches = np.array([1.3, 0.8, 1.1])[:d]
+    turns = ("z", [0.7]) if d == 2 else ("zxz", [0.7, 0.4, -0.2])
+    turn = Rotation.from_euler(*turns).as_matrix()[:d, :d]
+    gradient = turn @ np.diag(stretches) - np.eye(d)
+    parts = ("xx", "xy", "yy") if d == 2 else ("xx", "yz", "zz")
+    asked = [stress([0.44, 0.57, 0.5][:d], 0.3, part) for part in parts]
+    scene = scenes.scene(d=d, material=scenes.soft(d, model=model), quantities=asked,
+                         analysis={"kinematics": "corotational"})  # fmt: skip
+    mesh = rectangle_mesh((3, 3)) if d == 2 else box_mesh((3, 3, 3))
+    moved = (mesh.points @ gradient.T)[None]
+    found, law = values(scene, solution=Solution(mesh.points, mesh.cells, moved)), law_of(scene)
+    lame, shear, J = law.lame, law.shear, np.prod(stretches)
+    volumetric = {  # J dH/dJ
+        "neo_hookean": lame * np.log(J) - shear,
+        "stable_neo_hookean": J * ((lame + shear) * (J - 1) - shear),
+    }
+    if model == "hooke":
+        slopes = 2 * shear * (stretches - 1) + lame * np.sum(stretches - 1)
+    else:
+        slopes = shear * stretches + volumetric[model] / stretches
+    cauchy = turn @ np.diag(stretches * slopes / J) @ turn.T
+    for part in parts:
+        wanted = cauchy[tuple("xyz".index(axis) for axis in part)]
+        assert found[f"s_{part}"] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_interval_of_a_reaction_holds_the_value_of_far_finer_meshes():

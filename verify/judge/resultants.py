@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from verify.compare.hooke import Hooke, Law, stress_power, viscous_power
+from verify.compare.hooke import Corotated, Law, stress_power, viscous_power
 from verify.compare.load_work import (
     PrescribedNodes,
     nodal_forces,
@@ -348,18 +348,20 @@ def mean_stress(field: Field, law: Law, asked: StressQuantity) -> float:
 
     The mean gradient is (d/r) times the mean of u ⊗ n over its surface: displacements, which are
     continuous whatever elements the ball meets, are all that counts. The samples of the surface
-    miss up to 1e-4 of it on linear elements as large as half the ball.
+    miss up to 1e-4 of it on linear elements as large as half the ball. At finite rotation it is the
+    Cauchy stress P Fᵀ/det F of that gradient; the ball is one of the undeformed body.
     """
     centre = np.array([asked.point], dtype=float)
     d = centre.shape[1]
     normals, weights = on_unit_sphere(d)
     u = field.displacement(centre + asked.radius * normals, np.repeat(centre, len(normals), axis=0))
     gradient = d / asked.radius * np.einsum("q,qi,qj->ij", weights, u, normals)
-    strain, here = 0.5 * (gradient + gradient.T), law.at(centre)
-    assert isinstance(here, Hooke)
+    stress = law.at(centre).piola(gradient[None])[0]
+    if isinstance(law, Corotated):
+        deformation = np.eye(d) + gradient
+        stress = stress @ deformation.T / np.linalg.det(deformation)
     row, column = ("xyz".index(axis) for axis in asked.component)
-    trace = np.ravel(here.lame)[0] * np.trace(strain) if row == column else 0.0
-    return float(trace + 2.0 * np.ravel(here.shear)[0] * strain[row, column])
+    return float(stress[row, column])
 
 
 def scale_of(form: WeakForm, asked: ReactionQuantity | SectionQuantity | StressQuantity) -> float:
