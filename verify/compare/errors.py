@@ -201,7 +201,7 @@ class Rules:
         return found
 
 
-CONTACT_ERRORS = ("contact_pressure", "contact_oscillation")  # see `verify.compare.contact`
+CONTACT_ERRORS = ("contact_pressure", "contact_oscillation")  # see `verify.judge.contact`
 ERROR_NAMES = (
     *ERRORS,
     *(f"{name}_{how}" for name in OVER_TIME for how in ("max", "mean")),

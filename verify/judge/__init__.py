@@ -1,6 +1,7 @@
 """The judge: what measured numbers say about what a case demands, in this order of files.
 
-1. `quantities` and `stress_intensity` measure what a case asks for, with `verify.compare`.
+1. `quantities`, `stress_intensity` and `contact` measure what a case asks for, with
+   `verify.compare`.
 2. `convergence` and `reference` say how well a number is known, `intervals` how far from the truth
    it lies at least and at most. `accuracy` does this for all solves of a case.
 3. `checks` makes each demand of a case one of each solver that it holds for.

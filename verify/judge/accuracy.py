@@ -13,12 +13,6 @@ import numpy as np
 
 from verify.compare.blade import blade_forces, released_metrics
 from verify.compare.body import AnyBody, body_of
-from verify.compare.contact import (
-    ContactTruth,
-    contact_metrics,
-    exact_pressure,
-    stated_pressure,
-)
 from verify.compare.error_norm import ErrorNorm, MeasuredNorm, spread_of
 from verify.compare.errors import (
     COARSER,
@@ -46,6 +40,7 @@ from verify.compare.part_account import (
 from verify.compare.simplices import cells_of, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
+from verify.judge.contact import ContactTruth, contact_metrics, exact_pressure
 from verify.judge.convergence import observed_rate, shifted_ends
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
 from verify.judge.intervals import error_interval, sufficiency
@@ -237,10 +232,7 @@ def _reference(
         sizes = (compared_size(s, body) for s in judged or levels.values())
         finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
-        found = conforming_reference(scene, levels, body, law, rules_for(finest), others)
-        stated = [stated_pressure(levels[k]) for k in sorted(levels, reverse=True)
-                  if levels[k].contact is not None]  # fmt: skip
-        return replace(found, contact=stated), ""
+        return conforming_reference(scene, levels, body, law, rules_for(finest), others), ""
     except InputError as problem:
         return None, str(problem)
 
@@ -390,11 +382,9 @@ def _contact(
     if rule is None:
         return [], {"contact_pressure": "no cut lies inside the body"}
     if reference is not None:
-        judged = one.scene.judged_by_exact
-        known = [exact_pressure(exact, one.law, rule)] if judged else reference.contact
-        # one level of a reference does not say how well it is known
-        if judged or len(known) > 1:
-            truth = ContactTruth(known, reference.source)
+        truth = reference.contact
+        if one.scene.judged_by_exact:
+            truth = ContactTruth([exact_pressure(exact, one.law, rule)], reference.source)
     size = compared_size(one.solution, one.body)
     return contact_metrics(one.solution, one.field, rule, truth, size)
 

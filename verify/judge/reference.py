@@ -10,7 +10,6 @@ import numpy as np
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
-from verify.compare.contact import Pressure
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.errors import (
     COARSER,
@@ -29,6 +28,7 @@ from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import cells_of
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.contact import ContactTruth, stated_pressure
 from verify.judge.convergence import (
     ROUND_OFF,
     Extrapolation,
@@ -92,8 +92,8 @@ class Reference:
         Value and half-width per quantity of interest that it has.
     record : ReferenceRecord
         What the result says about it.
-    contact : sequence of Pressure
-        On the faces of cuts, of its levels, the finest first; of an exact field known otherwise.
+    contact : ContactTruth, optional
+        Pressures that its levels state; those of an exact field follow from its stress.
     rules : Rules, optional
         At the points of which the motion was asked before, and remembers what it was.
     """
@@ -104,7 +104,7 @@ class Reference:
     quantities: dict[str, tuple[float, float]]
     record: ReferenceRecord
     rules: Rules | None = None
-    contact: Sequence[Pressure] = ()
+    contact: ContactTruth | None = None
 
 
 def size_of(solution: Solution) -> float:
@@ -280,7 +280,11 @@ def conforming_reference(
         metrics=metrics,
         missing=missing or None,
     )
-    return Reference(motions[-1], source, norms, quantities, record, rules)
+    contact = None
+    if all(solution.contact is not None for solution in solutions):
+        pressures = [stated_pressure(solution) for solution in solutions]
+        contact = ContactTruth(pressures, source, sizes, order, falls)
+    return Reference(motions[-1], source, norms, quantities, record, rules, contact)
 
 
 def _known_quantities(

@@ -3,11 +3,14 @@
 A solver states its pressure at points of its realised cut, with the length or area of each. It is
 compared there with p = −n·σn of the exact field, or with the pressure of the reference. Errors are
 in L2 over the cut, and over the output times of a motion; the oscillation is the part of the error
-that is left of it without its mean over two elements to all sides.
+that is left of it without its mean over two elements to all sides. How well the reference is known
+follows from its levels, as of all other numbers (`verify.judge.convergence`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -20,6 +23,7 @@ from verify.compare.errors import CONTACT_ERRORS
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import field_at
+from verify.judge.convergence import extrapolate, field_uncertainty
 from verify.result import Metric
 from verify.solution import ContactPressure, Solution
 
@@ -27,19 +31,43 @@ Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]  # at points (n, d) and a time, Pa
 _PRESSED = 1e-3  # of the mean pressure (the largest may be at a tip): where more, faces touch
 _AROUND = 2.0  # elements over which the oscillation is told from the error
-_SAFETY = 3.0  # times the last difference of levels: the half-width of what has no order
+_ORDER_OF_EXTENT = 1.0  # faces touch or not: the end of a zone is known to a facet
 _MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
 
 
 @dataclass(frozen=True)
 class ContactTruth:
-    """Pressures that are known, the best first, and what they are.
+    """Pressures that are known.
 
-    A second one says by its distance how well the first is known; an exact one stands alone.
+    Parameters
+    ----------
+    pressures : sequence of Pressure
+        Of the levels of a reference, coarse to fine, at least three; or an exact one, alone.
+    source : str
+        What they are.
+    sizes : sequence of float
+        Element sizes of the levels, m; none of an exact one.
+    order : float
+        Of the stress of a level, that can be counted on.
+    falls : float
+        See `verify.judge.convergence.extrapolate`.
     """
 
     pressures: Sequence[Pressure]
     source: str
+    sizes: Sequence[float] = ()
+    order: float = 1.0
+    falls: float = inf
+
+    def width_of_norm(self, differences: Sequence[float]) -> float:
+        """Half-width of the norm of an error, from those of the differences of levels."""
+        if not self.sizes:
+            return 0.0
+        return field_uncertainty(differences, self.sizes, self.order, self.falls).half_width
+
+    def width_of_value(self, values: Sequence[float], order: float) -> float:
+        """Half-width of a number, from its values on the levels."""
+        return extrapolate(values, self.sizes, order, self.falls).half_width if self.sizes else 0.0
 
 
 def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
@@ -108,17 +136,16 @@ def contact_metrics(
     if slip >= _MOST_SLIP:
         why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
         return metrics, dict.fromkeys((*CONTACT_ERRORS, "contact_extent", "contact_force"), why)
-    known = truth.pressures if truth else ()
-    last, source = float(solution.times[-1]), truth.source if truth else ""
-    own = _resultants(contact.pressure[-1], contact.weights)
-    others = [_resultants(one(rule.points, last), rule.weights) for one in known]
-    unit = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
-    for i, name in enumerate(("contact_extent", "contact_force")):
-        values = [other[i] for other in others]
-        width = _SAFETY * abs(values[0] - values[1]) if len(values) > 1 else 0.0
-        metrics.append(Metric(name, own[i], unit[i], next(iter(values), None), width, source))
+    last, own = float(solution.times[-1]), _resultants(contact.pressure[-1], contact.weights)
+    names = ("contact_extent", "contact_force")
+    units = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
     if truth is None:
-        return metrics, {}
+        return [*metrics, *map(Metric, names, own, units)], {}
+    others = [_resultants(one(rule.points, last), rule.weights) for one in truth.pressures]
+    orders = (min(_ORDER_OF_EXTENT, truth.order), truth.order)
+    for name, value, unit, *values, order in zip(names, own, units, *others, orders, strict=True):
+        width = truth.width_of_value(values, order)
+        metrics.append(Metric(name, value, unit, values[-1], width, truth.source))
     errors, notes = _errors(solution, contact, truth, size)
     return metrics + errors, notes
 
@@ -133,10 +160,10 @@ def _errors(
     def norm(values: Array) -> float:
         return float(np.sqrt(spans @ (values**2 @ weights)))
 
-    scale, error = norm(known[0]), contact.pressure - known[0]
+    scale, error = norm(known[-1]), contact.pressure - known[-1]
     if scale == 0.0:
         return [], dict.fromkeys(CONTACT_ERRORS, "no face is pressed in the reference")
-    width = _SAFETY * norm(known[0] - known[1]) / scale if len(known) > 1 else 0.0
+    width = truth.width_of_norm([norm(fine - coarse) for coarse, fine in pairwise(known)]) / scale
     around = cKDTree(contact.points).sparse_distance_matrix(
         cKDTree(contact.points), _AROUND * size, output_type="coo_matrix"
     )

@@ -8,15 +8,15 @@ import scenes
 
 from reference.exact import exact_of
 from verify.compare.body import body_of
-from verify.compare.contact import (
+from verify.compare.errors import Rules
+from verify.compare.hooke import law_of
+from verify.compare.motion import SolutionMotion
+from verify.judge.contact import (
     ContactTruth,
     contact_metrics,
     exact_pressure,
     stated_pressure,
 )
-from verify.compare.errors import Rules
-from verify.compare.hooke import law_of
-from verify.compare.motion import SolutionMotion
 from verify.solution import ContactPressure, Solution
 
 LINE = {"kind": "polyline", "points": [[-0.1, 0.3], [1.1, 0.7]]}
@@ -24,14 +24,17 @@ STRAIN = [[-1e-3, 0.0], [0.0, -1e-3]]
 UNIFORM = 1e-3 / (1.3 * 0.4)  # E ε / ((1+ν)(1−2ν))
 
 
-def measured(pressure, truth=True, points=None, slide=0.0):
-    """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain."""
+def measured(pressure, known=None, slide=0.0):
+    """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain.
+
+    Against the exact one, or another that is `known`.
+    """
     scene = scenes.scene(
         [LINE], contact={"expected": "closed"},
         supports=[{"where": "boundary", "displacement": "exact"}],
         exact={"solution": "linear", "parameters": {"matrix": STRAIN, "shift": [0.0, 0.0]}},
     )  # fmt: skip
-    x = np.linspace(0.0, 1.0, 401)[:-1] + 1 / 800 if points is None else points
+    x = np.linspace(0.0, 1.0, 401)[:-1] + 1 / 800
     places = np.column_stack([x, 1 / 3 + x / 3])
     contact = ContactPressure(
         places, np.full(len(x), np.hypot(1, 1 / 3) / len(x)), pressure(x)[None]
@@ -45,7 +48,7 @@ def measured(pressure, truth=True, points=None, slide=0.0):
                         cut_facets=corners[None, [4, 5]])  # fmt: skip
     body, law = body_of(scene), law_of(scene)
     rule = Rules(body, 0.1).on_cuts()
-    known = ContactTruth([exact_pressure(exact_of(scene), law, rule)], "exact") if truth else None
+    known = known or ContactTruth([exact_pressure(exact_of(scene), law, rule)], "exact")
     field = SolutionMotion(solution, body).at()
     found, notes = contact_metrics(solution, field, rule, known, 0.1)
     return {one.name: one for one in found}, notes, solution
@@ -89,6 +92,28 @@ def test_half_of_the_faces_together_is_half_the_extent_and_a_stated_pressure_is_
     stated = stated_pressure(solution)
     at = np.array([[0.2, 0.4], [0.9, 1 / 3 + 0.3]])
     np.testing.assert_allclose(stated(at, 0.0), [UNIFORM, 0.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "fall, formal, wanted", [(4.0, 2.0, 1.6 / 3.0), (2.0, 2.0, 2.5), (1.2, 2.0, 2.5 / (2**0.5 - 1))]
+)
+def test_a_reference_is_known_by_its_levels_to_the_safety_factor_over_the_fall(
+    fall, formal, wanted
+):
+    """Of the last difference: 1.6/(2² − 1) at the formal order, 2.5/(2ᵖ − 1) below, p ≥ ½."""
+    off = [1e-2 / fall**k for k in range(3)]
+    levels = [lambda at, _t, o=o: np.full(len(at), UNIFORM * (1 + o)) for o in off]
+    truth = ContactTruth(levels, "levels", [0.4, 0.2, 0.1], formal)
+    found, _, _ = measured(lambda x: np.full_like(x, UNIFORM), truth)
+    last = off[1] - off[2]
+    assert found["contact_pressure"].uncertainty == pytest.approx(
+        wanted * last / (1 + off[2]), rel=1e-6
+    )
+    force = found["contact_force"]
+    assert force.uncertainty == pytest.approx(
+        wanted * last * UNIFORM * np.hypot(1.0, 1 / 3), rel=1e-6
+    )
+    assert force.reference == pytest.approx(UNIFORM * (1 + off[2]) * np.hypot(1, 1 / 3), rel=1e-9)
 
 
 def test_without_a_stated_pressure_nothing_is_measured_and_why():
