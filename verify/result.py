@@ -476,8 +476,9 @@ class OpeningCurve:
     """The displacement jump of one field along a line on a cut.
 
     `level` is None for an exact solution. `normal` and `tangential` are in m, positive where the
-    cut opens; in space the tangential jump is a length. The bands are half-widths of a reference,
-    m; empty where nothing says how well the field is known.
+    cut opens; in space the tangential jump is a length. `pressure` is that of faces that touch, Pa;
+    empty without contact. The bands are half-widths of a reference; empty where nothing says how
+    well the field is known.
     """
 
     solver: str
@@ -486,12 +487,14 @@ class OpeningCurve:
     tangential: list[float]
     normal_band: list[float] = field(default_factory=list)
     tangential_band: list[float] = field(default_factory=list)
+    pressure: list[float] = field(default_factory=list)
+    pressure_band: list[float] = field(default_factory=list)
 
 
 @_closed
 @dataclass(frozen=True)
 class OpeningProfile:
-    """Jumps along a line on a cut, of all solvers (their finest levels) and the reference.
+    """Jumps and pressures along a line on a cut, of all solvers' finest levels and the reference.
 
     Parameters
     ----------

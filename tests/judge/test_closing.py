@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from pressed_halves import normal, pressed
 
+from reference.exact import exact_of
 from verify.judge.openings import with_openings
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
+from verify.solution import ContactPressure
 from verify.solvers import find_solver
 
 SHARED = """
@@ -102,6 +104,39 @@ def test_the_band_of_a_jump_believes_no_order_above_two(tmp_path, fall):
     (profile,) = examined(scene(tmp_path), {"xfem": {0: own[0]}, "reference": own}).openings
     band = np.array(profile.curves[0].normal_band)
     assert band == pytest.approx(2.0 * (off[1] - off[2]) / 3.0, rel=1e-6)
+
+
+def test_profiles_of_faces_that_touch_hold_their_pressures_with_the_band(tmp_path):
+    """At the first order of the stress of linear elements: two times the last difference."""
+    touching = scene(tmp_path, '[contact]\nexpected = "closed"\n')
+    along = np.linspace(-0.6, 0.6, 301)
+
+    def own(pressure, level):
+        places, weights = 0.5 + along[:, None] * ALONG, np.full(301, 0.004)
+        stated = ContactPressure(places, weights, np.broadcast_to(pressure, (1, 301)))
+        return moved(0.0 * ALONG, 4 + level, level, size=0.25 / 2**level, contact=stated)
+
+    reference = {k: own(1.0 + 4e-3 / 2**k, k) for k in range(3)}
+    solutions = {"xfem": {0: own(1.0 + along, 0)}, "reference": reference}
+    (profile,) = examined(touching, solutions).openings
+    known, xfem = profile.curves
+    assert known.pressure == pytest.approx([1.001] * len(profile.arc), rel=1e-12)
+    assert known.pressure_band == pytest.approx([2.0 * 1e-3] * len(profile.arc), rel=1e-6)
+    places = (np.array(profile.points) - 0.5) @ ALONG
+    assert xfem.pressure == pytest.approx(1.0 + places, rel=1e-9)
+
+
+def test_the_pressure_of_an_exact_field_is_minus_its_stress_across_and_zero_where_it_is_open():
+    """−Re Z of the partly closed crack, Z = σ′(ξ − c/2) √((ξ + c)/(ξ − c)), on −c ≤ … < 0."""
+    crack = load_scene("contact/partly_closed_crack")
+    (profile,) = examined(crack, {}, exact_of(crack)).openings
+    (known,) = profile.curves
+    c, xi = 2 / 3, np.array(profile.arc) - 1 - 1 / 3
+    wanted = np.where(
+        xi < -c, 1e-3 * (0.5 * c - xi) * np.sqrt(((xi + c) / (xi - c)).clip(0.0)), 0.0
+    )
+    assert np.count_nonzero(wanted) == pytest.approx(0.39 * len(xi), abs=1)
+    assert known.pressure == pytest.approx(wanted, abs=1e-3 * wanted.max())
 
 
 @pytest.mark.parametrize("shift", [0.02 * normal(2), 0.1 * ALONG, 0.0 * ALONG])

@@ -258,6 +258,21 @@ def test_reference_and_solvers_are_in_one_figure_with_the_band(openings_drawn):
     assert "at most 0.002 m of the normal jump" in figure.caption
 
 
+def test_pressures_of_faces_that_touch_are_a_panel_of_their_own(openings_drawn):
+    pressed = replace(curve("reference", 2), pressure=[2.0, 1.0, 0.0, 0.0], pressure_band=[0.5] * 4)
+    shut = replace(curve("xfem"), normal=[0.0] * 4, pressure=[3.0, 1.5, 0.0, 0.0])
+    shown = profile(pressed, shut, curve("guest"))
+    (figure,), ((lines, bands), _) = openings_drawn(shown)
+    assert len(figure.panels) == 2
+    assert list(lines) == ["reference", "XFEM"]  # a guest without contact states none
+    assert lines["XFEM"][:, 1] == pytest.approx([3.0, 1.5, 0.0, 0.0])
+    assert bands[0][:, 1].max() == pytest.approx(2.5)
+    flat = replace(pressed, normal=[0.0] * 4)
+    (figure,), _ = openings_drawn(profile(flat, shut))
+    assert "zero along the whole cut" in figure.caption
+    assert len(figure.panels) == 1
+
+
 def body_with(values):
     body = deformed_bodies(cut_square(8), 0.0)[0]
     return replace(body, values=np.resize(values, len(body.points)))

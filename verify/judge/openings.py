@@ -1,4 +1,4 @@
-"""Jumps along cuts: opening profiles with their bands, overlaps, and warnings of those not meant.
+"""Jumps and pressures along cuts: profiles with their bands, overlaps, warnings of those not meant.
 
 A penetration counts when it is more than three times the uncertainty of the opening. Of the
 reference that is the widest part of the band of its opening profile. A solver's own opening is off
@@ -11,6 +11,7 @@ solver gives another answer, not the same one less exactly.
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,13 @@ from numpy.typing import NDArray
 from verify.compare.body import AnyBody, body_of
 from verify.compare.cut_deviation import continued_where
 from verify.compare.cut_profile import ProfileLine, profile_lines
+from verify.compare.cut_rule import CutRule
 from verify.compare.error_norm import displacement_jump
+from verify.compare.hooke import law_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch
 from verify.errors import InputError, UnsupportedSceneError
+from verify.judge.contact import Pressure, exact_pressure, stated_pressure
 from verify.judge.convergence import place_uncertainty
 from verify.judge.reference import size_of
 from verify.printable import one_line
@@ -65,6 +69,8 @@ class Contestant:
         Element sizes of these and of its own, m.
     order : int
         Polynomial order.
+    pressures : function of CutRule
+        Gives the pressures of contact on these points, of the levels below it and its own.
     """
 
     name: str
@@ -73,6 +79,7 @@ class Contestant:
     coarser: Sequence[Motion] = ()
     sizes: Sequence[float] = ()
     order: int = 1
+    pressures: Callable[[CutRule], Sequence[Pressure]] = lambda rule: ()
 
 
 def opening_profiles(
@@ -114,15 +121,19 @@ def largest_opening_time(body: AnyBody, motion: Motion, times: Sequence[float]) 
 def _curve(
     body: AnyBody, line: ProfileLine, one: Contestant, time: float | None
 ) -> OpeningCurve | None:
-    """Take the jump of a field; None where it does not reach that time."""
+    """Take the jump of a field, and its pressure; None where it does not reach that time."""
     try:
-        parts = _parts(body, line, one.motion, time)
-        band = _band(body, line, one, time, parts)
+        jumps = [_parts(body, line, m, time) for m in (*one.coarser[-2:], one.motion)]
     except InputError:
         return None
-    normal, tangential = parts.tolist()
-    bands = band.tolist() if band is not None else [[], []]
-    return OpeningCurve(one.name, one.level, normal, tangential, *bands)
+    bands = _band(one, jumps, one.order + 1)
+    found = OpeningCurve(one.name, one.level, *jumps[-1].tolist(), *bands)
+    stated = one.pressures(line.rule)[-3:]
+    if not stated:
+        return found
+    pressures = [pressure(line.rule.points, time or 0.0)[None] for pressure in stated]
+    (band,) = _band(one, pressures, one.order)
+    return replace(found, pressure=pressures[-1][0].tolist(), pressure_band=band)
 
 
 def _parts(body: AnyBody, line: ProfileLine, motion: Motion, time: float | None) -> Array:
@@ -136,22 +147,22 @@ def _parts(body: AnyBody, line: ProfileLine, motion: Motion, time: float | None)
     return np.stack([normal, tangential])
 
 
-def _band(
-    body: AnyBody, line: ProfileLine, one: Contestant, time: float | None, parts: Array
-) -> Array | None:
-    """Half-widths (2, n), m, from the differences of levels around each point."""
+def _band(one: Contestant, levels: Sequence[Array], formal: float) -> list[list[float]]:
+    """Half-widths of rows (k, n) on the last levels, by how these differ around each point.
+
+    Zero of an exact field; empty where the levels are fewer than three.
+    """
     if one.level is None:
-        return np.zeros_like(parts)
-    if len(one.coarser) < 2:
-        return None
-    levels = [_parts(body, line, m, time) for m in one.coarser[-2:]] + [parts]
-    differences = [_around(levels[1] - levels[0]), _around(levels[2] - levels[1])]
+        return np.zeros_like(levels[-1]).tolist()
+    if len(levels) < 3:
+        return [[] for _ in levels[-1]]
     sizes = list(one.sizes[-3:])
 
     def width(value: float, first: float, last: float) -> float:
-        return place_uncertainty(value, [first, last], sizes, one.order + 1).half_width
+        return place_uncertainty(value, [first, last], sizes, formal).half_width
 
-    return np.asarray(np.vectorize(width, otypes=[float])(parts, *differences))
+    differences = [_around(fine - coarse) for coarse, fine in pairwise(levels)]
+    return np.vectorize(width, otypes=[float])(levels[-1], *differences).tolist()
 
 
 def _around(difference: Array) -> Array:
@@ -303,13 +314,19 @@ def _contestants(
     shown = []
     levels = solutions.get(REFERENCE, {})
     if scene.judged_by_exact and exact is not None:
-        shown.append(Contestant(REFERENCE, None, ExactMotion(exact)))
+        truth, law = Contestant(REFERENCE, None, ExactMotion(exact)), law_of(scene)
+        if scene.contact.closed:
+            truth = replace(truth, pressures=lambda rule: [exact_pressure(exact, law, rule)])
+        shown.append(truth)
     elif levels:
         names = sorted(levels)
         motions = [SolutionMotion(levels[level], body) for level in names]
         sizes = [size_of(levels[level]) for level in names]
         order = levels[names[-1]].order
-        shown.append(Contestant(REFERENCE, names[-1], motions[-1], motions[:-1], sizes, order))
+        stated = _stated([levels[level] for level in names])
+        shown.append(
+            Contestant(REFERENCE, names[-1], motions[-1], motions[:-1], sizes, order, stated)
+        )
     good = {(s.solver, s.level): s.cut for s in result.solves if s.metrics}
     for name, own in solutions.items():
         usable = [level for level in own if (name, level) in good]
@@ -317,8 +334,13 @@ def _contestants(
             finest = max(usable)
             where = continued_where(own[finest], body, good[name, finest])
             motion = SolutionMotion(own[finest], body, continued=where)
-            shown.append(Contestant(name, finest, motion))
+            shown.append(Contestant(name, finest, motion, pressures=_stated([own[finest]])))
     return shown
+
+
+def _stated(solutions: Sequence[Solution]) -> Callable[[CutRule], Sequence[Pressure]]:
+    found = [stated_pressure(one) for one in solutions if one.contact and len(one.contact.weights)]
+    return lambda rule: found
 
 
 def _times(

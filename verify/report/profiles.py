@@ -1,4 +1,4 @@
-"""Curves of a case over time and along its cuts: errors, balances, opening profiles."""
+"""Curves of a case over time and along its cuts: errors, balances, openings, pressures."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -265,18 +265,21 @@ def _figures(profile: OpeningProfile, result: CaseResult, palette: Palette) -> I
     length = profile.arc[-1] - profile.arc[0]
     reference = next((c for c in curves if c.solver == REFERENCE), None)
     largest = max(map(_largest, curves))
-    if largest <= _NOTHING * length:
-        yield Figure([], f"{place}: the jump is zero along the whole cut, to round-off.")
-        return
     scale = _largest(reference) if reference else min(map(_largest, curves))
     far = [c for c in curves if c is not reference and _largest(c) > max(_FAR * scale, length)]
     others = [c for c in curves if c is not reference and c not in far]
     left_out = ", ".join(f"{_name(c)} (up to {_largest(c):.2g} m)" for c in far)
+    pressures = _panel(profile, "pressure", reference, others, 0.0, palette)
+    if largest <= _NOTHING * length:
+        said = f"{place}: the jump is zero along the whole cut, to round-off."
+        yield Figure([pressures] if pressures else [], said)
+        return
     panels = [
         panel
         for part in ("normal", "tangential")
         if (panel := _panel(profile, part, reference, others, _NOTHING * length, palette))
     ]
+    panels += [pressures] if pressures else []
     said = f"{place}: {profile.where}. {_band_text(reference, result)}"
     yield Figure(panels, said + (f" Off the scale, and left out: {left_out}." if far else ""))
 
@@ -292,7 +295,7 @@ def _panel(
     others: Sequence[OpeningCurve], nothing: float, palette: Palette,
 ) -> Drawing | None:  # fmt: skip
     shown = [*([reference] if reference else []), *others]
-    curves = [(_name(c), getattr(c, part)) for c in shown]
+    curves = [(_name(c), values) for c in shown if (values := getattr(c, part))]
     if all(abs(v) <= nothing for _, values in curves for v in values if math.isfinite(v)):
         return None
     band = None
@@ -302,7 +305,7 @@ def _panel(
             [v - w for v, w in zip(middle, half, strict=True)],
             [v + w for v, w in zip(middle, half, strict=True)],
         )
-    title = f"{profile.cut}: {part} jump, m"
+    title = f"{profile.cut}: {'pressure, Pa' if part == 'pressure' else f'{part} jump, m'}"
     return profile_panel(title, profile.arc, curves, palette, x_title="arc length, m", band=band)
 
 
