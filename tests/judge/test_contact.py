@@ -11,12 +11,7 @@ from verify.compare.body import body_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.compare.motion import SolutionMotion
-from verify.judge.contact import (
-    ContactTruth,
-    contact_metrics,
-    exact_pressure,
-    stated_pressure,
-)
+from verify.judge.contact import contact_metrics, exact_contact, known_contact, stated_pressure
 from verify.solution import ContactPressure, Solution
 
 LINE = {"kind": "polyline", "points": [[-0.1, 0.3], [1.1, 0.7]]}
@@ -48,7 +43,7 @@ def measured(pressure, known=None, slide=0.0):
                         cut_facets=corners[None, [4, 5]])  # fmt: skip
     body, law = body_of(scene), law_of(scene)
     rule = Rules(body, 0.1).on_cuts()
-    known = known or ContactTruth([exact_pressure(exact_of(scene), law, rule)], "exact")
+    known = known or exact_contact(exact_of(scene), law, rule, 0.0, "exact")
     field = SolutionMotion(solution, body).at()
     found, notes = contact_metrics(solution, field, rule, known, 0.1)
     return {one.name: one for one in found}, notes, solution
@@ -102,8 +97,8 @@ def test_a_reference_is_known_by_its_levels_to_the_safety_factor_over_the_fall(
 ):
     """Of the last difference: 1.6/(2² − 1) at the formal order, 2.5/(2ᵖ − 1) below, p ≥ ½."""
     off = [1e-2 / fall**k for k in range(3)]
-    levels = [lambda at, _t, o=o: np.full(len(at), UNIFORM * (1 + o)) for o in off]
-    truth = ContactTruth(levels, "levels", [0.4, 0.2, 0.1], formal)
+    levels = [measured(lambda x, o=o: np.full_like(x, UNIFORM * (1 + o)))[2] for o in off]
+    truth = known_contact(levels, "levels", [0.4, 0.2, 0.1], formal, np.inf)
     found, _, _ = measured(lambda x: np.full_like(x, UNIFORM), truth)
     last = off[1] - off[2]
     assert found["contact_pressure"].uncertainty == pytest.approx(

@@ -40,7 +40,7 @@ from verify.compare.part_account import (
 from verify.compare.simplices import cells_of, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
-from verify.judge.contact import ContactTruth, contact_metrics, exact_pressure
+from verify.judge.contact import contact_metrics, exact_contact
 from verify.judge.convergence import observed_rate, shifted_ends
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
 from verify.judge.intervals import error_interval, sufficiency
@@ -384,7 +384,8 @@ def _contact(
     if reference is not None:
         truth = reference.contact
         if one.scene.judged_by_exact:
-            truth = ContactTruth([exact_pressure(exact, one.law, rule)], reference.source)
+            last = float(one.solution.times[-1])
+            truth = exact_contact(exact, one.law, rule, last, reference.source)
     size = compared_size(one.solution, one.body)
     return contact_metrics(one.solution, one.field, rule, truth, size)
 

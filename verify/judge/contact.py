@@ -43,6 +43,8 @@ class ContactTruth:
     ----------
     pressures : sequence of Pressure
         Of the levels of a reference, coarse to fine, at least three; or an exact one, alone.
+    resultants : sequence of (float, float)
+        Of each of them, extent (m, in space m²) and force (N/m, N) at the last output time.
     source : str
         What they are.
     sizes : sequence of float
@@ -54,6 +56,7 @@ class ContactTruth:
     """
 
     pressures: Sequence[Pressure]
+    resultants: Sequence[tuple[float, float]]
     source: str
     sizes: Sequence[float] = ()
     order: float = 1.0
@@ -68,6 +71,27 @@ class ContactTruth:
     def width_of_value(self, values: Sequence[float], order: float) -> float:
         """Half-width of a number, from its values on the levels."""
         return extrapolate(values, self.sizes, order, self.falls).half_width if self.sizes else 0.0
+
+
+def exact_contact(exact: Any, law: Law, rule: CutRule, time: float, source: str) -> ContactTruth:
+    """Take the contact of an exact field from its stress; its resultants at a time, by a rule."""
+    pressure = exact_pressure(exact, law, rule)
+    return ContactTruth(
+        [pressure], [_resultants(pressure(rule.points, time), rule.weights)], source
+    )
+
+
+def known_contact(
+    levels: Sequence[Solution], source: str, sizes: Sequence[float], order: float, falls: float
+) -> ContactTruth | None:
+    """Take the contact that levels of a reference state, coarse to fine; None without any."""
+    stated = [one.contact for one in levels if one.contact is not None]
+    if len(stated) < len(levels):
+        return None
+    resultants = [_resultants(one.pressure[-1], one.weights) for one in stated]
+    return ContactTruth(
+        [stated_pressure(one) for one in levels], resultants, source, sizes, order, falls
+    )
 
 
 def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
@@ -136,14 +160,15 @@ def contact_metrics(
     if slip >= _MOST_SLIP:
         why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
         return metrics, dict.fromkeys((*CONTACT_ERRORS, "contact_extent", "contact_force"), why)
-    last, own = float(solution.times[-1]), _resultants(contact.pressure[-1], contact.weights)
+    own = _resultants(contact.pressure[-1], contact.weights)
     names = ("contact_extent", "contact_force")
     units = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
     if truth is None:
         return [*metrics, *map(Metric, names, own, units)], {}
-    others = [_resultants(one(rule.points, last), rule.weights) for one in truth.pressures]
     orders = (min(_ORDER_OF_EXTENT, truth.order), truth.order)
-    for name, value, unit, *values, order in zip(names, own, units, *others, orders, strict=True):
+    for name, value, unit, *values, order in zip(
+        names, own, units, *truth.resultants, orders, strict=True
+    ):
         width = truth.width_of_value(values, order)
         metrics.append(Metric(name, value, unit, values[-1], width, truth.source))
     errors, notes = _errors(solution, contact, truth, size)

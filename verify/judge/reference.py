@@ -28,7 +28,7 @@ from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.simplices import cells_of
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.contact import ContactTruth, stated_pressure
+from verify.judge.contact import ContactTruth, known_contact
 from verify.judge.convergence import (
     ROUND_OFF,
     Extrapolation,
@@ -280,10 +280,7 @@ def conforming_reference(
         metrics=metrics,
         missing=missing or None,
     )
-    contact = None
-    if all(solution.contact is not None for solution in solutions):
-        pressures = [stated_pressure(solution) for solution in solutions]
-        contact = ContactTruth(pressures, source, sizes, order, falls)
+    contact = known_contact(solutions, source, sizes, order, falls)
     return Reference(motions[-1], source, norms, quantities, record, rules, contact)
 
 
