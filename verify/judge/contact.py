@@ -82,16 +82,18 @@ def exact_contact(exact: Any, law: Law, rule: CutRule, time: float, source: str)
 
 
 def known_contact(
-    levels: Sequence[Solution], source: str, sizes: Sequence[float], order: float, falls: float
-) -> ContactTruth | None:
-    """Take the contact that levels of a reference state, coarse to fine; None without any."""
-    stated = [one.contact for one in levels if one.contact is not None]
-    if len(stated) < len(levels):
+    levels: Sequence[Solution], rule: CutRule | None, source: str, sizes: Sequence[float],
+    order: float, falls: float,
+) -> ContactTruth | None:  # fmt: skip
+    """Take the contact that levels of a reference state, coarse to fine; None without any.
+
+    Their resultants at the last output time are by one rule, whoever is judged.
+    """
+    if rule is None or any(one.contact is None for one in levels):
         return None
-    resultants = [_resultants(one.pressure[-1], one.weights) for one in stated]
-    return ContactTruth(
-        [stated_pressure(one) for one in levels], resultants, source, sizes, order, falls
-    )
+    pressures, last = [stated_pressure(one) for one in levels], float(levels[-1].times[-1])
+    resultants = [_resultants(one(rule.points, last), rule.weights) for one in pressures]
+    return ContactTruth(pressures, resultants, source, sizes, order, falls)
 
 
 def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
@@ -214,10 +216,9 @@ def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
     points = contact.points[_pressed(contact.pressure[-1], contact.weights)]
     if not len(points):
         return 0.0
-    nearest = cKDTree(rule.points).query(points)[1]
-    shift = rule.positive[nearest] - rule.points[nearest]
-    normals = rule.normals[nearest]
-    beside = CutRule(points, np.ones(len(points)), normals, points + shift, points - shift)
+    # points of the cut as asked: facets of a curved one lie on one side of it, where no field jumps
+    near = np.unique(cKDTree(rule.points).query(points)[1])
+    beside = rule.reordered(near)
     jump = displacement_jump(field, beside)
-    jump -= np.sum(jump * normals, axis=1)[:, None] * normals
+    jump -= np.sum(jump * beside.normals, axis=1)[:, None] * beside.normals
     return float(np.linalg.norm(jump, axis=1).max())

@@ -280,7 +280,7 @@ def conforming_reference(
         metrics=metrics,
         missing=missing or None,
     )
-    contact = known_contact(solutions, source, sizes, order, falls)
+    contact = known_contact(solutions, rules.on_cuts(), source, sizes, order, falls)
     return Reference(motions[-1], source, norms, quantities, record, rules, contact)
 
 
