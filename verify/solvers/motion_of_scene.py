@@ -412,7 +412,9 @@ class CutMotion:
         faces = faces_of(self.scene, phantom.corners, moving=True)
         return {
             "times": self.timeline.outputs[: len(outputs)],
-            "contact": None if faces is None else contact_of(faces, displacement),
+            "contact": None
+            if faces is None
+            else contact_of(faces, [*map(faces.pressure, displacement)]),
             "displacement": displacement,
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),

@@ -209,7 +209,7 @@ def solve_equilibrium(
         record.notes["linear solver"] = _solver_text(closed.solver, kernels)
         record.notes["residual"] = f"{closed.residual:.3e}"
         fields = at_rest(closed.displacement, closed.strain_energy)
-        return fields | {"contact": contact_of(faces, [closed.displacement])}
+        return fields | {"contact": contact_of(faces, [closed.pressure])}
     if kinematics == "linear" and law is InternalForce:
         ghost = GhostPenalty(body, material) if penalise else None
         static = solve_static(body, material, supports, load, ghost=ghost, kernels=kernels)

@@ -105,11 +105,10 @@ def faces_of(
     return ClosingFaces(phantom, material_of(scene, mesh), cuts, moving)
 
 
-def contact_of(faces: ClosingFaces, displacements: Iterable[_Floats]) -> ContactPressure:
-    """Return the pressure between faces at displacements (N, d), one per output time."""
-    pressure = np.array([faces.pressure(one).ravel() for one in displacements])
+def contact_of(faces: ClosingFaces, pressures: Iterable[_Floats]) -> ContactPressure:
+    """Return the pressure between faces from pressures (f, q), one per output time."""
     points = faces.points.reshape(-1, faces.points.shape[2])
-    return ContactPressure(points, faces.weights.ravel(), pressure)
+    return ContactPressure(points, faces.weights.ravel(), np.array([p.ravel() for p in pressures]))
 
 
 def system_of(

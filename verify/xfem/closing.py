@@ -98,8 +98,6 @@ class ClosingFaces:
         γ, in Pa/m.
     points : (f, q, d) float array
         Quadrature points, in metres.
-    slide : (f, q) float array
-        Gap given beside the normal jump, in metres; see the docstring of the module.
     weights : (f, q) float array
         In m^(d − 1).
 
@@ -171,7 +169,6 @@ class ClosingFaces:
         self._mean = self._of_nodes(self.stress[:, None])
         self._turned = self._trial.T.tocsr(), self._mean.T.tocsr()
         self._bend = None if moving else self._of_nodes(turned)
-        self.slide: Floats = np.zeros(self.weights.shape)
         self._entries: tuple[BlockPattern, csc_array, Floats] | None = None
 
     def _of_nodes(self, rows: Floats) -> csr_array:
@@ -191,39 +188,44 @@ class ClosingFaces:
         pairs = np.stack(np.broadcast_arrays(one[:, :, None], other[:, None]), axis=-1)
         return np.unique(np.sort(pairs.reshape(-1, 2), axis=1), axis=0)
 
-    def trial_stress(self, displacement: Floats) -> Floats:
-        """Compute σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
-        trial = (self._trial @ displacement.ravel()).reshape(self.weights.shape)
-        return trial + self.stiffness[:, None] * self.slide
-
     def slid(self, displacement: Floats) -> Floats:
-        """Compute gap (f, q) in metres by which curved faces open as they slide; see `slide`."""
+        """Compute the gap (f, q) in metres by which curved faces open as they slide.
+
+        Beside the normal jump: the `slide` of the methods below. See the docstring of the module.
+        """
         if self._bend is None:
-            return self.slide
+            return np.zeros(self.weights.shape)
         return (self._bend @ displacement.ravel()).reshape(self.weights.shape)
 
-    def pressure(self, displacement: Floats) -> Floats:
-        """Compute the pressure (f, q) between the faces in pascal; zero where they are apart."""
-        return np.maximum(0.0, -self.trial_stress(displacement))
+    def trial_stress(self, displacement: Floats, slide: Floats | float = 0.0) -> Floats:
+        """Compute σ + γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
+        trial = (self._trial @ displacement.ravel()).reshape(self.weights.shape)
+        return trial + self.stiffness[:, None] * slide
 
-    def energy(self, displacement: Floats) -> float:
+    def pressure(self, displacement: Floats, slide: Floats | float = 0.0) -> Floats:
+        """Compute the pressure (f, q) between the faces in pascal; zero where they are apart."""
+        return np.maximum(0.0, -self.trial_stress(displacement, slide))
+
+    def energy(self, displacement: Floats, slide: Floats | float = 0.0) -> float:
         """Return the energy in joules beside the elastic one; open faces that bear σ lower it."""
         own = self._mean @ displacement.ravel()
-        squares = self.pressure(displacement) ** 2 - own[:, None] ** 2
+        squares = self.pressure(displacement, slide) ** 2 - own[:, None] ** 2
         return float(np.sum(self._per_stiffness * squares)) / 2.0
 
-    def force(self, displacement: Floats, tied: bool = False) -> Floats:
+    def force(
+        self, displacement: Floats, slide: Floats | float = 0.0, tied: bool = False
+    ) -> Floats:
         """Return the slope (N, d) of the energy, in newtons; or with all normal jumps tied."""
-        traction = self.trial_stress(displacement)
+        traction = self.trial_stress(displacement, slide)
         if not tied:
             traction = np.minimum(traction, 0.0)
         own = self._per_stiffness.sum(axis=1) * (self._mean @ displacement.ravel())
         total = self._turned[0] @ (self._per_stiffness * traction).ravel() - self._turned[1] @ own
         return total.reshape(displacement.shape)
 
-    def touching(self, displacement: Floats) -> Bools:
+    def touching(self, displacement: Floats, slide: Floats | float = 0.0) -> Bools:
         """Tell whether faces press on each other, (f, q)."""
-        return self.trial_stress(displacement) < 0.0
+        return self.trial_stress(displacement, slide) < 0.0
 
     def add_stiffness(
         self, pattern: BlockPattern, blocks: Floats, touching: Floats | Bools | bool
@@ -353,15 +355,16 @@ class _Closing:
         self.pattern = body_pattern(force.phantom, faces.couplings)
         self.elastic = force.stiffness(self.pattern)
         self.solver = StaticSolver(force, self.pattern, supports.fixed, 1e-13)
+        self.slide = np.zeros(faces.weights.shape)
         self.solves = 0
 
     def energy(self, u: Floats) -> float:
-        elastic = self.force.evaluate(u)[1]
-        return elastic + self.faces.energy(u) - float(np.vdot(self.load, u))
+        elastic, closed = self.force.evaluate(u)[1], self.faces.energy(u, self.slide)
+        return elastic + closed - float(np.vdot(self.load, u))
 
     def residual(self, u: Floats) -> tuple[Floats, float]:
-        """Compute the residual (N, d), and the largest of the forces in it."""
-        internal, contact = self.force.evaluate(u)[0], self.faces.force(u)
+        """Residual (N, d), and the largest of the forces in it."""
+        internal, contact = self.force.evaluate(u)[0], self.faces.force(u, self.slide)
         scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
         return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
 
@@ -380,15 +383,28 @@ class _Closing:
         residual = np.where(self.fixed, 0.0, self.load - force)
         return values + self.correction(residual, np.ones(self.faces.weights.shape))
 
+    def settled(self, u: Floats) -> Floats:
+        """Minimise J from a displacement (N, d), and correct how far curved faces have slid."""
+        for _ in range(_SLIDES):
+            u = self.solved(u)
+            before, self.slide = self.slide, self.faces.slid(u)
+            change = np.abs(self.faces.stiffness[:, None] * (self.slide - before)).max(initial=0.0)
+            if change <= _SETTLED * self.faces.pressure(u, self.slide).max(initial=0.0):
+                return u
+        raise NotConvergedError(
+            f"curved faces still slide after {_SLIDES} corrections: pressures change by "
+            f"{change:.3g} Pa. Expected a cut that turns by less from element to element"
+        )
+
     def solved(self, u: Floats) -> Floats:
         """Minimise J from a displacement (N, d), with the faces slid as they are."""
         for _ in range(_ITERATIONS):
             residual, scale = self.residual(u)
-            now = self.faces.touching(u)
+            now = self.faces.touching(u, self.slide)
             if np.abs(residual).max() <= _TOLERANCE * scale:
                 return u
             u, whole = self.next(u, residual, now)
-            if whole and np.array_equal(now, self.faces.touching(u)):
+            if whole and np.array_equal(now, self.faces.touching(u, self.slide)):
                 return u
         left = np.abs(residual).max()
         raise NotConvergedError(
@@ -477,21 +493,10 @@ def solve_closed(
     given = finite_array(np.zeros(shape) if load is None else load, "load", shape)
     check_bodies(force.phantom, supports, (faces.nodes, faces.gap))
     newton = _Closing(force, faces, supports, given)
-    faces.slide = np.zeros(faces.weights.shape)
-    u = newton.tied(supports.values)
-    for _ in range(_SLIDES):
-        u = newton.solved(u)
-        before, faces.slide = faces.slide, faces.slid(u)
-        change = np.abs(faces.stiffness[:, None] * (faces.slide - before)).max(initial=0.0)
-        if change <= _SETTLED * np.abs(faces.pressure(u)).max(initial=0.0):
-            break
-    else:
-        raise NotConvergedError(
-            f"curved faces still slide after {_SLIDES} corrections: pressures change by "
-            f"{change:.3g} Pa. Expected a cut that turns by less from element to element"
-        )
+    u = newton.settled(newton.tied(supports.values))
     residual, scale = newton.residual(u)
+    pressure, left = faces.pressure(u, newton.slide), float(np.abs(residual).max() / scale)
     return ClosedSolution(
-        u, force.evaluate(u)[1], faces.pressure(u), float(np.abs(residual).max() / scale),
+        u, force.evaluate(u)[1], pressure, left,
         newton.solves, "direct" if "direct" in newton.solver.used else "iterative",
     )  # fmt: skip
