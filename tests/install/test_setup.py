@@ -2,8 +2,10 @@
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -42,6 +44,28 @@ def test_setup_installs_the_hashed_lock_and_then_the_project(checkout):
     assert "--only-binary :all:" in locked
     assert installed_lock(checkout) == (ROOT / ".ci/requirements.lock").read_text()
     assert "--no-deps --no-build-isolation --editable" in project
+
+
+@pytest.mark.parametrize("exit_code", [0, 7])
+def test_a_terminal_shows_how_far_the_set_up_has_come_and_a_log_does_not(checkout, exit_code):
+    place, environment = checkout
+    of_terminal, seen = os.openpty()
+    environment |= {"STAND_IN_PIP_SECONDS": "1.5", "STAND_IN_PIP_EXIT": str(exit_code)}
+    environment.pop("CI", None)
+    done = subprocess.run([place / ".ci/setup"], env=environment, stdin=seen, stdout=seen,
+                          stderr=seen, timeout=120)  # fmt: skip
+    os.close(seen)
+    shown = b""
+    with suppress(OSError):  # what ends a terminal whose other end is closed
+        while read := os.read(of_terminal, 4096):
+            shown += read
+    os.close(of_terminal)
+    assert done.returncode == exit_code
+    lines = (ROOT / ".ci/requirements.lock").read_text().splitlines()
+    count = sum("==" in line for line in lines)
+    assert f"2 of {count} fetched".encode() in shown
+    assert f"1 of {count} installed".encode() in shown
+    assert b"fetched" not in set_up(checkout, STAND_IN_PIP_SECONDS=0).stdout.encode()
 
 
 def test_a_second_setup_is_silent_and_installs_only_what_has_changed(checkout):

@@ -7,15 +7,18 @@ import stat
 import numpy as np
 import pytest
 
+from thesis_stages import stage
+
 from verify.errors import InputError
+from verify.simulator import Session
 from verify.simulator.animation import (
     Frame,
     Underlay,
     View,
     _labelled,
     _lips,
-    _outer,
     beside,
+    meshes_of,
     scale_length,
     view_of,
     write_film,
@@ -37,17 +40,21 @@ def sheet(gap, cells=4):
             a = row * (cells + 1) + column
             b, c, d = a + 1, a + cells + 1, a + cells + 2
             triangles += [(a, b, d), (a, d, c)]
-    corners = grid[np.array(triangles)].reshape(-1, 3)  # every triangle has its own
-    right = np.repeat(grid[np.array(triangles)].mean(axis=1)[:, 0] > 0.05, 3)
-    inside = (abs(corners[:, 0] - 0.05) < 1e-9) & (abs(corners[:, 1] - 0.05) < 0.024)
-    now = corners + np.where(inside & right, gap, 0.0)[:, None] * [1.0, 0.0, 0.0]
-    return Picture(now, corners, np.arange(len(corners)).reshape(-1, 3), np.zeros(32, bool))
+    places = np.array(triangles)
+    lip = np.flatnonzero((abs(grid[:, 0] - 0.05) < 1e-9) & (abs(grid[:, 1] - 0.05) < 0.024))
+    right = grid[places].mean(axis=1)[:, 0] > 0.05
+    doubled = np.arange(len(grid))
+    doubled[lip] = len(grid) + np.arange(len(lip))
+    places[right] = doubled[places[right]]
+    material = np.concatenate([grid, grid[lip]])
+    now = material + np.where(np.arange(len(material)) >= len(grid), gap, 0.0)[:, None] * [1, 0, 0]
+    ends = np.flatnonzero((abs(grid[:, 0] - 0.05) < 1e-9) & (abs(grid[:, 1] - 0.05) < 0.026))
+    left = np.column_stack([ends[:-1], ends[1:]])
+    return Picture(now, material, places, np.zeros(32, bool), np.concatenate([left, doubled[left]]))
 
 
 def test_lips_have_the_thickness_of_the_membrane_and_only_where_it_gapes():
-    rest = _outer(sheet(0.0))
-    assert _lips(rest, rest, 0.002, VIEW) == []
-    ((walls, *_),) = _lips(_outer(sheet(0.01)), rest, 0.002, VIEW)
+    walls = _lips(sheet(0.01), 0.002, VIEW)
     left, right = 0.05, 2 * np.hypot(0.025, 0.01)
     assert walls.area == pytest.approx(0.002 * (left + right), rel=1e-6)
     assert walls.bounds[4:] == pytest.approx((-0.002, 0.0))  # away from the eye
@@ -60,6 +67,37 @@ def test_what_lies_under_a_skin_is_behind_all_of_it_and_has_its_outline():
     (bed, *_) = beside(Frame(0.0, sheet(0.01)), view)[0]
     assert bed.bounds[:4] == pytest.approx((0.0, 0.1, 0.0, 0.1))
     assert bed.bounds[5] < -0.1
+
+
+@pytest.mark.parametrize("off", [0.0, 0.002, -0.002])
+def test_a_hook_is_drawn_on_the_lip_that_is_seen(off):
+    """Where it grips is known by the mean of the nodes it holds, in any depth."""
+    grips = np.array([0.06 + off, 0.05 - off, -0.01])
+    frame = Frame(1.0, sheet(0.01), hooks=[(grips, np.array([1.0, 0.0, 0.0]))])
+    ((rod, *_),) = beside(frame, VIEW)
+    size = 0.16 * VIEW.width  # of the rod; over the lip its end is drawn 0.05 of it inside
+    ends = rod.points[np.argsort(rod.points[:, 0])[:4]]
+    assert ends[:, 0].min() == pytest.approx(0.06 - 0.05 * size, abs=0.2e-3)
+    assert np.abs(ends[:, 1] - 0.05).max() < 1.5e-3
+
+
+@pytest.mark.parametrize("name", ["face_incision", "hand_straight", "square_dissected"])
+def test_the_line_of_a_closed_cut_is_drawn_behind_the_blade_and_nowhere_else(name):
+    """Skin in space as a membrane and as a solid, and a plane body: lips that touch are seen."""
+    session = Session(stage(name, tolerance=1e-6), account=False)
+    paths, edge = session.stage.strokes, session.stage.smoothing / 2.0
+    assert len(session.picture().lines) == 0
+    while (now := paths[0].travel_at(session.time)) < 0.4 * paths[0].length:
+        session.step()
+    picture = session.picture()
+    ends = picture.material[np.unique(picture.lines)][:, : session.stage.mesh.space]
+    apart, _, travel = paths[0].sweep.probed(ends).T
+    assert np.abs(apart).max() < 0.1 * edge
+    # elements open as the blade comes to the support of one of their nodes
+    assert now - edge < travel.max() < now + 3.0 * edge
+    assert np.diff(np.sort(travel)).max() < edge
+    lines = [mesh for mesh, *_ in meshes_of(Frame(0.0, picture), VIEW) if mesh.n_lines]
+    assert [mesh.n_lines for mesh in lines] == [len(picture.lines)]
 
 
 def test_a_hook_grips_at_the_edge_of_its_cut_wherever_along_the_blade():

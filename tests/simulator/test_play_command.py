@@ -11,7 +11,7 @@ from thesis_stages import CASES
 from verify.cli import main
 from verify.scene import load_scene
 from verify.simulator import Session, stage_of
-from verify.simulator.animation import LiveScalpel, stroke_text, write_stroke
+from verify.simulator.animation import LiveScalpel, stroke_text, write_strokes
 
 graphics = pytest.mark.graphics
 
@@ -66,9 +66,9 @@ def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played
     cut = session.cutter.body.split_cells
     assert cut.sum() > 50
     assert len(scalpel.finished) == 1
-    write_stroke(scalpel.finished[0], tmp_path / "stroke.toml", "first")
+    write_strokes(scalpel.finished, tmp_path / "stroke.toml")
     stroke = (tmp_path / "stroke.toml").read_text(encoding="utf-8")
-    assert stroke == stroke_text(scalpel.finished[0], "first")
+    assert stroke == stroke_text(scalpel.finished[0], "stroke_1")
     begin, end = text.index("[[cuts]]"), text.index("[analysis]")
     again = tmp_path / "again.toml"
     again.write_text(text[:begin] + stroke + "\n" + text[end:], encoding="utf-8")

@@ -1,11 +1,20 @@
 """The window of ``verify play --window``: its mouse is driven through the interactor's events."""
 
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from PIL import Image
 from thesis_stages import CASES
 
+from verify.cli import main
 from verify.scene import load_scene
-from verify.simulator.animation import PlayWindow, place_in_sight
+from verify.simulator import animation
+from verify.simulator.animation import Frame, PlayWindow, place_in_sight, write_picture
 from verify.simulator.stage import stage_of
 from verify.simulator.surfaces import Picture
 
@@ -21,6 +30,7 @@ def _two_sheets(inner: bool) -> Picture:
         material,
         triangles,
         np.array([inner, inner, False, False]),
+        np.empty((0, 2), dtype=np.int64),
     )
 
 
@@ -52,6 +62,8 @@ def _send(window, event: str, x: float, y: float) -> None:
 def test_the_left_button_cuts_and_writes_its_stroke_and_does_not_turn_the_body(
     window, tmp_path
 ) -> None:
+    said = [a.GetText(2) for a in window.plotter.actors.values() if hasattr(a, "GetText")]
+    assert any("stroke.toml" in text for text in said)  # before the first stroke
     eye = np.array(window.plotter.camera.position)
     _send(window, "LeftButtonPressEvent", 320, 430)
     for y in range(420, 250, -10):
@@ -68,3 +80,63 @@ def test_the_left_button_cuts_and_writes_its_stroke_and_does_not_turn_the_body(
     box = window.session.stage.mesh.points
     outside = np.minimum(places - box.min(axis=0), box.max(axis=0) - places).min(axis=1)
     np.testing.assert_allclose(outside, 0.0, atol=1e-9)
+
+
+@pytest.mark.graphics
+def test_the_window_shows_what_a_picture_shows(tmp_path) -> None:
+    """A gaping wound: fat below it, its lips, its hooks, in the same colours at the same pixels."""
+    stage = stage_of(load_scene(CASES / "hand_straight.toml"))
+    stage = replace(stage, hooks=[replace(hook, begin=1.0) for hook in stage.hooks], tolerance=1e-4)
+    window = PlayWindow(stage, "hand", tmp_path / "stroke.toml", off_screen=True)
+    session = window.session
+    while session.time < 1.8:
+        session.step()
+    window.tick()
+    window.plotter.show(auto_close=False)
+    seen = np.array(window.plotter.screenshot(return_img=True), dtype=int)
+    now = Frame(session.time, session.picture(), session.blades(), session.hooks())
+    write_picture(now, window.view, tmp_path / "now.png")
+    with Image.open(tmp_path / "now.png") as image:
+        drawn = np.asarray(image.convert("RGB"), dtype=int)
+    window.plotter.close()
+    middle = slice(100, 540)
+    assert np.abs(seen - drawn).max(axis=2)[middle, middle].mean() < 0.5
+    fat = (drawn[..., 2] < 0.6 * drawn[..., 0]) & (drawn[..., 1] > 0.6 * drawn[..., 0])
+    assert fat[middle, middle].sum() > 200
+
+
+@pytest.mark.parametrize("flags", [[], ["--window"]])
+def test_a_display_that_cannot_be_opened_is_an_error_of_one_line(flags, tmp_path) -> None:
+    environment = {**os.environ, "DISPLAY": ":4711"}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "verify", "play", str(CASES / "triangle.toml"), *flags]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert "display ':4711' cannot be opened; use --out FILE.gif" in line
+    assert not done.stdout
+
+
+def test_all_strokes_are_written_also_one_under_way_as_the_window_is_closed(
+    window, tmp_path, monkeypatch, capsys
+) -> None:
+    for x in (280, 350):
+        _send(window, "LeftButtonPressEvent", x, 430)
+        for y in range(420, 250, -20):
+            _send(window, "MouseMoveEvent", x, y)
+            window.tick()
+        if x == 280:
+            _send(window, "LeftButtonReleaseEvent", x, 250)
+            assert (tmp_path / "stroke.toml").read_text().count("[[cuts]]") == 1
+    window.plotter.show = lambda: None  # the loop of events, in which the user closes it
+    monkeypatch.setattr(animation, "PlayWindow", lambda *_: window)
+    monkeypatch.setattr(animation, "display_is_open", lambda: True)
+    monkeypatch.setenv("DISPLAY", ":0")
+    file = tmp_path / "stroke.toml"
+    command = ["play", str(CASES / "block_cut_once.toml"), "--window", "--stroke", str(file)]
+    assert main(command) == 0
+    assert f"strokes of the mouse: 2, in {file}" in capsys.readouterr().out
+    assert re.findall(r'name = "(.*)"', file.read_text()) == ["stroke_1", "stroke_2"]
+    window.scalpel.finished.clear()
+    assert main(command) == 0
+    assert "no stroke was made" in capsys.readouterr().out

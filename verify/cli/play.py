@@ -33,7 +33,7 @@ def play(
         ),
     ] = None,
     window: Annotated[bool, Arg("open a window")] = False,
-    stroke: Annotated[Path, Arg("window: where the stroke of the mouse is written", "TOML")] = Path(
+    stroke: Annotated[Path, Arg("window: where strokes of the mouse are written", "TOML")] = Path(
         "stroke.toml"
     ),
     frames: Annotated[int, Arg("frames drawn", "N")] = 48,
@@ -62,10 +62,11 @@ def play(
       verify play my_case.toml --out a.gif --tolerance 1e-3      faster, and how far off
       verify play my_case.toml --window --stroke my_stroke.toml
 
-    In a window the left mouse button is the scalpel; the stroke is written as a tool_path
-    that can be pasted into a case file.
+    In a window the left mouse button is the scalpel; its strokes are written as cuts of kind
+    tool_path that can be pasted into a case file.
     """
-    has_display = _check_outputs(out, window, frames, records)
+    in_window = window or (out is None and records is None)
+    _check_outputs(out, window, stroke if in_window else None, frames, records)
     from verify.scene import load_scene
 
     scene = load_scene(case)
@@ -79,35 +80,49 @@ def play(
         if tolerance >= 1.0:
             raise InputError(f"--tolerance {tolerance:g}: expected below 1")
         stage = replace(stage, tolerance=tolerance)
-    if window or (out is None and has_display):
+    if in_window:
         from verify.simulator.animation import play_in_window
 
-        play_in_window(stage, scene.title, stroke)
+        time, strokes = play_in_window(stage, scene.title, stroke)
+        file = str(stroke) if strokes else None
+        if as_json:
+            print_json({"case": scene.name, "time": time, "strokes": strokes, "stroke": file})
+        else:
+            made = f"strokes of the mouse: {strokes}, in {file}" if file else "no stroke was made"
+            print(f"{scene.name}: closed at t = {time:.2f} s; {made}")
         return 0
     summary = _played(stage, scene, out, frames, zoom, records)
     print_json(summary) if as_json else print(_words(summary))
     return 0
 
 
-def _check_outputs(out: Path | None, window: bool, frames: int, records: Path | None) -> bool:
-    """Refuse early what cannot be drawn or written; return whether there is a display."""
+def _check_outputs(
+    out: Path | None, window: bool, stroke: Path | None, frames: int, records: Path | None
+) -> None:
+    """Refuse early what cannot be drawn, shown or written; `stroke` is None without a window."""
     if frames < 2:
         raise InputError(f"--frames {frames}: expected at least 2")
     if out is not None and out.suffix not in (".gif", ".mp4", ".png"):
         raise InputError(f"--out {out}: expected a name that ends in .gif, .mp4 or .png")
     if out is not None and out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError("--out: MP4 needs the program ffmpeg, which is not in the path")
-    if (out is not None or window) and find_spec("pyvista") is None:
+    if window and (out is not None or records is not None):
+        raise InputError("--window: a window writes neither --out nor --records; leave them away")
+    asked = "--window: " if window else ""
+    places = [os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")]
+    if stroke is not None and not any(places):
+        raise InputError(f"{asked}there is no display to show it on; use --out FILE.gif")
+    if (out is not None or stroke is not None) and find_spec("pyvista") is None:
         raise ModuleNotFoundError("No module named 'pyvista'", name="pyvista")
-    for path in (out, records):
+    for path in (out, records, stroke):
         if path is not None and not path.resolve().parent.is_dir():
             raise InputError(f"no directory '{path.parent}' to write into")
-    has_display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-    if window and not has_display:
-        raise InputError("--window: there is no display; use --out FILE.gif")
-    if out is None and not has_display and records is None:
-        raise InputError("there is no display to show it on; use --out FILE.gif")
-    return has_display
+    if stroke is not None:
+        from verify.simulator.animation import display_is_open
+
+        if not display_is_open():
+            named = ", ".join(filter(None, places))
+            raise InputError(f"{asked}the display '{named}' cannot be opened; use --out FILE.gif")
 
 
 def _played(
@@ -132,7 +147,7 @@ def _played(
     cutting = Spread.of(record.total_seconds for record in taken if record.newly_split)
     if out is not None:
         with asked_place(out):
-            _draw(frames, stage, scene, out, zoom)
+            _draw(frames, stage, out, zoom)
     if records is not None:
         with asked_place(records):
             write_whole(records, _table(taken, blades))
@@ -183,19 +198,11 @@ def _solver_error(session: "Session") -> float | None:
     return float(abs(off).max() / abs(exact.displacement).max())
 
 
-def _draw(frames: "list[Frame]", stage: "Stage", scene: "Scene", out: Path, zoom: float) -> None:
+def _draw(frames: "list[Frame]", stage: "Stage", out: Path, zoom: float) -> None:
     """Draw the last frame, or all as fast as it happened."""
-    from verify.simulator.animation import (
-        Underlay,
-        view_of,
-        write_animation,
-        write_film,
-        write_picture,
-    )
+    from verify.simulator.animation import view_of, write_animation, write_film, write_picture
 
-    skin = scene.geometry.kind == "skin"
-    under = Underlay(frames[0].picture, scene.material.thickness or 0.0) if skin else None
-    view = view_of(frames, underlay=under, zoom=zoom)
+    view = view_of(frames, skin=stage.skin, zoom=zoom)
     if out.suffix == ".png":
         write_picture(frames[-1], view, out)
         return

@@ -2,22 +2,23 @@
 
 What lies under a skin, the depth of the lips of a membrane and the shapes of scalpel and hooks are
 drawn and not simulated. In the window the mouse leads the blade: what it points at, strokes that
-cut as it goes, and these as cuts of a case.
+cut as it goes, and these as cuts of a case. Pictures and window are drawn by the same code.
 """
 
 import io
+import re
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
-from scipy.spatial import cKDTree
 
 from verify.errors import InputError
 from verify.files import whole_file, write_whole
@@ -27,7 +28,8 @@ from verify.simulator.surfaces import Picture
 from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.cuts import ToolPath
 
-_SKIN, _FLESH, _FAT, _STEEL = "#e8b79b", "#a8322a", "#e8bf62", "#8b98a5"
+_SKIN, _FLESH, _FAT, _STEEL, _LINE = "#e8b79b", "#a8322a", "#e8bf62", "#8b98a5", "#6e1410"
+_LIFT = 0.002  # of the width that is seen: so much lines of cuts lie above the skin
 _BED = 1.0  # of the width that is seen, along the line of sight: behind every fold of a skin
 _SHAFT, _ROUND = 0.16, 0.005  # length and radius of instruments, of that width
 _SHEET = 0.6  # height over width below which a body is one
@@ -53,6 +55,11 @@ class Underlay:
 
     picture: Picture
     thickness: float = 0.0
+
+    @cached_property
+    def mesh(self) -> Any:
+        """Surface for PyVista."""
+        return _polydata(self.picture, ~self.picture.inner).clean()
 
 
 @dataclass(frozen=True)
@@ -83,11 +90,12 @@ class View:
 def view_of(
     frames: Sequence[Frame],
     towards: Sequence[float] | None = None,
-    underlay: Underlay | None = None,
+    skin: float | None = None,
     zoom: float = 1.0,
 ) -> View:
     """Choose a view that holds the first and the last frame.
 
+    Below a `skin` (`Stage.skin`) its first frame is drawn as what lies under it.
     With `zoom` above 1 it is so many times as near, about what the hooks of the last frame hold
     apart, else about its blades, else about the middle. A plane body is looked at from above its
     plane, a sheet almost so, a block from a corner.
@@ -104,7 +112,8 @@ def view_of(
     if zoom > 1.0 and held:
         places = np.mean([place for place, _ in held], axis=0)
         centre = np.pad(places, (0, 3 - len(places)))
-    return View(centre, eye / np.linalg.norm(eye), up, width, underlay=underlay)
+    under = Underlay(frames[0].picture, skin) if skin is not None else None
+    return View(centre, eye / np.linalg.norm(eye), up, width, underlay=under)
 
 
 def write_picture(frame: Frame, view: View, path: Path) -> None:
@@ -180,19 +189,23 @@ def _draw(frames: Sequence[Frame], view: View) -> list[NDArray[np.uint8]]:
     plotter.background_color = pyvista.Color("white")
     images = []
     for frame in frames:
-        plotter.clear_actors()
-        for mesh, colour, smooth in [*meshes_of(frame), *beside(frame, view)]:
-            plotter.add_mesh(
-                mesh, color=colour, smooth_shading=smooth, split_sharp_edges=smooth,
-                feature_angle=_SHARP, specular=0.15, reset_camera=False, render=False,
-                line_width=4.0,
-            )  # fmt: skip
         look(plotter.camera, view)
-        plotter.reset_camera_clipping_range()
+        show(plotter, frame, view)
         plotter.render()
         images.append(_labelled(np.array(plotter.screenshot(return_img=True)), frame, view))
     plotter.close()
     return images
+
+
+def show(plotter: Any, frame: Frame, view: View) -> None:
+    """Put a frame in the place of what a plotter of PyVista shows; not rendered yet."""
+    plotter.clear_actors()
+    for mesh, colour, smooth in [*meshes_of(frame, view), *beside(frame, view)]:
+        plotter.add_mesh(
+            mesh, color=colour, smooth_shading=smooth, split_sharp_edges=smooth,
+            feature_angle=_SHARP, specular=0.15, reset_camera=False, render=False, line_width=3.0,
+        )  # fmt: skip
+    plotter.reset_camera_clipping_range()
 
 
 def look(camera: Any, view: View) -> None:
@@ -202,20 +215,29 @@ def look(camera: Any, view: View) -> None:
     camera.parallel_projection, camera.parallel_scale = True, 0.5 * view.width
 
 
-def meshes_of(frame: Frame) -> list[tuple[Any, str, bool]]:
-    """Meshes of a frame for PyVista: skin and faces of cuts; colour; if shaded smoothly."""
+def meshes_of(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
+    """Meshes for PyVista: skin, faces of cuts, their lines; colour; if shaded smoothly."""
     import pyvista
 
     picture, found = frame.picture, []
     for inner, colour in ((False, _SKIN), (True, _FLESH)):
-        triangles = picture.triangles[picture.inner == inner]
-        if len(triangles):
-            used, place = np.unique(triangles, return_inverse=True)
-            mesh = pyvista.PolyData.from_regular_faces(
-                picture.points[used], place.reshape(triangles.shape)
-            )
+        chosen = picture.inner == inner
+        if chosen.any():
+            mesh = _polydata(picture, chosen)
             found.append((mesh if inner else mesh.clean(), colour, not inner))
+    if len(picture.lines):
+        used, place = np.unique(picture.lines, return_inverse=True)
+        points = picture.points[used] + _LIFT * view.width * view.towards
+        lines: Any = np.pad(place.reshape(-1, 2), ((0, 0), (1, 0)), constant_values=2)
+        found.append((pyvista.PolyData(points, lines=lines.ravel()), _LINE, False))
     return found
+
+
+def _polydata(picture: Picture, chosen: NDArray[np.bool_]) -> Any:
+    import pyvista
+
+    used, place = np.unique(picture.triangles[chosen], return_inverse=True)
+    return pyvista.PolyData.from_regular_faces(picture.points[used], place.reshape(-1, 3))
 
 
 def beside(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
@@ -224,10 +246,9 @@ def beside(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
 
     found: list[tuple[Any, str, bool]] = []
     if view.underlay is not None:
-        rest = _outer(view.underlay.picture)
-        found.append((rest.translate(-_BED * view.width * view.towards), _FAT, True))
-        if view.underlay.thickness:
-            found += _lips(_outer(frame.picture), rest, view.underlay.thickness, view)
+        found.append((view.underlay.mesh.translate(-_BED * view.width * view.towards), _FAT, True))
+        if view.underlay.thickness and len(frame.picture.lines):
+            found.append((_lips(frame.picture, view.underlay.thickness, view), _FLESH, False))
     for tip, end in frame.blades:
         ends = [np.pad(point, (0, 3 - len(point))) for point in (tip, end)]
         if (ends[0] != ends[1]).any():
@@ -237,43 +258,37 @@ def beside(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
         out = out / (np.linalg.norm(out) or 1.0)
         size = _SHAFT * view.width
         turns = ((-0.05, 0.0), (0.0, -0.03), (0.06, 0.04), (0.3, 0.12), (1.0, 0.3))
-        bent = [np.pad(place, (0, 3 - len(place))) + size * (a * out + b * view.towards)
-                for a, b in turns]  # fmt: skip
+        edge = _on_edge(np.pad(place, (0, 3 - len(place))), frame.picture, view)
+        bent = [edge + size * (a * out + b * view.towards) for a, b in turns]
         found.append((_tube(pyvista.Spline(np.array(bent), 40).points, view), _STEEL, True))
     return found
 
 
-def _outer(picture: Picture) -> Any:
-    """Surface of a body without the faces of its cuts; points that coincide are one."""
+def _on_edge(place: Floats, picture: Picture, view: View) -> Floats:
+    """Find where a hook grips on the lines of cuts: the nearest, of these the one that is seen."""
+    if not len(picture.lines):
+        return place
+    points = picture.points[np.unique(picture.lines)]
+    away = points - place
+    height = away @ view.towards
+    aside = np.linalg.norm(away - height[:, None] * view.towards, axis=1)
+    near = np.flatnonzero(aside <= aside.min() + _LIFT * view.width)
+    return np.asarray(points[near[np.argmax(height[near])]])
+
+
+def _lips(picture: Picture, thickness: float, view: View) -> Any:
+    """Walls of the depth of a membrane below the lines of its cuts."""
     import pyvista
 
-    triangles: Any = picture.triangles[~picture.inner]
-    mesh = pyvista.PolyData.from_regular_faces(picture.points, triangles)
-    mesh["material"] = picture.material
-    return mesh.clean()
-
-
-def _lips(now: Any, rest: Any, thickness: float, view: View) -> list[tuple[Any, str, bool]]:
-    """Walls of the depth of a membrane below the borders that are new."""
-    import pyvista
-
-    def border(mesh: Any) -> Any:
-        return mesh.extract_feature_edges(
-            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
-        )
-
-    mesh = border(now.compute_normals(cell_normals=False, split_vertices=False))
-    if not mesh.n_cells:
-        return []
-    away = cKDTree(border(rest)["material"]).query(mesh["material"])[0]
-    edges = mesh.lines.reshape(-1, 3)[:, 1:]
-    edges = edges[(away[edges] > 1e-9 * view.width).any(axis=1)]
-    if not len(edges):
-        return []
-    normals = mesh["Normals"] * np.where(mesh["Normals"] @ view.towards < 0.0, -1.0, 1.0)[:, None]
-    points = np.concatenate([mesh.points, mesh.points - thickness * normals])
-    walls: Any = np.column_stack([edges, edges[:, ::-1] + len(mesh.points)])
-    return [(pyvista.PolyData.from_regular_faces(points, walls), _FLESH, False)]
+    mesh = pyvista.PolyData.from_regular_faces(picture.points, picture.triangles)
+    mesh = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
+    ends, edges = np.unique(picture.lines, return_inverse=True)
+    edges = edges.reshape(-1, 2)
+    normals = mesh["Normals"][ends]
+    normals = normals * np.where(normals @ view.towards < 0.0, -1.0, 1.0)[:, None]
+    points = np.concatenate([picture.points[ends], picture.points[ends] - thickness * normals])
+    walls: Any = np.column_stack([edges, edges[:, ::-1] + len(ends)])
+    return pyvista.PolyData.from_regular_faces(points, walls)
 
 
 def _tube(points: Any, view: View) -> Any:
@@ -413,7 +428,7 @@ def place_in_sight(picture: Picture, eye: Floats, towards: Floats) -> Floats | N
     return np.asarray(weights @ picture.material[picture.triangles[first]])
 
 
-def stroke_text(path: ToolPath, name: str = "stroke") -> str:
+def stroke_text(path: ToolPath, name: str) -> str:
     """Say a path of a straight blade as a ``[[cuts]]`` of kind ``tool_path``, in TOML."""
     lines = ["[[cuts]]", 'kind = "tool_path"', f'name = "{name}"']
     tips = path.blades[:, 0]
@@ -427,9 +442,9 @@ def stroke_text(path: ToolPath, name: str = "stroke") -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_stroke(path: ToolPath, file: Path, name: str = "stroke") -> None:
-    """Write it into a file, in one step."""
-    write_whole(file, stroke_text(path, name))
+def write_strokes(paths: Sequence[ToolPath], file: Path) -> None:
+    """Write strokes as cuts of a case into a file, in one step."""
+    write_whole(file, "\n".join(stroke_text(p, f"stroke_{n}") for n, p in enumerate(paths, 1)))
 
 
 def _row(values) -> str:  # type: ignore[no-untyped-def]
@@ -440,14 +455,32 @@ def _table(rows) -> str:  # type: ignore[no-untyped-def]
     return "[\n" + "".join(f"    {_row(row)},\n" for row in rows) + "]"
 
 
-def play_in_window(stage: Stage, title: str, stroke_file: Path) -> None:
-    """Play until the window is closed; strokes of the mouse are written to a file as they end."""
+def display_is_open() -> bool:
+    """Whether a window can be opened: without a display VTK draws off-screen and says nothing."""
+    from vtkmodules import vtkRenderingOpenGL2  # noqa: F401 - makes windows
+    from vtkmodules.vtkCommonCore import vtkLogger
+    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    return not re.match(r"vtk(EGL|OS|OSMesa)", vtkRenderWindow().GetClassName())
+
+
+def play_in_window(stage: Stage, title: str, stroke_file: Path) -> tuple[float, int]:
+    """Play until the window is closed; strokes of the mouse are written to a file as they end.
+
+    Returns
+    -------
+    (float, int)
+        Time of the scene then, s, and how many strokes were made.
+    """
     window = PlayWindow(stage, title, stroke_file)
     milliseconds = max(1, round(1e3 * stage.time_step))
     window.plotter.add_timer_event(
         max_steps=10**9, duration=milliseconds, callback=lambda _: window.tick()
     )
     window.plotter.show()
+    window.lift()
+    return window.session.time, len(window.scalpel.finished)
 
 
 class PlayWindow:
@@ -458,7 +491,7 @@ class PlayWindow:
     stage : Stage
     title : str
     stroke_file : Path
-        Where each stroke of the mouse is written as it ends.
+        Where the strokes of the mouse are written, all again as one ends.
     off_screen : bool
         Without a display, for tests: events are then sent to `plotter.iren.interactor`.
 
@@ -467,6 +500,8 @@ class PlayWindow:
     plotter : pyvista.Plotter
     session : Session
     scalpel : LiveScalpel
+    view : View
+        That from which it is looked at first.
     """
 
     def __init__(
@@ -480,13 +515,13 @@ class PlayWindow:
 
         self.session = Session(stage, account=False)
         frame = self._frame()
-        self._view = view = view_of([frame, frame])
+        self.view = view = view_of([frame, frame], skin=stage.skin)
         self.scalpel = LiveScalpel(self.session, _DEPTH * view.width)
         self.plotter: Any = pyvista.Plotter(
             title=title, window_size=list(view.size), off_screen=off_screen
         )
         self.plotter.background_color = pyvista.Color("white")
-        self._stroke_file, self._down = stroke_file, False
+        self._stroke_file, self._down, self._written = stroke_file, False, 0
         self._take_the_mouse()
         look(self.plotter.camera, view)
         self._draw(frame)
@@ -502,18 +537,14 @@ class PlayWindow:
         return Frame(session.time, session.picture(), session.blades(), session.hooks())
 
     def _draw(self, frame: Frame) -> None:
-        self.plotter.clear_actors()
-        for mesh, colour, smooth in [*meshes_of(frame), *beside(frame, self._view)]:
-            self.plotter.add_mesh(
-                mesh, color=colour, smooth_shading=smooth, reset_camera=False, render=False
-            )
+        show(self.plotter, frame, self.view)
         records = self.session.records
         cost = f", step {1e3 * sum(records[-1].seconds.values()):.1f} ms" if records else ""
         self.plotter.add_text(
-            f"{frame.time:.2f} s{cost}{self._force()}\nleft: cut, right: turn, wheel: nearer",
+            f"{frame.time:.2f} s{cost}{self._force()}\n"
+            f"left: cut (into {self._stroke_file.name}), right: turn, wheel: nearer",
             font_size=9, color="black", render=False,
         )  # fmt: skip
-        self.plotter.reset_camera_clipping_range()
 
     def _force(self) -> str:
         """Say what drives the blades that are under way."""
@@ -556,10 +587,14 @@ class PlayWindow:
 
     def _release(self, *_: Any) -> None:
         self._down = False
-        before = len(self.scalpel.finished)
+        self.lift()
+
+    def lift(self) -> None:
+        """End the stroke under way, and write all there are."""
         self.scalpel.lift()
-        if len(self.scalpel.finished) > before:
-            write_stroke(self.scalpel.finished[-1], self._stroke_file)
+        if len(self.scalpel.finished) > self._written:
+            self._written = len(self.scalpel.finished)
+            write_strokes(self.scalpel.finished, self._stroke_file)
 
     def _cut(self) -> None:
         x, y = self.plotter.iren.interactor.GetEventPosition()

@@ -126,6 +126,8 @@ class Stage:
         Of the tissue along each stroke, J/m²; of a membrane times the thickness.
     tolerance : float
         Residual that iterations may leave of the right-hand side of a step.
+    skin : float or None
+        Of a skin, how deep the lips are drawn, m: its thickness if it is a membrane, else 0.
     """
 
     mesh: SimplexMesh
@@ -145,6 +147,7 @@ class Stage:
     opening: str = "swept"
     toughness: list[float | None] = field(default_factory=list)
     tolerance: float = 1e-10
+    skin: float | None = None
 
     @cached_property
     def smoothing(self) -> float:
@@ -315,6 +318,7 @@ def stage_of(scene: Scene, level: int = 0) -> Stage:
             tool_force=replay.tool_force if replay else 0.0,
             opening=analysis.opening,
             toughness=[c.toughness and c.toughness * thickness for c in scene.cuts],
+            skin=scene.material.thickness or 0.0 if isinstance(scene.geometry, Skin) else None,
         )
     except XfemError as error:
         raise InputError(str(error), where) from None

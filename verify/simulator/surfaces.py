@@ -30,12 +30,16 @@ class Picture:
     triangles : (f, 3) int array
     inner : (f,) bool array
         Whether a triangle lies on a cut.
+    lines : (l, 2) int array
+        Edges along which cuts meet the surface that is seen, open or closed.
     """
 
-    def __init__(self, points: Floats, material: Floats, triangles: Ints, inner: Bools) -> None:
+    def __init__(
+        self, points: Floats, material: Floats, triangles: Ints, inner: Bools, lines: Ints
+    ) -> None:
         beyond = ((0, 0), (0, 3 - points.shape[1]))
         self.points, self.material = np.pad(points, beyond), np.pad(material, beyond)
-        self.triangles, self.inner = triangles, inner
+        self.triangles, self.inner, self.lines = triangles, inner, lines
 
 
 class Surfaces:
@@ -69,6 +73,9 @@ class Surfaces:
             for k, begin, end in zip(numbers, begins, begins[1:], strict=False):
                 found[k] = embedded.surface.of_owners(begin, end)
         self.shown, self.touchable = found
+        if stage.mesh.space == 3:
+            uncut = self.shown.facets.rows[self.shown.used]
+            self._rim = self.shown.material.rows[_borders(uncut)]
 
     def update(self, increment: Increment) -> None:
         """Let them follow a cut."""
@@ -86,9 +93,12 @@ class Surfaces:
 
     def picture(self, phantom: PhantomMesh, displacement: Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
-        if phantom.mesh.space == 2:
-            return _pieces(phantom, displacement)
         inside = self.material.surface
+        if phantom.mesh.space == 2:
+            cut = inside.facets.rows[inside.used[inside.inner.rows[inside.used]]]
+            ends = cut.ravel()
+            lines = inside.positions(displacement)[ends], inside.material.rows[ends]
+            return _pieces(phantom, displacement, *lines)
         parts = [(inside, inside.used)]
         if self.shown is not inside:
             shown = inside.used[inside.inner.rows[inside.used]]
@@ -101,11 +111,36 @@ class Surfaces:
             triangles.append(corners.reshape(-1, inside.facets.rows.shape[1]) + begin)
             inner.append(surface.inner.rows[used] & (number == 0))
             begin += len(vertices)
-        return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
+        drawn = [np.concatenate(rows) for rows in (points, material, triangles, inner)]
+        return Picture(*drawn, self._lines(drawn[1], drawn[2][~drawn[3]]))
+
+    def _lines(self, material: Floats, skin: Ints) -> Ints:
+        """Edges (l, 2) along which cuts meet the skin: its borders that are not on its rim.
+
+        Vertices are doubled where, and only where, the skin is parted.
+        """
+        edges = _borders(skin)
+        if not len(edges) or not len(self._rim):
+            return edges
+        middle, (a, b) = material[edges].mean(axis=1)[:, None], np.moveaxis(self._rim, 1, 0)
+        along = b - a
+        share = np.einsum("qrs,rs->qr", middle - a, along) / np.einsum("rs,rs->r", along, along)
+        nearest = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
+        away = np.linalg.norm(middle - nearest, axis=2).min(axis=1)
+        return np.asarray(edges[away > 1e-9 * np.ptp(material, axis=0).max()])
 
 
-def _pieces(phantom: PhantomMesh, displacement: Floats) -> Picture:
-    """Draw a plane body: its whole triangles and the parts of the split ones."""
+def _borders(triangles: Ints) -> Ints:
+    """Edges (l, 2) that belong to one triangle only."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    found, count = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(found[count == 1])
+
+
+def _pieces(
+    phantom: PhantomMesh, displacement: Floats, lines: Floats, lines_material: Floats
+) -> Picture:
+    """Draw a plane body: its whole triangles, the parts of the split ones, lines (2l, 2)."""
     piece, at, _ = phantom.solid_simplices
     corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
     turned = np.linalg.det(at) < 0.0  # sub-simplices come in the order of their numbers
@@ -115,7 +150,10 @@ def _pieces(phantom: PhantomMesh, displacement: Floats) -> Picture:
         np.einsum("qki,qis->qks", at, x).reshape(-1, corners.shape[2]) for x in (moved, corners)
     )
     triangles = np.arange(len(now)).reshape(-1, 3)
-    return Picture(now, before, triangles, np.zeros(len(triangles), dtype=bool))
+    return Picture(
+        np.concatenate([now, lines]), np.concatenate([before, lines_material]), triangles,
+        np.zeros(len(triangles), dtype=bool), len(now) + np.arange(len(lines)).reshape(-1, 2),
+    )  # fmt: skip
 
 
 _ROUND_OFF = 16.0 * np.finfo(float).eps  # of positions: what touches exactly is touched
