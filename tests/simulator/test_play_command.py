@@ -71,7 +71,8 @@ def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played
     assert stroke == stroke_text(scalpel.finished[0], "stroke_1")
     begin, end = text.index("[[cuts]]"), text.index("[analysis]")
     again = tmp_path / "again.toml"
-    again.write_text(text[:begin] + stroke + "\n" + text[end:], encoding="utf-8")
+    pulls = text[end:].replace('cut = "first"', 'cut = "stroke_1"')
+    again.write_text(text[:begin] + stroke + "\n" + pulls, encoding="utf-8")
     replayed = Session(stage_of(load_scene(again)))
     while replayed.time < session.time:
         replayed.step()

@@ -111,8 +111,8 @@ class Surfaces:
             triangles.append(corners.reshape(-1, inside.facets.rows.shape[1]) + begin)
             inner.append(surface.inner.rows[used] & (number == 0))
             begin += len(vertices)
-        drawn = [np.concatenate(rows) for rows in (points, material, triangles, inner)]
-        return Picture(*drawn, self._lines(drawn[1], drawn[2][~drawn[3]]))
+        at, before, corner, on_cut = map(np.concatenate, (points, material, triangles, inner))
+        return Picture(at, before, corner, on_cut, self._lines(before, corner[~on_cut]))
 
     def _lines(self, material: Floats, skin: Ints) -> Ints:
         """Edges (l, 2) along which cuts meet the skin: its borders that are not on its rim.
