@@ -237,7 +237,8 @@ def _polydata(picture: Picture, chosen: NDArray[np.bool_]) -> Any:
     import pyvista
 
     used, place = np.unique(picture.triangles[chosen], return_inverse=True)
-    return pyvista.PolyData.from_regular_faces(picture.points[used], place.reshape(-1, 3))
+    triangles: Any = place.reshape(-1, 3)
+    return pyvista.PolyData.from_regular_faces(picture.points[used], triangles)
 
 
 def beside(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
@@ -280,7 +281,8 @@ def _lips(picture: Picture, thickness: float, view: View) -> Any:
     """Walls of the depth of a membrane below the lines of its cuts."""
     import pyvista
 
-    mesh = pyvista.PolyData.from_regular_faces(picture.points, picture.triangles)
+    triangles: Any = picture.triangles
+    mesh = pyvista.PolyData.from_regular_faces(picture.points, triangles)
     mesh = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
     ends, edges = np.unique(picture.lines, return_inverse=True)
     edges = edges.reshape(-1, 2)
