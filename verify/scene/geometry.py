@@ -29,6 +29,7 @@ from verify.scene.strict import (
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 #: before the name of a group of a mesh file, in a text that says where
 GROUP = "group:"
@@ -324,7 +325,7 @@ class MeshLevels(Strict):
         given = self.pattern == "given"
         return 1 + self.refine if given else len(self.sizes or self.cells or [])
 
-    def divisions(self, body: Rectangle | Box, level: int) -> Array:
+    def divisions(self, body: Rectangle | Box, level: int) -> Ints:
         """Numbers of elements along each axis of a structured mesh, (d,) int."""
         if self.cells is not None:
             counts = np.array(self.cells[level])
@@ -332,7 +333,7 @@ class MeshLevels(Strict):
             assert self.sizes is not None
             sides = np.subtract(body.upper, body.lower)
             # a size that divides the side up to round-off is that size
-            counts = np.ceil(sides / self.sizes[level] * (1 - 1e-9)).astype(int)
+            counts = np.ceil(sides / self.sizes[level] * (1 - 1e-9)).astype(np.int64)
         return counts + mesh_position(self.position).more
 
 
