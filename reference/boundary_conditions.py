@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 _OPEN = 1e-12  # of the spread of the points: what they leave open is turned as little as possible
 _SMALL = 1e-2  # angle below which the linear response to a turn serves
 Ints = NDArray[np.int64]
-# marks of the faces of cuts in a measure, beyond those of the loads on the boundary
+# marks of the faces of cuts in a measure, beyond the marks of loads on the boundary
 _FACE = 1_000_000
 _PART = 2_000_000  # and of facets in which loads end
 _WHOLE = 1e-12  # of a facet: what may be left of one that is loaded as a whole
-_DEGREE = 8  # of the rule for what is integrated over pieces of facets
+_DEGREE = 8  # of the rule over pieces of facets
 
 
 def constrained_values(
@@ -93,7 +93,7 @@ def nodes_on_part(
 
 
 def support_ends(scene: Scene, space: ConformingSpace, size: float) -> list[Regularisation]:
-    """Report where supports hold more than their parts; `size` is that of the elements, m."""
+    """Report where supports hold more than their parts; `size` is the element size, m."""
     corners = space.boundary_facets[1]
     ended = [s.where for s in scene.supports if not scene.geometry.holds_inside(s.where)]
     return shifted_ends([held_facets(scene.geometry, where, corners) for where in ended], size)
@@ -229,11 +229,11 @@ class LoadedFacets(NamedTuple):
     Attributes
     ----------
     whole : (w,) int array
-        Those on all of which it acts, as rows of the mesh's `boundary`.
+        Facets on all of which it acts, as rows of the mesh's `boundary`.
     ended : (e,) int array
-        Those in which it ends.
+        Facets in which it ends.
     pieces : Pieces
-        What is loaded of the latter; `facet` counts rows of `boundary`.
+        Loaded parts of the latter; `facet` counts rows of `boundary`.
     """
 
     whole: Ints
@@ -316,7 +316,7 @@ def _parted(
 ) -> Iterator[tuple[int, NDArray[np.int32], Any]]:
     """Facets in which a load ends, with their densities: corner opposite, pairs and a function.
 
-    Those of one function are opposite to the same corner: no cell has two of them.
+    Facets of one function are opposite to the same corner: no cell has two of them.
     """
     from dolfinx import fem
 
@@ -419,9 +419,9 @@ def density_on_whole(
 ) -> Array:
     """Force per area on whole facets that does the work of a traction on pieces of them.
 
-    It is the polynomial of the space's degree with the same integrals against all shape functions:
-    what is loaded is the piece itself, though forms are integrated over facets. All facets must be
-    opposite to the same corner.
+    It is the polynomial of the space's degree with the same integrals against all shape functions.
+    So the load acts on the piece itself, though forms are integrated over facets. All facets must
+    be opposite to the same corner.
 
     Returns
     -------
@@ -474,7 +474,7 @@ def _values(
 def _facet_shapes(barycentric: Array, edges: list[tuple[int, int]]) -> Array:
     """Shape functions (…, q) of a facet at barycentric coordinates (…, k).
 
-    Those of the corners, and of the middles of edges in a quadratic one.
+    Functions of the corners, and in a quadratic space of the middles of edges.
     """
     if not edges:
         return barycentric

@@ -4,11 +4,11 @@ The gap g = (u₊ − u₋)·n at the doubled nodes of a cut is not negative, th
 neither, and p g = 0. Pressures are linear over facets, with a value at each doubled corner; the gap
 that belongs to one is weighted by its hat function. Of linear elements that is one value per node
 (the rule of the corners); of quadratic ones it is the pair P2/P1, which is stable (S. Hüeber, M.
-Mair, B. Wohlmuth, Appl. Numer. Math. 54, 2005). Where a facet has corners at a tip, their share of
-the pressure is that of its other corners, so that a uniform pressure is one.
+Mair, B. Wohlmuth, Appl. Numer. Math. 54, 2005). Corners of a facet at a tip have the pressure of
+its other corners, so that a uniform pressure is one.
 
-With weighted gaps B u, forces on the nodes are Bᵀ p, and the pressures solve a complementarity
-problem of the dense compliance S = B A⁻¹ Bᵀ, A the matrix of the body with its cuts open.
+With weighted gaps B u, forces on the nodes are Bᵀ p. The pressures solve a complementarity problem
+of the dense compliance S = B A⁻¹ Bᵀ. A is the matrix of the body with its cuts open.
 """
 
 from collections.abc import Callable
@@ -28,8 +28,8 @@ _BLOCK = 64  # right sides that are solved for at once
 _MOST = 100  # changes of the active set, far more than any took
 _ROUND_OFF = 1e-12  # of the largest gap without pressures
 
-# Integrals over a facet, per its size, of the hat of a corner times the quadratic function of that
-# corner, another corner, the middle of an edge at the corner, and that of another edge
+# Integrals over a facet, per its size, of the hat of a corner times a quadratic function: of the
+# corner, another corner, the middle of an edge at the corner, the middle of another edge
 _HAT = {1: (1 / 6, 0.0, 1 / 3, 0.0), 2: (1 / 30, -1 / 60, 2 / 15, 1 / 15)}
 
 
@@ -124,7 +124,7 @@ def _shares(
     """Integrals (f, q, q) of pressures times functions of nodes, and of pressures (f, q).
 
     Per size of the facet. Corners whose gap is prescribed, not `moves` (f, q), give their hat to
-    those of the facet that have one of their own.
+    the other corners of the facet.
     """
     ends = space.edge_ends[facing[:, :, 0]]
     own = facing[:, :, 0]

@@ -9,20 +9,20 @@ to the rotation next to F, and the least stretch is negative). Differentiated, i
 
     R = ∂s/∂F = ((s² + I₁) F + 2 s cof F − 2 F C) / (s³ − I₁ s − 2 J),
 
-whose denominator is twice the product of all sums of two principal stretches. So the numbers s at
-the quadrature points, found by Newton's method, and this rational formula do for a form and, by the
-chain rule, for its derivative.
+whose denominator is twice the product of all sums of two principal stretches. Newton's method finds
+the numbers s at the quadrature points. They and this rational formula give a form and, by the chain
+rule, its derivative.
 
-On a membrane, with the projection P on the tangent plane of a triangle in space and F = P + ∇u,
-whose gradient is tangential, the two stretches in the plane have J² = ½ (I₁² − tr C²), and
+On a membrane let P be the projection on the tangent plane of a triangle in space. F = P + ∇u with a
+tangential gradient. The two stretches in the plane have J² = ½ (I₁² − tr C²), and
 
     s = √(I₁ + 2 J),    U = (C + J P) / s,    R = F U⁻¹,    U⁻¹ = (s P − U) / J.
 
 R takes the tangent plane to the deformed one without stretch. There is no det F with a sign: a
 membrane has no bending stiffness, and one folded over is as good as turned.
 
-All of it is written in H = ∇u, with what is 1 or I at rest taken out by hand: strains and forces
-are right to round-off of H, and not of F, so that a load of 1e-12 of Young's modulus is solved as
+All of it is written in H = ∇u; terms that are 1 or I at rest are taken out by hand. Strains and
+forces are right to round-off of H, and not of F. So a load of 1e-12 of Young's modulus is solved as
 well as any other.
 """
 
@@ -158,7 +158,7 @@ class Deformation:
         gradient, d = ufl.grad(of), self._dimension
         if len(of) == d:
             return gradient
-        # not that of a part split off: UFL does not differentiate it along its own direction
+        # not of a part split off: UFL does not differentiate it along its own direction
         return ufl.as_tensor([[gradient[i, j] for j in range(d)] for i in range(d)])
 
 
@@ -242,7 +242,7 @@ class PolarStretch(Deformation):
 class MembraneStretch(Deformation):
     """Deformation of triangles in space, with its rotation and stretch in the tangent planes.
 
-    F, R and `away` are of rank 2, as those of `PolarStretch` else; F = P + H.
+    F, R and `away` are of rank 2, otherwise as in `PolarStretch`; F = P + H.
 
     Attributes
     ----------

@@ -1,9 +1,9 @@
 """Body in motion, as a scene states it: mass, elasticity, loads, supports, and cuts that open.
 
-When facets open, a group of nodes that were tied falls into several. Each node is held on by the
-force r = M a − f that it was held by before (f: loads less internal and viscous forces), multiplied
-by what is not swept yet of the cut in its support. The sum over the group is zero, as its forces
-were in balance: momentum is kept, and no acceleration jumps.
+When facets open, a group of tied nodes divides into several. On each node the tie force of before,
+r = M a − f, goes on to act (f: loads less internal and viscous forces). It is multiplied by the
+share of the cut in the node's support that is not swept yet. The sum over the group is zero, as its
+forces were in balance: momentum is kept, and no acceleration jumps.
 """
 
 from collections.abc import Callable
@@ -71,7 +71,7 @@ class FacetOpenings(NamedTuple):
         facing : (f, q, 2) int array
             Pairs of nodes that face each other across each facet.
         due : (f, q) bool array
-            Which have just opened. Where those of several cuts have, it is the first.
+            Pairs that have just opened. Where pairs of several cuts have, it is the first cut.
         """
         pairs = np.unique(np.column_stack([before, after]), axis=0)
         nodes = np.flatnonzero((np.bincount(pairs[:, 0], minlength=len(before)) > 1)[before])
@@ -104,7 +104,7 @@ class TieForces:
         self._shape, self._releases = (cuts, *shape), list[Release]()
 
     def add(self, release: Release, time: float) -> None:
-        """Add those of a release at a time, and drop those that have faded."""
+        """Add the forces of a release at a time, and drop forces that have faded."""
         self._releases = [one for one in self._releases if one.factor(time).any()]
         self._releases.append(release)
 
@@ -125,10 +125,10 @@ def facet_openings(
 ) -> FacetOpenings:
     """Find when each facet of the cut opens.
 
-    Those of a cut open with it. One on a tool path opens when the blade has passed all of it, the
-    last of its corners; or if `swept` at each node as the first facet there begins to be swept. A
-    facet belongs to the cut that it is closest to: one on a curved cut is
-    off by its own sagitta, and cuts do not lie on each other.
+    Facets of a cut open with it. A facet on a tool path opens when the blade has passed the last of
+    its corners; if `swept`, at each node as the first facet there begins to be swept. A facet
+    belongs to the cut that it is closest to: one on a curved cut is off by its own sagitta, and
+    cuts do not lie on each other.
 
     Parameters
     ----------
@@ -174,8 +174,8 @@ def _passed_at(cut: ToolPathCut, delay: float, points: Array) -> Array:
 def _weights(corners: Array, nodes: Array) -> Array:
     """Weights (f, d, q) of the nodes (f, q, d) of facets at their corners.
 
-    That of the corner a node is at; of one between two corners both, the same as N over a segment
-    but for its shape, and never negative.
+    A node at a corner has the hat of the corner. A node between two corners has both hats: as N
+    over a segment except for the shape, and never negative.
     """
     away = np.linalg.norm(corners[:, :, None] - nodes[:, None], axis=3)
     size = away.max(axis=(1, 2), keepdims=True)
@@ -246,7 +246,7 @@ class MovingBody:
     scene : Scene
     space : ConformingSpace
     exact : ExactSolution or None
-        For supports and loads that are said to be exact.
+        For supports and loads that take the exact solution.
     pressure : bool
         Whether a linear law has the pressure as an unknown.
 
@@ -260,17 +260,17 @@ class MovingBody:
     weight : (k,) array
         Dead load of gravity, N.
     ties : TiedUnknowns
-        Of all unknowns of the law: what of the cut is still closed.
+        Of all unknowns of the law: the closed part of the cut.
     held : (h,) int array
         Unknowns with a prescribed motion, ascending: also those that are tied to such.
     tie_forces : TieForces
-        On what the cut has released.
+        On nodes that the cut has released.
     contact : FaceContact or None
         Of a scene with contact.
     pressure : (m,) array
         On its faces in the last step, or in the initial equilibrium, Pa.
     pressure_before : (m,) array
-        That of the step before.
+        Pressure of the step before.
 
     Raises
     ------
@@ -340,7 +340,7 @@ class MovingBody:
         return total
 
     def prescribed(self, time: float) -> tuple[Array, Array]:
-        """Displacements and velocities (h,) of what is held, m and m/s."""
+        """Return displacements and velocities (h,) of held unknowns, m and m/s."""
         values, rates = [], []
         for one in self._supports:
             values.append(one.values(factor_at(one.support.history, time), time))
@@ -375,8 +375,8 @@ class MovingBody:
     def accelerations(self, forces: Array) -> Array:
         """Solve M a = forces, with a = 0 where held.
 
-        By conjugate gradients: over its diagonal a consistent mass has a condition of a few tens,
-        whatever the mesh, and no factorisation lasts longer than until a facet opens.
+        By conjugate gradients: scaled by its diagonal a consistent mass has a condition number of a
+        few tens, whatever the mesh. A factorisation would last only until a facet opens.
 
         Raises
         ------
@@ -406,7 +406,7 @@ class MovingBody:
     def iterates(self) -> bool:
         """Whether symmetric systems of a step begin by conjugate gradients.
 
-        Those of solids, unless they are small; with a pressure they are indefinite.
+        Matrices of solids are, unless they are small; with a pressure they are indefinite.
         """
         solid = self.space.mesh.cell_dimension == 3
         return bool(
@@ -515,7 +515,7 @@ class MovingBody:
         return found
 
     def _filled(self, values: list[Array]) -> Array:
-        """Values (h,) of what is held; a later support wins."""
+        """Collect values (h,) of held unknowns; a later support wins."""
         filled = np.zeros(self.space.node_points.shape)
         for one, value in zip(self._supports, values, strict=True):
             filled[one.place] = value

@@ -42,8 +42,8 @@ _JUST = 1e-12  # of the step: loads are taken that much inside of it, on their s
 class Scheme:
     """Parameters of one-step schemes with one unknown acceleration a₊.
 
-    M a_{n+1−α_m} + C v_{n+1−α_f} + K u_{n+1−α_f} = f, where n+1−α is (1−α)·new + α·old, with
-    u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
+    M a_{n+1−α_m} + C v_{n+1−α_f} + K u_{n+1−α_f} = f, where n+1−α is (1−α)·new + α·old. The ends
+    are u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
     """
 
     alpha_m: float
@@ -100,7 +100,7 @@ class StepForces:
     viscous: Array
     inertia: Array
     tie: Array  # (cuts, k) of the external ones, those on what each cut has released
-    contact: Array | float = 0.0  # of the external ones, those of faces that press on each other
+    contact: Array | float = 0.0  # part of the external forces: between faces in contact
 
     @property
     def residual(self) -> Array:
@@ -116,9 +116,9 @@ class Stepper:
     body : MovingBody
     scheme : Scheme
     averaged : bool
-        Whether the internal force is the mean over the step (energy–momentum) and other forces
-        are those in its middle; else all are weighted means of those at its ends. The scheme
-        must then be that of spectral radius 1.
+        Whether the internal force is the mean over the step (energy–momentum) and other forces are
+        taken in its middle. The scheme must then have spectral radius 1. Otherwise all are weighted
+        means of the forces at its ends.
     size : float
         Δt, s.
 
@@ -182,12 +182,12 @@ class Stepper:
     def restart(self, state: State, forces: Array) -> None:
         """Give a state, of which something has jumped, an acceleration to go on with.
 
-        That which balances the forces is c/m v of a mode whose damping c, of the stiffness, is
-        suddenly out of balance. If c Δt ≫ m the mode has long settled within the step; a scheme
-        that weighs the old acceleration by itself (α_m ≠ α_f) throws it by Δt² c/m v, the more
-        the finer the mesh. The matrix of the step, (1 − α_m) M + (1 − α_f)(γ Δt C + β Δt² K),
-        stands for (1 − α_m) M instead: the same to O(Δt) where a mode is resolved, so that the
-        order stays; bounded by v/Δt where it is not.
+        The acceleration that balances the forces is c/m v in a mode whose damping c, of the
+        stiffness, is suddenly out of balance. If c Δt ≫ m the mode has long settled within the
+        step; a scheme that weighs the old acceleration by itself (α_m ≠ α_f) throws it by Δt² c/m
+        v, the more the finer the mesh. The matrix of the step, (1 − α_m) M + (1 − α_f)(γ Δt C + β
+        Δt² K), replaces (1 − α_m) M. In a resolved mode both agree to O(Δt), so that the order
+        stays; in others the acceleration is bounded by v/Δt.
 
         Parameters
         ----------
@@ -206,7 +206,7 @@ class Stepper:
     def _first(self, start: State, share: float = 1.0) -> Array:
         """Acceleration at which Newton's method starts: the body travels on as in the last step.
 
-        Not by Δt v: what is stiff rings, its velocity changes sign with every step and cancels in
+        Not by Δt v: stiff modes ring, their velocity changes sign with every step and cancels in
         the mean over one. Nor by the acceleration, which a jump of the loads leaves behind:
         elements smaller than Δt² a would begin inside out.
         """
@@ -435,9 +435,7 @@ class Ledger:
 class ShortWaves:
     """Kinetic energy of motions of periods up to 4h/c at the end, c the speed of shear waves.
 
-    That of the velocity less its mean over the last such period, and less the mean of that over
-    each part of the body, which falls or swings as a whole; averaged over the period.
-    `verify.compare.hooke.short_wave_energy` has the same of output times.
+    `verify.compare.hooke.short_wave_energy` defines it, and has the same from output times.
     """
 
     def __init__(self, body: MovingBody, size: float) -> None:
@@ -448,7 +446,7 @@ class ShortWaves:
         self._recent: deque[tuple[float, Array]] = deque()
 
     def enter(self, state: State) -> None:
-        """Take the velocity at the end of a step, and forget those of earlier periods."""
+        """Take the velocity at the end of a step, and forget earlier periods."""
         self._recent.append((state.time, state.velocity))
         while self._recent[0][0] <= state.time - self.period * (1 - 1e-9):
             self._recent.popleft()

@@ -36,8 +36,8 @@ LEAST_POISSON = 0.45
 # Unknowns in space up to which MUMPS was measured to be quicker (in the plane it always is)
 _MOST_DIRECT = 30_000
 _MOST_DIRECT_MIXED = 60_000
-# Volume over that of a cube of the longest edge, below which a cell is flat: one of a regular
-# tetrahedron has 0.12, those of a split cube 0.03
+# Volume over the cube of the longest edge, below which a cell is flat: a regular tetrahedron has
+# 0.12, tetrahedra of a split cube 0.03
 _FLAT = 0.01
 
 
@@ -96,7 +96,7 @@ def solve_linear(
     scene : Scene
     space : ConformingSpace
     exact : ExactSolution or None
-        For supports and loads that are said to be exact.
+        For supports and loads that take the exact solution.
     method : {"direct", "multigrid"}, optional
         MUMPS, or CG with multigrid (with a pressure MINRES with GAMG); default by
         the number of unknowns.

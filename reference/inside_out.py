@@ -1,8 +1,8 @@
 """Places at which a solve fails: inverted cells, and supports that hold too weakly.
 
 The corotated energy has no barrier at det F = 0. At a tip, a re-entrant corner or the end of a
-support its strains are unbounded, so that det F ≤ 0 in a small zone around such a place is a
-property of the law: the zone keeps its size when the mesh is refined. Anywhere else it is an error.
+support its strains are unbounded. Therefore det F ≤ 0 in a small zone around such a place is a
+property of the law: refinement does not shrink the zone. Anywhere else it is an error.
 """
 
 from collections.abc import Iterator

@@ -1,11 +1,11 @@
 """FEniCSx and gmsh as installed: probes, versions' differences, cache of forms, MPI ranks.
 
 ``python -m reference.installation NAME`` probes one of them and prints one line of JSON: each probe
-runs in a process of its own, because what is half installed may crash or hang instead of failing.
+runs in a process of its own, because a broken installation may crash or hang instead of failing.
 
 FFCx makes an empty file ``NAME.c``, compiles, and adds ``NAME.c.cached`` at the end. If it is
-killed in between, every later process waits for the end and fails. Here whoever compiles holds a
-lock on ``NAME.lock``, which the system releases when it dies.
+killed in between, every later process waits for the end and fails. Here the process that compiles
+holds a lock on ``NAME.lock``, which the system releases when it dies.
 """
 
 import fcntl

@@ -36,7 +36,7 @@ _MOST_ITERATIONS = 25
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
 # A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
-# Tangents, not forces, are those of a tension of so much μ more, falling with Newton's iterations.
+# Tangents, not forces, get a tension of so much μ more, falling with Newton's iterations.
 _TENSION = (1.0, 0.1)
 _LINEAR = 1e-6  # of the residual: what a linear solve by multigrid leaves
 _SMALLEST_STEP = 1e-4
@@ -44,7 +44,7 @@ _SMALLEST_STEP = 1e-4
 _MOST = {"accepted steps": 100, "refused steps": 50, "Newton iterations": 1000}
 _SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
 _FINER = 2.7  # steps of a second path: another, but no multiple of the first
-_NEAR = 0.25  # of the displacement: so close to that of linear elements is the same equilibrium
+_NEAR = 0.25  # of the displacement: so close to linear elements it is the same equilibrium
 _SAME = 1e-6  # of the energy, between two paths
 
 
@@ -113,9 +113,9 @@ class StrainEquations:
     def advance(self, target: float, values: Array, is_short: bool = False) -> str:
         """Go to another load factor; say why not, or nothing.
 
-        A state counts if its energy is that before and the work of reactions and loads on the way,
-        by the trapezoidal rule up to a quarter. Less may be stored by what snaps through in a short
-        step, and under dead loads.
+        A state counts if its gain of energy is the work of reactions and loads, by the trapezoidal
+        rule up to a quarter. A body that snaps through in a short step may store less, and so may
+        one under dead loads.
 
         Parameters
         ----------
@@ -278,7 +278,7 @@ class StrainEquations:
             self._cycle.update(self._matrix)
 
     def _follow(self, values: Array) -> None:
-        """Let pieces turn with their supports; what is left is the linear response's."""
+        """Let pieces turn with their supports; the rest is left to the linear response."""
         displacement = self.displacement()
         moved = self._motions.follow(displacement, values)
         if moved is None:
@@ -311,7 +311,7 @@ class StrainEquations:
         linear = self._solver.getKSP()
         linear.setOperators(self._matrix)
         self._renew_cycle()
-        if self._unproven:  # at rest: what is held too weakly shows as in linear statics
+        if self._unproven:  # at rest: a body held too weakly shows as in linear statics
             solve_directly(linear, self._matrix, increment, vector)
             self._unproven = False
         else:
@@ -423,7 +423,7 @@ class LargeStrainSolve:
     timings : dict of str to float
         Seconds.
     nested : bool
-        Whether the load steps are those of linear elements on the same mesh.
+        Whether linear elements on the same mesh took the load steps.
     """
 
     displacement: Array
@@ -452,12 +452,12 @@ def solve_large_strain(
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
 
-    In each step every piece follows the rigid motion of its supports first, and then the linear
-    response to what is left; then PETSc's Newton with line search. A step that does not converge,
-    turns too much inside out, or stores what neither its supports nor its loads could have paid for
-    is halved. An end whose tangent is not positive definite is sought again in smaller steps; the
-    stable one of two ends counts, and an unstable one only where cells inside out leave the energy
-    without a tangent and both paths end there.
+    In each step every piece follows the rigid motion of its supports first, then the linear
+    response to the rest; PETSc's Newton with line search follows. A step is halved if it does not
+    converge, inverts too much, or stores more energy than supports and loads supplied. An end whose
+    tangent is not positive definite is sought again in smaller steps. The stable one of two ends
+    counts. An unstable one counts only where inverted cells leave the energy without a tangent and
+    both paths end there.
 
     Parameters
     ----------
@@ -560,7 +560,7 @@ def _nested(problem: _Problem, first_step: float) -> LargeStrainSolve | None:
         equations = problem.equations()
         begin = linear.refined(coarse.displacement)
         refused = equations.begin(begin, problem.prescribed(1.0))
-    except RuntimeError:  # said by the path of the quadratic elements
+    except RuntimeError:  # as the path of the quadratic elements will report
         return None
     found = _state(equations, coarse.steps, coarse.refused_steps)
     moved = np.linalg.norm(found.displacement - begin)

@@ -1,25 +1,25 @@
 """Laws of elasticity: an energy in UFL, whose derivatives are forces and tangents.
 
-The density is μ S + ½ λ θ², of a measure S of the shape and θ of the volume. With the pressure
-p = λ θ as an unknown of its own it is μ S + p θ − p² / 2λ, stationary in p: with quadratic
-displacements and linear pressures the error is bounded evenly in λ (Brezzi & Fortin, Mixed and
-Hybrid Finite Element Methods, 1991, VI). Statics and motions use the same law.
+The density is μ S + ½ λ θ², of a measure S of the shape and θ of the volume. With the pressure p =
+λ θ as an unknown of its own it is μ S + p θ − p² / 2λ, stationary in p. With quadratic
+displacements and linear pressures the error is bounded uniformly in λ. Source: Brezzi & Fortin,
+Mixed and Hybrid Finite Element Methods, 1991, VI. Statics and motions use the same law.
 
 A step-averaged force of the energy–momentum scheme is a discrete gradient of the energy: its work
 over a step is the change of the stored energy, and it turns nothing, whatever the step (Simo &
 Tarnow, ZAMP 43, 1992; Gonzalez, CMAME 190, 2000). The linear one is the force at the mean
-displacement. The corotated density is μ (tr C − 2 s + d) + ½ λ (s − d)² with s = tr U, of which
-tr C is quadratic in F, so that its mean stress is that of F̄, the mean of both deformation
-gradients. The rest is
+displacement. The corotated density is μ (tr C − 2 s + d) + ½ λ (s − d)² with s = tr U. As tr C is
+quadratic in F, its mean stress is the stress of F̄, the mean of both deformation gradients. The
+rest is
 
     s₁ − s₀ = D : (F₁ − F₀),   D F̄ᵀ symmetric,
 
 which leaves the stress 2 μ (F̄ − D) + ½ λ (s₀ + s₁ − 2 d) D. In the plane s² = q = tr C + 2 det F
-is quadratic and blind to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² =
-Ū (U₁ − U₀) + (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁), so that D = F̄ Ū⁻¹: exact, not 0/0
-at rest, and without a quadrature over the step. It asks for a regular Ū: a cell that is pressed
-through zero volume at a mean stretch of zero has no such mean force. On a membrane alike: there U
-is the stretch within the tangent planes.
+is quadratic and invariant to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² = Ū (U₁ − U₀)
++ (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁). So D = F̄ Ū⁻¹: exact, not 0/0 at rest, and
+without a quadrature over the step. It needs a regular Ū: a cell that is pressed through zero volume
+at a mean stretch of zero has no such mean force. On a membrane alike: there U is the stretch within
+the tangent planes.
 
 The neo-Hookean density is ½ μ (tr C − d) + H(J): μ F̄ + (H₁ − H₀)/(J₁ − J₀) D, and D as above of J
 in place of s. In the plane J is quadratic: D = cof F̄. In space J² = det C is cubic in C: D =
@@ -105,7 +105,7 @@ def stable_neo_hookean(state: Deformation) -> Strain:
 
 @dataclass(frozen=True)
 class Energy:
-    """What is known of an energy.
+    """Properties of an energy.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class Law:
     mu : ufl expression
         Times the thickness of a membrane.
     work : ufl form
-        Virtual work of the internal forces; of a pressure, that of the saddle point.
+        Virtual work of the internal forces; with a pressure, of the saddle point.
     stiffness : ufl form
         Its derivative.
     test, trial : ufl arguments

@@ -219,7 +219,7 @@ def solve_by_multigrid(
     space : ConformingSpace
         Of the displacements, which are the unknowns.
     tolerance : float
-        Of the true residual, relative to that of the start.
+        Of the true residual, relative to the start.
     flat : int array, optional
         Unknowns of flat cells that this process owns, by their numbers in the matrix.
 
@@ -302,7 +302,7 @@ class Cycle:
             matrix.PtAP(self._linear, self._below)
 
     def set(self, solver: Any) -> None:
-        """Let a PETSc KSP be preconditioned by the cycle, its norm that of the true residual."""
+        """Let the cycle precondition a PETSc KSP, with the norm of the true residual."""
         if not self._entries:
             set_multigrid(solver)
             return
@@ -389,7 +389,7 @@ def solve_saddle(
     mixed : Unknowns
         Of `mixed_unknowns`.
     tolerance : float
-        Of the true residual, relative to that of the start.
+        Of the true residual, relative to the start.
 
     Raises
     ------
@@ -444,17 +444,17 @@ def iterate(
 ) -> Answer:
     """Start an iterative solver from x again and again until the true residual is small.
 
-    Small is what is asked, or what round-off of K x leaves: of a thin body that bends the products
-    are many orders larger than the loads. Then the last run has to change x by little.
+    Small means within the tolerance, or within round-off of K x: in a thin body that bends the
+    products are many orders larger than the loads. Then the last run has to change x by little.
 
     Parameters
     ----------
     solver, matrix, x, vector : PETSc KSP, Mat and Vecs
     tolerance : float
-        Of the true residual, relative to that of the start.
+        Of the true residual, relative to the start.
     aim : callable
-        Sets the solver's own tolerances for its next run; it is given the norm of the residual at
-        the start, and what share of that the last run has left (0 before the first).
+        Sets the solver's own tolerances for its next run. Its arguments are the norm of the
+        residual at the start, and the share that the last run has left (0 before the first).
     method : str
     persist : bool
         Whether to go on after a run that PETSc says has failed.
@@ -498,7 +498,7 @@ def _round_off(matrix: Any, x: Any, work: Any) -> float:
 
 
 def set_multigrid(solver: Any) -> None:
-    """Let a PETSc KSP be preconditioned by GAMG, its norm that of the true residual."""
+    """Let GAMG precondition a PETSc KSP, with the norm of the true residual."""
     with options(solver, "reference_", _MULTIGRID):
         pass
 
@@ -525,7 +525,7 @@ def near_null_space(
 ) -> Any:
     """Give the rigid motions of a body as PETSc wants them for the multigrid of `matrix`.
 
-    Its unknowns are those of the nodes of this rank, or of some of them.
+    Its unknowns belong to the nodes of this rank, or to some of them.
     """
     from petsc4py import PETSc
 

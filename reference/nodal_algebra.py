@@ -3,11 +3,11 @@
 Assembly, products and factorisations are distributed; what a motion does with vectors between them
 is not, so that every rank takes the same steps.
 
-Systems of which ties are dropped one after the other: the matrix A is that of the body with its
-whole cut open, factorised once. Ties B u = 0 are forces λ between the nodes that they hold
-together: S λ = B A⁻¹ f with S = B A⁻¹ Bᵀ, u = A⁻¹ (f − Bᵀ λ). Ties are in the order in which they
-go, the last one first: the Cholesky factor of S for those that are left is then a leading block of
-the one for all.
+Systems of which ties are dropped one after the other. The matrix A of the body with its whole cut
+open is factorised once. Ties B u = 0 are forces λ between the nodes that they hold together: S λ =
+B A⁻¹ f with S = B A⁻¹ Bᵀ, u = A⁻¹ (f − Bᵀ λ). Ties are in the order in which they go, the last one
+first: the Cholesky factor of S for the remaining ties is then a leading block of the factor for
+all.
 """
 
 from typing import Any
@@ -61,9 +61,9 @@ class NodalMatrix:
 class NodalSolver:
     """Solver with a matrix of which the rows and columns of held unknowns are taken out.
 
-    It factorises, unless it is to iterate. Then it does so by conjugate gradients until they have
-    taken, beyond what solutions by a factor take, as many operations as a factorisation, or meet
-    a direction without positive curvature. No clock decides.
+    It factorises, unless it is to iterate by conjugate gradients. It stops iterating when they have
+    taken as many operations as a factorisation, beyond the cost of solutions by a factor. It stops,
+    too, at a direction without positive curvature. No clock decides.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class NodalSolver:
         matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix))
         self._solver: Any = None
         self._iteration = preconditioned_gradients(matrix, _LEFT) if iterates else None
-        self._spent = 0.0  # ns by iterations, beyond those of solutions by a factor
+        self._spent = 0.0  # ns by iterations, beyond solutions by a factor
         if not iterates:
             self._factorise()
         self._x, self._b = matrix.createVecs()
@@ -235,7 +235,7 @@ class TiedSolver:
     solver : NodalSolver
         Without any ties; destroyed with this one.
     ties : TiedUnknowns
-        What is tied, now and at every later solve.
+        Tied unknowns, now and at every later solve.
     lasting : (p, 2) int array
         Of `lasting_ties`.
     held : (h,) int array
@@ -280,6 +280,6 @@ class TiedSolver:
         return np.asarray(u[self._one] - u[self._other])
 
     def _pull(self, forces: Array, sizes: Array, which: slice) -> None:
-        """Add forces between the nodes of some ties; what is held bears them."""
+        """Add forces between the nodes of some ties; held unknowns bear them."""
         for ends, sign in ((self._one[which], 1.0), (self._other[which], -1.0)):
             np.add.at(forces, ends, sign * sizes * self._free[ends])

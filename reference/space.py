@@ -62,7 +62,7 @@ class Unknowns:
         return own, at[own]
 
     def rows(self, displacements: NDArray[Any]) -> Any:
-        """Give those of some nodal displacements that this rank owns as PETSc numbers them."""
+        """Select the nodal displacements that this rank owns, in PETSc's numbering."""
         from petsc4py import PETSc
 
         return (self.own_unknowns(displacements)[0] + self.first).astype(PETSc.IntType)
@@ -192,7 +192,7 @@ class TiedUnknowns(Unknowns):
         return super().own_part(self.summed(values))
 
     def everywhere(self, local: Array) -> Array:
-        """Gather nodal displacements (n, d) on all ranks from those of the groups of each."""
+        """Gather nodal displacements (n, d) on all ranks from the groups of each."""
         return self.spread(super().everywhere(local)).reshape(self.shape)
 
 
@@ -223,7 +223,7 @@ class ConformingSpace(Unknowns):
     dolfinx_cell : (m,) int array
         DOLFINx's number of each cell of `mesh` on this rank; −1 where it has none.
     node_of_dof : (l,) int array
-        Node of each (vector) unknown of this rank, those of other ranks last. Serial: 0, 1, 2, …
+        Node of each (vector) unknown of this rank, unknowns of other ranks last. Serial: 0, 1, 2, …
     """
 
     mesh: ConformingMesh
@@ -422,14 +422,14 @@ class LinearElements:
         return np.asarray(u[self._ends].mean(axis=1))
 
     def forces(self, fine: Array) -> Array:
-        """Nodal forces (k,) that do the work of those of the quadratic space."""
+        """Restrict forces of the quadratic space to nodal forces (k,) that do the same work."""
         coarse = np.zeros(self.space.shape)
         for end in self._ends.T:
             np.add.at(coarse, end, 0.5 * fine.reshape(len(end), -1))
         return coarse.ravel()
 
     def held(self, fine: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """Which scalar unknowns are held, and which of those of the quadratic space they are."""
+        """Find the held scalar unknowns, and their places in the quadratic space."""
         node, component = np.divmod(fine, self.space.dimension)
         one, other = self._ends[node].T
         return (one * self.space.dimension + component)[one == other].astype(np.int32), one == other

@@ -47,10 +47,10 @@ class ArcCrack(ExactSolution):
         φ  = ½ [(d − Ḡ/z) X − Ḡ/z + C z],
         ψ  = {½ [G z² − C̄ − (d̄ − G z) X] − φ'} / z,
 
-    where Γ = (σ_xx + σ_yy)/4 and G = (σ_yy − σ_xx)/2 + iσ_xy of the remote stress in the axes
-    of the arc, C = 2Γ − d, Re d = (4Γ + ½ sin²α Re G)/(3 − c), Im d = ½ sin²α Im G/(1 + c);
-    2μ(u + iv) = κφ − z conj φ' − conj ψ. Under tension σ from all sides
-    K_I = σ √(πR sin α) cos(α/2)/(1 + sin²(α/2)).
+    where Γ = (σ_xx + σ_yy)/4 and G = (σ_yy − σ_xx)/2 + iσ_xy of the remote stress in the axes of
+    the arc. The constants are C = 2Γ − d, Re d = (4Γ + ½ sin²α Re G)/(3 − c); Im d = ½ sin²α Im
+    G/(1 + c). The displacement is 2μ(u + iv) = κφ − z conj φ' − conj ψ. Under tension σ from all
+    sides K_I = σ √(πR sin α) cos(α/2)/(1 + sin²(α/2)).
 
     The side of the centre is the positive one: left of an arc that runs counter-clockwise.
 
@@ -162,7 +162,7 @@ class ArcCrack(ExactSolution):
             sheet[across & self._on_arc(z_n + np.clip(share, 0.0, 1.0) * (z - z_n))] = -1.0
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.stack(self._closed(z, sheet))
-        # the series is that of the side of the centre
+        # the series belongs to the side of the centre
         central = (np.abs(z) < _NEAR_CENTRE) & (sheet > 0.0)
         found[:, central] = np.polynomial.polynomial.polyval(z[central], self._series.T)
         return z, _Potentials(*found)
@@ -267,8 +267,8 @@ def _radial_energy(
     """Integral over a box, outside a ball, of the density w₀ + w₁/r⁶, J.
 
     With g r³ = ∫_b^r s² (w₀ + w₁/s⁶) ds, which is 0 inside the ball, the density is div(x g). Its
-    flux through a face at the distance h is h ∫ g dA; with G(ϱ) = ∫_0^ϱ g s ds around the foot of
-    the centre that is Σ ∫ G (ξ dη − η dξ)/ϱ² over the edges.
+    flux through a face at the distance h is h ∫ g dA. With G(ϱ) = ∫_0^ϱ g s ds around the foot of
+    the centre, ∫ g dA = Σ ∫ G (ξ dη − η dξ)/ϱ² over the edges.
 
     Parameters
     ----------
@@ -354,18 +354,18 @@ class _Derivatives(NamedTuple):
 class Penny(ExactSolution):
     """A circular crack of radius a in a body under remote stress, with a pressure in it.
 
-    What opens it (I. N. Sneddon, Proc. R. Soc. Lond. A 187, 1946): around the axis, with z along
-    it, 2μ u_r = B [(1−2ν) f_r + z f_rz], 2μ u_z = B [−2(1−ν) f_z + z f_zz], B = 2Na²/3π for a
-    pull N. What shears it along x by T (M. K. Kassir & G. C. Sih, J. Appl. Mech. 33, 1966):
-    2μ u_x = C [−2(1−ν) f_z + z f_xx], 2μ u_y = C z f_xy, 2μ u_z = C [−(1−2ν) f_x + z f_xz],
-    C = 4Ta²/(3π(2−ν)), u_x and u_y odd in z. The function f is harmonic; in oblate coordinates
-    z = aζm, r² = a²(1+ζ²)(1−m²) its derivatives are elementary, with r² + (z+ia)² = R²,
-    R = a(ζ+im). To both comes the field of the uniform remote stress.
+    Opening by a pull N (I. N. Sneddon, Proc. R. Soc. Lond. A 187, 1946), around the axis, with z
+    along it: 2μ u_r = B [(1−2ν) f_r + z f_rz]; 2μ u_z = B [−2(1−ν) f_z + z f_zz]; B = 2Na²/3π.
+    Shear T along x (M. K. Kassir & G. C. Sih, J. Appl. Mech. 33, 1966): 2μ u_x = C [−2(1−ν) f_z + z
+    f_xx], 2μ u_y = C z f_xy, 2μ u_z = C [−(1−2ν) f_x + z f_xz], C = 4Ta²/(3π(2−ν)), u_x and u_y odd
+    in z. The function f is harmonic; in oblate coordinates z = aζm, r² = a²(1+ζ²)(1−m²) its
+    derivatives are elementary, with r² + (z+ia)² = R², R = a(ζ+im). To both comes the field of the
+    uniform remote stress.
 
-    Parameters ``centre`` (m, default the origin), ``normal`` of the crack (default z), radius
-    ``a`` (m), remote ``tension`` across the crack (Pa) or in its place the remote ``stress``
-    (3 × 3, Pa, in the axes of the scene), and the ``pressure`` on the faces (Pa, default 0).
-    Faces that are not pulled open overlap.
+    Parameters: ``centre`` (m, default the origin); ``normal`` of the crack (default z); radius
+    ``a`` (m); remote ``tension`` across the crack (Pa) or in its place the remote ``stress`` (3 ×
+    3, Pa, in the axes of the scene); ``pressure`` on the faces (Pa, default 0). Faces that are not
+    pulled open overlap.
     """
 
     def __init__(self, law: Hooke, parameters: Parameters) -> None:

@@ -23,9 +23,9 @@ class BladeStrip(ExactSolution):
     of traction, far behind the halves are at rest at ±w₀. Any part of the strip is a body that
     it solves. At v = 0 it is the strip with a crack at rest.
 
-    Parameters ``half_width`` b (m), ``grip`` w₀ (m), ``speed`` v (m/s, default 0), ``tip`` (x, y)
-    at the time 0 (m, default the origin) and ``angle`` of the direction of the advance (degrees,
-    default 0). A speed needs the density of the material.
+    Parameters: ``half_width`` b (m); ``grip`` w₀ (m); ``speed`` v (m/s, default 0); ``tip`` (x, y)
+    at the time 0 (m, default the origin); ``angle`` of the advance (degrees, default 0). A speed
+    needs the density of the material.
     """
 
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
@@ -103,7 +103,7 @@ class BladeStrip(ExactSolution):
         return np.asarray(slope)
 
     def _evaluate(self, points: Array, near: Array | None) -> tuple[Complex, Array, Array]:
-        """Give s (n,), the sign of the side, and that of dy in d|y|.
+        """Give s (n,), the sign of the side, and the sign of dy in d|y|.
 
         Behind the tip a point belongs to the side of its `near`, and the field of a side goes on
         evenly beyond the cut; ahead nothing is cut.
@@ -131,9 +131,9 @@ class BladeStrip(ExactSolution):
 class ReleasedBar(ExactSolution):
     """Uniaxial strain of a bar between held ends, let go across at the time 0: d'Alembert's waves.
 
-    Until then u_x = ε (x − x₀). Then both faces of the cut, or the end that was
-    pulled, are free of traction, and waves run at c = √((λ+2μ)/ρ), in space without lateral
-    contraction in which the sides are held or Poisson's ratio is zero; see `wave`.
+    Until then u_x = ε (x − x₀). Then both faces of the cut, or the end that was pulled, are free of
+    traction. Waves run at c = √((λ+2μ)/ρ), without lateral contraction: the sides are held or
+    Poisson's ratio is zero. See `wave`.
 
     Parameters ``strain`` ε, ``ends`` of the bar along x (m), ``at``, where it is let go (m):
     between the ends, or one of them, and ``origin`` x₀ (m, default 0). The material needs a
@@ -210,12 +210,12 @@ class ReleasedBar(ExactSolution):
 class Impact(ExactSolution):
     """Two equal halves of a bar that move towards each other and touch: d'Alembert's waves.
 
-    With y the distance from the place where they meet and τ the time since, the halves move by
-    −(v/c) min(y, m) towards it, m = L − |cτ − L|: together for 2L/c, under the pressure ρcv, then
-    apart with velocities exchanged. c = √((λ+2μ)/ρ), as of `ReleasedBar`.
+    Let y be the distance from the place where they meet and τ the time since. The halves move by
+    −(v/c) min(y, m) towards it, m = L − |cτ − L|. They are together for 2L/c, under the pressure
+    ρcv, then apart with velocities exchanged. c = √((λ+2μ)/ρ), as of `ReleasedBar`.
 
-    Parameters ``half_length`` L (m), ``at``, where they meet along x (m), ``speed`` v of each
-    (m/s) and the ``gap`` between them at the time 0 (m, default 0). The material needs a density.
+    Parameters: ``half_length`` L (m); ``at``, where they meet along x (m); ``speed`` v of each
+    (m/s); the ``gap`` between them at the time 0 (m, default 0). The material needs a density.
     """
 
     moves = True
@@ -310,10 +310,10 @@ def sudden_intensity(
 ) -> float:
     """Stress-intensity factor, Pa √m, of a half-infinite crack with a traction from the time 0 on.
 
-    Laplace transforms in time (s) and along the crack (sζ) leave one equation of Wiener–Hopf for
-    the stress ahead and the displacement behind, Σ₊ + Σ₋ ∝ F₊F₋ U₋, with the slownesses a and b of
-    pressure and shear waves. A traction σ from the time 0 on gives K = 2σ√(2t/π)/F₊(0), where the
-    function of Rayleigh, b⁴ at ζ = 0, and √a, √b of the displacement's own wave make
+    Laplace transforms in time (s) and along the crack (sζ) leave one Wiener–Hopf equation for the
+    stress ahead and the displacement behind. It is Σ₊ + Σ₋ ∝ F₊F₋ U₋, with the slownesses a and b
+    of pressure and shear waves. A traction σ from the time 0 on gives K = 2σ√(2t/π)/F₊(0).
+    Rayleigh's function, b⁴ at ζ = 0, and √a, √b of the displacement's own wave make
 
         F₊(0)² = b⁴/(2a(b² − a²)) in mode I, b⁴/(2b(b² − a²)) in mode II, b in mode III.
 
@@ -348,8 +348,8 @@ def sudden_intensity(
 def sudden_slip(traction: float, law: Hooke, distance: float, time: float) -> float:
     """Displacement jump along the front at a distance behind it, m: antiplane.
 
-    The velocity of a face is (τc/μ) [1 − (2/π) arctan √(ct/r − 1)], c that of shear waves: the
-    pole ζ = 0 is the plane wave, the branch cut from b on what comes from the tip.
+    The velocity of a face is (τc/μ) [1 − (2/π) arctan √(ct/r − 1)], c the speed of shear waves. The
+    pole ζ = 0 is the plane wave, the branch cut from b on the wave from the tip.
 
     Parameters
     ----------

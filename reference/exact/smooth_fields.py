@@ -1,10 +1,10 @@
 """Fields without a tip: uniform strains, waves, layers of two materials, halves rolled apart.
 
 Layers meet along a line which a straight cut crosses; the field is linear on each of four parts.
-Tension S along the cut, another on each side, leaves the cut free and is in equilibrium with
-itself across the interface. Its strains are those of each material; they fit together where both
-materials strain alike along the interface, τ·ε τ: at one angle for two given materials. The rest
-of the jump, which shears, is a rotation of the second material.
+Tension S along the cut, another on each side, leaves the cut free and is in equilibrium with itself
+across the interface. Each material has its own strains; they are compatible if both materials
+strain alike along the interface, τ·ε τ: at one angle for two given materials. The rest of the jump,
+which shears, is a rotation of the second material.
 """
 
 import numpy as np
@@ -263,7 +263,7 @@ class Layers(TwoSidedSolution):
         self._gradients = np.array([strains[0], strains[1] + spin * _QUARTER])
 
     def stress(self, points: Array, near: Array | None = None) -> Array:
-        """Stress (n, 2, 2), Pa; that of each point's material."""
+        """Compute the stress (n, 2, 2), Pa, by the material of each point."""
         _, above = self._local(points, near)
         unit = np.outer(self._axes[0], self._axes[0])
         return np.asarray(side(self._stress, above)[:, None, None] * unit)
@@ -301,9 +301,9 @@ class Layers(TwoSidedSolution):
 class RolledHalves(TwoSidedSolution):
     """Strips on both sides of a cut, each bent away from the other to a circle of its own.
 
-    A strip |ξ| < h/2 takes the places (r cos cs, r sin cs), with stretches λ₁ = dr/dξ across and
-    λ₂ = c r along it. Without body force and free of traction at ξ = ±h/2 it is in equilibrium in
-    the energy W(λ₁, λ₂) if d/dξ ∂W/∂λ₁ = c ∂W/∂λ₂ and ∂W/∂λ₁ = 0 there (Rivlin, Proc. R. Soc. Lond.
+    A strip |ξ| < h/2 takes the places (r cos cs, r sin cs), with stretches λ₁ = dr/dξ across and λ₂
+    = c r along it. There is no body force, and no traction at ξ = ±h/2. In the energy W(λ₁, λ₂)
+    equilibrium is d/dξ ∂W/∂λ₁ = c ∂W/∂λ₂, with ∂W/∂λ₁ = 0 at both ends (Rivlin, Proc. R. Soc. Lond.
     A 195, 1949). In the energy μ‖U − I‖² + ½ λ tr²(U − I) that is r = A cosh cξ + B sinh cξ + b/c,
     b = 2(λ + μ)/(λ + 2μ); in a neo-Hookean one it is found by collocation, to 1e-12. At s = 0 the
     middle lines stay where they are.

@@ -1,8 +1,8 @@
 """Bases of exact solutions: a field known at every point, its law, parameters and stored energy.
 
 Energies are integrals over facets of the body (edges of a polygon, faces of a box) or over the
-cones that join them to a point: where a cut plane goes through, over the parts on either side, each
-with the field of its side, which is smooth beyond the cut.
+cones that join them to a point. Where a cut plane goes through, they run over the parts on either
+side. Each part takes the field of its side, which is smooth beyond the cut.
 """
 
 from abc import ABC, abstractmethod
@@ -46,8 +46,8 @@ Above = NDArray[np.bool_]
 class Hooke:
     """Hooke's law, in the plane or in space.
 
-    In plane stress `lame` is that of the plane law, 2λμ/(λ+2μ), so that one set of formulas
-    serves both states.
+    In plane stress `lame` is the λ of the plane law, 2λμ/(λ+2μ), so that one set of formulas serves
+    both states.
 
     Parameters
     ----------
@@ -132,8 +132,8 @@ class Parameters:
         Raises
         ------
         InputError
-            If it is not finite numbers of that shape. What is missing without a `default` is
-            said by `close`.
+            If it is not finite numbers of that shape. `close` reports parameters that are missing
+            without a `default`.
         """
         self._known.append(name)
         if name not in self._given:
@@ -167,7 +167,7 @@ class Parameters:
         InputError
             If something is left that the solution does not know, or something was missing.
         """
-        # first what is left: a misspelt name explains the one that is missing
+        # unknown names first: a misspelt name explains the one that is missing
         for name in self._given:
             if name not in self._known:
                 hint = nearest(name, self._known)
@@ -524,7 +524,7 @@ def _gauss(density: _Density, starts: Array, ends: Array) -> Array:
 def line_axes(parameters: Parameters, of: str = "") -> Array:
     """Take the direction of a line: rows along (s) and normal (t), from `slope` or `angle`.
 
-    With `of`, that of something else: the names of its parameters begin so.
+    With `of`, the material of another body: the names of its parameters begin so.
     """
     slope, degrees = f"{of}slope", f"{of}angle"
     if parameters.has(slope) and parameters.has(degrees):

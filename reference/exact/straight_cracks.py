@@ -153,11 +153,11 @@ class CrackTip(ComplexCrack):
 class Griffith(ComplexCrack):
     """φ = ½ S R + Γ z, ω = ½ S R − Γ z, with R = √(z−a) √(z+a).
 
-    S = σ_yy − iσ_xy and Γ = (σ_xx − σ_yy)/4 + iσ_xy/2 of the remote stress in the crack's
-    axes. Parameters ``centre`` (m, default the origin), half-length ``a`` (m), ``angle``
-    (degrees, default 0), the remote ``stress`` (σ_xx, σ_yy, σ_xy) in the axes of the scene and
-    the ``pressure`` p (Pa, default 0) on the faces: the field of free faces under the remote
-    stress σ + p I, less that of the uniform stress p I.
+    S = σ_yy − iσ_xy and Γ = (σ_xx − σ_yy)/4 + iσ_xy/2 of the remote stress in the crack's axes.
+    Parameters: ``centre`` (m, default the origin); half-length ``a`` (m); ``angle`` (degrees,
+    default 0); the remote ``stress`` (σ_xx, σ_yy, σ_xy) in the axes of the scene; the ``pressure``
+    p (Pa, default 0) on the faces. With p it is the field of free faces under the remote stress σ +
+    p I, less the field of the uniform stress p I.
     """
 
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
@@ -311,8 +311,8 @@ class StraightFrontField(ExactSolution):
     Antiplane shear alone is exact for neo-Hookean material too, at any strain: det F is 1, and the
     first Piola stress is μ (e₃ ⊗ ∇u_3 + ∇u_3 ⊗ e₃), as in linear elasticity.
 
-    Parameters ``point`` of the front (m), ``normal`` of the crack towards its positive side,
-    ``axis``, the direction ahead, projected onto its plane, and ``intensity`` (K_I, K_II, K_III),
+    Parameters: ``point`` of the front (m); ``normal`` of the crack towards its positive side;
+    ``axis``, the direction ahead, projected onto its plane; ``intensity`` (K_I, K_II, K_III),
     Pa·√m.
     """
 

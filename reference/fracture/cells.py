@@ -1,7 +1,7 @@
 """A finite element field at quadrature points of cells: gradients, stress, and the force it bears.
 
 The stress of a mixed solution has the pressure that its displacement determines. The force per
-volume that balances the stress is what is given, less the inertia.
+volume that balances the stress is the body force less the inertia.
 """
 
 from collections.abc import Callable

@@ -144,16 +144,16 @@ def stress_intensity(
 ) -> StressIntensity:
     """K_I and K_II of a crack that is straight, or an arc, from a plane field.
 
-    The interaction integral with fields of each mode (Yau, Wang & Corten, J. Appl. Mech. 47,
-    1980), M = ∫ (σ_ij δû_i + σ̂_ij δu_i − σ_ij ε̂_ij t_j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δû_i q
-    dA, and K = E' M / 2 with E' = E/(1−ν²) in plane strain, E in plane stress. At a straight crack
-    t is its direction and δu = u_,t. At an arc t = ω (x − c) is the turn about its centre that
-    moves the tip by one, and δu = u_,t − ω u: the faces of the arc and an isotropic law stay what
-    they are in it (J. K. Knowles & E. Sternberg, Arch. Ration. Mech. Anal. 44, 1972), so that the
-    integral has no terms of the curvature. The fields of both modes are in equilibrium and free
-    of traction on the crack; a tip that stands still has them in a motion too. G is the domain
-    form of Rice's J of the field alone (C. F. Shih, B. Moran & T. Nakamura, Int. J. Fract. 30,
-    1986), ∫ (σ_ij δu_i − ½ σ:ε t_j) q,_j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δu_i q dA.
+    The interaction integral with fields of each mode (Yau, Wang & Corten, J. Appl. Mech. 47, 1980),
+    M = ∫ (σ_ij δû_i + σ̂_ij δu_i − σ_ij ε̂_ij t_j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δû_i q dA,
+    and K = E' M / 2 with E' = E/(1−ν²) in plane strain, E in plane stress. At a straight crack t is
+    its direction and δu = u_,t. At an arc t = ω (x − c) is the turn about its centre that moves the
+    tip by one, and δu = u_,t − ω u. It leaves the faces of the arc and an isotropic law unchanged,
+    so the integral has no terms of the curvature (J. K. Knowles & E. Sternberg, Arch. Ration. Mech.
+    Anal. 44, 1972). The fields of both modes are in equilibrium and free of traction on the crack;
+    a tip that stands still has them in a motion too. G is the domain form of Rice's J of the field
+    alone (C. F. Shih, B. Moran & T. Nakamura, Int. J. Fract. 30, 1986), ∫ (σ_ij δu_i − ½ σ:ε t_j)
+    q,_j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δu_i q dA.
 
     Parameters
     ----------

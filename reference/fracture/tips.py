@@ -153,7 +153,7 @@ def tip_at(scene: Scene, name: str, end: End) -> Tip:
     length = float(np.linalg.norm(point - before))
     if isinstance(cut, PolylineCut):
         away.append((length, own))
-    # round-off does not tell whether a singular point is that of a feature
+    # round-off does not tell whether a singular point belongs to a feature
     reach, nearest = min(away, key=lambda one: one[0] * (1 + _TOUCHING * (one[1] == own)))
     if isinstance(cut, ArcCut):
         spoke = (point - np.asarray(cut.centre)) / cut.radius
@@ -168,8 +168,8 @@ def tip_fields(
 ) -> list[list[tuple[float, ExactSolution]]]:
     """Give the fields of mode I and mode II, each as a sum of exact ones with their factors.
 
-    At a straight crack those of Williams; at an arc, those of the arc in an infinite plate under
-    three remote stresses, combined so that only the one mode is left at this end.
+    At a straight crack Williams' fields. At an arc, fields of the arc in an infinite plate under
+    three remote stresses, combined so that only one mode is left at this end.
     """
     if arc is None:
         angle = float(np.rad2deg(np.arctan2(direction[1], direction[0])))
@@ -211,8 +211,8 @@ def ahead_of(
 class ModeField(NamedTuple):
     """A singular field of unit intensity at n points, in the axes ahead, across, along.
 
-    The stress is that of the plane problem; at a curved front it is not quite in equilibrium, and
-    the strain that belongs to it is not quite that of the displacement.
+    The stress solves the plane problem. At a curved front it is not quite in equilibrium, and its
+    strain is not quite the strain of the displacement.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ class ModeField(NamedTuple):
     divergence : (n, 3) array
         Of the stress.
     misfit : (n, 3, 3) array
-        Derivative, in the direction ahead, of the strain of the displacement less that of the
+        Derivative, in the direction ahead, of the strain of the displacement less the strain of the
         stress.
     """
 
@@ -327,7 +327,7 @@ class Front(Protocol):
 class CircularFront:
     """The rim of a penny-shaped crack: anticlockwise about its normal.
 
-    Its arc length starts in the direction `towards`, by default that of a coordinate axis.
+    Its arc length starts in the direction `towards`, by default a coordinate axis.
     """
 
     centre: ArrayLike
@@ -420,7 +420,7 @@ class StraightFront:
 
 
 def front_at(scene: Scene, asked: FractureQuantity) -> tuple[Front, Array]:
-    """Give the front around a point at which a factor is asked for, and radii of domains, m.
+    """Give the front around a point at which a factor is evaluated, and radii of domains, m.
 
     A straight front is the part of it that hats at the point lie on. The radii are 0 where the
     front meets something.
@@ -472,8 +472,8 @@ def front_reach(scene: Scene, asked: FractureQuantity) -> float:
 def _straight_part(cut: PolygonCut, point: Array, box: Array) -> tuple[Array, Array, Array]:
     """Give both ends (3,) of a part of an edge around a point, and the way ahead (3,).
 
-    It ends short of where the edge does or leaves the box, whichever is nearer, and runs along
-    ahead × normal: what is up, seen from it, is the positive side.
+    It ends short of the place where the edge ends or leaves the box. It runs along ahead × normal:
+    seen from it, the positive side is up.
     """
     start, end = cut.edge_of(point)
     along = (end - start) / np.linalg.norm(end - start)

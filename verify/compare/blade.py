@@ -41,14 +41,13 @@ def released_metrics(
 ) -> tuple[list[Metric], dict[str, str]]:
     """Measure where the energy went that the blades of a scene release, J per m² of their way.
 
-    ``released``: G, if the exact solution states it; ``released_to_cut``: what the forces took that
-    the solver says it has held the released cut with; ``_scheme``: what else is missing in the
-    measured balance of energies, as uncertain as that; ``_damping``: what the rate of damping
-    takes; ``_kinetic`` and ``_strain``: energy of the difference from the exact field since the
-    start, kinetic energy by the solver's own mass (a lumped one holds more of short waves than
-    their field); ``_short_waves``: without an exact field, kinetic energy of motions of periods
-    below 4h/c. ``released_mismatch``: the share of G by which cut, scheme, damping and difference
-    miss it.
+    ``released``: G, if the exact solution states it. ``released_to_cut``: work of the tie forces
+    that the solver states. ``_scheme``: the rest of the measured balance of energies, as uncertain
+    as the balance. ``_damping``: the energy that damping takes by its rate. ``_kinetic`` and
+    ``_strain``: energy of the difference from the exact field since the start. Its kinetic energy
+    takes the solver's own mass: a lumped mass holds more of short waves than the field.
+    ``_short_waves``: without an exact field, kinetic energy of motions of periods below 4h/c.
+    ``released_mismatch``: the share of G by which cut, scheme, damping and difference miss it.
 
     Parameters
     ----------
@@ -101,12 +100,12 @@ def released_metrics(
 def blade_forces(scene: Scene, account: MotionAccount) -> dict[str, list[float]]:
     """Return the forces on blades over the output times, in newtons (in the plane N/m).
 
-    ``driving_force_`` and the name of the cut: what the forces that hold the released cut take of
-    the body's energy per advance of the blade; positive pulls the blade on. Where the cut has a
-    toughness R, ``resistance_`` and the name: R times the width that is cut, less the driving
-    force. Both are smoothed over two intervals between outputs, and NaN while the blade rests.
-    Without an entry ``cut_work_`` and the name of the cut in the ledger, a single blade has the
-    whole ``cut_work``. Empty if no blade has any.
+    ``driving_force_`` and the name of the cut: energy that the tie forces of the cut take per
+    advance of the blade; positive pulls the blade on. Where the cut has a toughness R,
+    ``resistance_`` and the name: R times the width that is cut, less the driving force. Both are
+    smoothed over two intervals between outputs, and NaN while the blade rests. Without an entry
+    ``cut_work_`` and the name of the cut in the ledger, a single blade has the whole ``cut_work``.
+    Empty if no blade has any.
     """
     paths = [cut for cut in scene.cuts if isinstance(cut, ToolPathCut)]
     times, found = account.times, {}
@@ -128,15 +127,15 @@ def blade_forces(scene: Scene, account: MotionAccount) -> dict[str, list[float]]
 
 
 def travelled(cut: ToolPathCut, times: Array) -> Array:
-    """Length (n,) of the way that a blade has come at some times, m: of the end that goes farther.
+    """Measure the travel (n,) of a blade at some times, m, by the end that goes farther.
 
-    As `verify.xfem.ToolPath.travel` has it for what is played.
+    The same as `verify.xfem.ToolPath.travel`.
     """
     return np.interp(times, cut.moments, cut.travel)
 
 
 def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
-    """Energy (n,) per advance of a blade, smoothed, in newtons.
+    """Compute the energy (n,) per advance of a blade, smoothed, in newtons.
 
     Parameters
     ----------
@@ -150,8 +149,8 @@ def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
     Returns
     -------
     (n,) array
-        NaN where the blade does not move. What it takes at rest, as forces fade on, counts at the
-        place where it rests: to the advance on either side within `length`.
+        NaN where the blade does not move. Energy that fading forces take while it rests counts at
+        the place of rest: to the advance on either side within `length`.
     """
     goes = np.diff(advance) > 0.0
     moving = np.append(goes, False) | np.append(False, goes)
@@ -167,14 +166,14 @@ def driving_force(advance: Array, cut_work: Array, length: float) -> Array:
 
 
 def advance(scene: Scene) -> float:
-    """Area that the blades of a scene sweep in its body during the motion, m² (2D: m)."""
+    """Compute area that the blades of a scene sweep in its body during the motion, m² (2D: m)."""
     duration = scene.analysis.duration
     paths = [cut for cut in scene.cuts if isinstance(cut, ToolPathCut)]
     return swept_area(scene, paths, 0.0, duration or 0.0)
 
 
 def swept_area(scene: Scene, paths: Sequence[ToolPathCut], start: float, end: float) -> float:
-    """Area that blades sweep in the body of a scene between two times, m² (2D: m)."""
+    """Compute the area that blades sweep in the body of a scene between two times, m² (2D: m)."""
     parts = [part for cut in paths if (part := cut.between(start, end)) is not None]
     total = 0.0
     for part in parts:
@@ -224,9 +223,9 @@ def _difference(
 
 
 def _in_the_mass(account: MotionAccount) -> float:
-    """Kinetic energy that the solver's mass holds beyond that of its velocity field, J.
+    """Compute the kinetic energy of the solver's mass beyond its velocity field, J.
 
-    It is that of the difference from the exact field: for smooth fields any mass is consistent.
+    It belongs to the difference from the exact field: for smooth fields any mass is consistent.
     """
     if not account.energies.parts or account.whole is None:
         return 0.0
@@ -259,11 +258,11 @@ class BladeFront:
     Parameters
     ----------
     point : (3,) array
-        In the middle of what of it lies in the body, m.
+        In the middle of its part in the body, m.
     ahead : (3,) array
         Unit vector of its advance.
     blade : (3,) array
-        Unit vector along it; the positive side of the cut is that of ahead × blade.
+        Unit vector along it; ahead × blade points to the positive side of the cut.
     speed : float
         m/s.
     """
@@ -282,11 +281,11 @@ class BladeFront:
 def tearing_intensity(
     field: Field, body: AnyBody, cut: str, front: BladeFront, radius: float, material: Material
 ) -> float:
-    """K_III in Pa √m by displacement correlation, extrapolated to the front.
+    """Compute K_III in Pa √m by displacement correlation, extrapolated to the front.
 
-    Near a front that advances at v the jump is (4 K/(μ g)) √(r/2π) (1 + k r), g² = 1 − ρv²/μ, with
-    r the distance behind it. K and k are fitted by least squares at places from a quarter of the
-    radius to the radius, evenly spaced in √r.
+    Near a front that advances at v the jump is (4 K/(μ g)) √(r/2π) (1 + k r), g² = 1 − ρv²/μ. Here
+    r is the distance behind the front. K and k are fitted by least squares at places from a quarter
+    of the radius to the radius, evenly spaced in √r.
 
     Parameters
     ----------
@@ -318,7 +317,7 @@ _SAMPLES = 401  # points of the blade, of which those in the body count
 def blade_intensity(
     scene: Scene, motion: Motion, body: AnyBody, asked: StressIntensityQuantity
 ) -> float:
-    """K_III in Pa √m at the place where the blade is, wherever a solver has its tip.
+    """Compute K_III in Pa √m at the place where the blade is, wherever a solver has its tip.
 
     Raises
     ------
@@ -341,7 +340,7 @@ def blade_intensity(
 
 
 def blade_front(cut: ToolPathCut, body: SolidBody, time: float) -> BladeFront:
-    """Front at a time, on the move that leads there.
+    """Compute the front at a time, on the move that leads there.
 
     Raises
     ------

@@ -46,7 +46,8 @@ class Body:
     Parameters
     ----------
     loops : tuple of (n, 2) arrays
-        Corners of the closed curves that bound it; what an odd number of them holds is inside.
+        Corners of the closed curves that bound it; places that an odd number of them holds are
+        inside.
     cuts : dict of str to list of Segment or Arc
         The cuts as asked, not trimmed, in their direction.
     parts : list of CutPart
@@ -98,15 +99,15 @@ class Body:
         return bool(self.parts)
 
     def inside(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie inside the body."""
+        """Tell whether points (n, 2) lie inside the body."""
         return _inside(points, self.loops)
 
     def tip_distance(self, points: Array) -> Array:
-        """Distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
+        """Compute the distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
         return np.asarray(distance_to_segments(points, self.tips[:, None].repeat(2, axis=1)))
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""
+        """Find nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""
         pieces = [piece for cut in self.cuts.values() for piece in cut]
         foot = distance_to_cut(pieces, points)[1]
         return foot, self.tip_distance(foot) <= 1e-10 * self.size
@@ -160,7 +161,7 @@ def _loops(scene: Scene) -> tuple[Array, ...]:
 
 
 def boundary_loops(cells: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Nodes of the closed curves that bound triangles (m, 3) of positive orientation."""
+    """Find the nodes of the closed curves that bound triangles (m, 3) of positive orientation."""
     edges = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     _, first, count = np.unique(
         np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
@@ -185,7 +186,7 @@ def boundary_loops(cells: NDArray[np.int64]) -> list[NDArray[np.int64]]:
 
 
 def _kinks(loop: Array) -> Array:
-    """Corners (k, 2) at which a closed curve turns by more than 15°."""
+    """Find corners (k, 2) at which a closed curve turns by more than 15°."""
     along = np.roll(loop, -1, axis=0) - loop
     along /= np.linalg.norm(along, axis=1)[:, None]
     return loop[np.sum(along * np.roll(along, 1, axis=0), axis=1) < np.cos(_KINK)]

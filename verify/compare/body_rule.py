@@ -1,17 +1,17 @@
 """Quadrature of a cut body, split by the cuts and graded to their ends.
 
-In the plane it is exact: thin parallel slabs have their borders through every corner, every end
-and every crossing. Inside a slab no two curves cross, so that they are ordered from left to right
-and the strips between them are trapezoids with (perhaps curved) sides. Nothing is clipped, no
-sliver is special: a strip of width 1e-12 is a trapezoid of width 1e-12. The slabs are turned away
-from the axes and diagonals, so that their points do not fall in step with the lines of a structured
-mesh, and away from the cuts, so that strips are not sheared.
+In the plane it is exact: thin parallel slabs have their borders through every corner, every end and
+every crossing. Inside a slab no two curves cross, so they are ordered from left to right. The
+strips between them are trapezoids with (perhaps curved) sides. Nothing is clipped, no sliver is
+special: a strip of width 1e-12 is a trapezoid of width 1e-12. The slabs are turned away from the
+axes and diagonals: their points do not fall in step with the lines of a structured mesh. They are
+turned away from the cuts, too, so that strips are not sheared.
 
 In space neutral simplices are split by the cuts. A box is divided by a grid of its own, whose
 planes are shifted at random (with a fixed seed); the simplices of a mesh file are divided at random
 points. Plane cuts split them exactly; a cylinder splits them along its linear interpolant in
-tetrahedra so small that the sagitta is a thirtieth of the spacing. The side of a point is then a
-matter of the field that is asked; the rest is in the integration error.
+tetrahedra so small that the sagitta is a thirtieth of the spacing. The side of a point is then up
+to the evaluated field; the rest is in the integration error.
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class Rule:
         return max(float(np.ptp(column)) for column in self.points.T)
 
     def gradient(self, field: Field) -> Array:
-        """Gradient (n, d, d) of a field at the points; of a membrane (n, 3, 2), see `in_frames`."""
+        """Evaluate the gradient (n, d, d) of a field; of a membrane (n, 3, 2), see `in_frames`."""
         gradient = field.gradient(self.points, self.points)
         return gradient if self.frames is None else in_frames(gradient, self.frames)
 
@@ -84,7 +84,7 @@ class _Monotone:
         return [*ends, 1.0, *self.piece.centre, self.piece.radius, self.bulge]
 
     def poles(self) -> list[float]:
-        """Heights, at an end or close beyond it, at which x(y) is like a square root."""
+        """Compute heights, at an end or close beyond it, at which x(y) is like a square root."""
         if isinstance(self.piece, Segment):
             return []
         middle, radius = float(self.piece.centre[1]), self.piece.radius
@@ -100,7 +100,7 @@ def area_rule(
     depth: float = 1e-2,
     grading: float = 1.0,
 ) -> Rule:
-    """Quadrature of a body, split by its cuts and graded to its singular points.
+    """Make a quadrature of a body, split by its cuts and graded to its singular points.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def area_rule(
 def slab_angles(body: Body) -> tuple[float, float, float]:
     """Choose three slab directions, rad in [0, π), the best first.
 
-    Each is as far as possible from the cuts and from the lines of structured meshes, and at
+    Each is at the largest possible angle to the cuts and to the lines of structured meshes, and at
     least 10° from the two others.
     """
     straight = [part.piece for part in body.parts if isinstance(part.piece, Segment)]
@@ -167,7 +167,7 @@ def slab_angles(body: Body) -> tuple[float, float, float]:
 def graded_breaks(
     breaks: Array, singular: Array, spacing: float, smallest: float, grading: float = 1.0
 ) -> Array:
-    """Sorted break points with gaps of at most `spacing`, halving towards `singular` points.
+    """Sort break points, with gaps of at most `spacing` that halve towards `singular` points.
 
     A gap is at most `grading` times as long as its distance to the nearest singular point, or
     `smallest`.
@@ -294,7 +294,7 @@ def _strips(curves, ys, columns, thinnest):
 
 @njit(cache=True)
 def _in_strips(curves, ys, columns, strips, u, wu, v, wv):
-    """Quadrature points (n, 2) and weights (n,) of strips, with more points (v) of curved ones."""
+    """Make points (n, 2) and weights (n,) of strips, with more points (v) of curved ones."""
     count = 0
     for _, left, right, first, last in strips:
         curved = curves[left, 3] + curves[right, 3] > 0.0
@@ -335,7 +335,7 @@ def body_rule(
     body: SimplexBody, spacing: float, seed: int = 0, order: int = 2, depth: float = 0.25,
     grading: float = 1.0,
 ) -> Rule:  # fmt: skip
-    """Quadrature of a solid or of a membrane.
+    """Make a quadrature of a solid or of a membrane.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def body_rule(
 
 
 def _thick(cells: Array, least: float) -> NDArray[np.bool_]:
-    """Whether simplices (m, k + 1, d) are higher than `least`, m."""
+    """Tell whether simplices (m, k + 1, d) are higher than `least`, m."""
     k = cells.shape[1] - 1
     reach = np.sqrt(squares(np.ptp(cells, axis=1)))  # of any face: no more than its power k − 1
     thick = k * measures(cells) > least * reach ** (k - 1)
@@ -376,7 +376,7 @@ def _thick(cells: Array, least: float) -> NDArray[np.bool_]:
 
 
 def _cells(body: SimplexBody, spacing: float, seed: int, depth: float, grading: float) -> Array:
-    """Simplices (m, k + 1, 3) of the quadrature."""
+    """Make the simplices (m, k + 1, 3) of the quadrature."""
     random = np.random.default_rng(seed)
     if body.box is not None:
         cells = _shaken_grid(body.box, spacing, random)
@@ -420,7 +420,7 @@ def _split(cells: Array, patch: Patch, spacing: float) -> Array:
 
 
 def _shaken_grid(box: Array, spacing: float, random: np.random.Generator) -> Array:
-    """Kuhn tetrahedra (m, 4, 3) of a grid on a box whose inner nodes are moved."""
+    """Make Kuhn tetrahedra (m, 4, 3) of a grid on a box whose inner nodes are moved."""
     shape = np.maximum(1, np.ceil((box[1] - box[0]) / spacing).astype(int))
     nodes = np.stack(np.meshgrid(*(np.arange(n + 1.0) for n in shape), indexing="ij"), axis=-1)
     shift = random.uniform(-_SHAKE, _SHAKE, nodes.shape)
@@ -441,7 +441,7 @@ def _shaken_grid(box: Array, spacing: float, random: np.random.Generator) -> Arr
 
 
 def _divided(corners: Array, random: np.random.Generator) -> Array:
-    """Simplices (k m, k, 3) around a random point inside each of (m, k, 3)."""
+    """Divide each of (m, k, 3) simplices at a random point inside: (k m, k, 3)."""
     count = corners.shape[1]
     weight = random.dirichlet(np.full(count, 8.0), len(corners))
     inner = np.einsum("mk,mka->ma", weight, corners)

@@ -37,7 +37,7 @@ class SearchedCells(NamedTuple):
     lower, upper, cells
         See `CellTree`.
     corners, normals : (m, k, d) float array
-        Of each cell; the normals are those of its facets, inwards, of length one.
+        Of each cell; normals of its facets point inwards and have length one.
     centres : (m, d) float array
     """
 
@@ -76,8 +76,8 @@ def build_cell_tree(
 ) -> CellTree:
     """Build the tree from the bounding boxes (m, d) of the cells; NaN marks cells to leave out.
 
-    Cells on a `surface` are ordered in cubes: in boxes as flat as a shallow surface is, its height
-    would count as much as its length, which makes finding its cells half as slow again.
+    Cells on a `surface` are ordered in cubes. In flat boxes the height of a shallow surface would
+    count as much as its length, and the search would take half as long again.
     """
     kept = np.flatnonzero(np.isfinite(lower).all(axis=1))
     centres = 0.5 * (lower[kept] + upper[kept])
@@ -105,8 +105,7 @@ def build_cell_tree(
 def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
     """Order (n,) of points (n, d) in which near ones follow each other.
 
-    Points that are asked for in this order find their cells three times as fast: what they
-    need is in the cache.
+    Points in this order find their cells three times as fast: the cells are in the cache.
     """
     return np.argsort(_morton(points), kind="stable")
 
@@ -141,7 +140,7 @@ def axes_of(dimension: int) -> tuple[int, ...]:
 
 @njit(inline="always")
 def _depth(x, normals, corners, axes):
-    """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
+    """Compute the distance of `x` to the nearest facet plane of a simplex, positive inside."""
     d = len(axes)
     depth = np.inf
     for facet in range(d + 1):
@@ -155,7 +154,7 @@ def _depth(x, normals, corners, axes):
 
 @njit(cache=True)
 def segment_distance2(x, a, b):
-    """Squared distance of `x` to the segment ab, in any dimension."""
+    """Compute the squared distance of `x` to the segment ab, in any dimension."""
     along, length2 = 0.0, 0.0
     for c in range(x.shape[0]):
         along += (x[c] - a[c]) * (b[c] - a[c])
@@ -169,7 +168,7 @@ def segment_distance2(x, a, b):
 
 @njit(inline="always")
 def _outside_distance2(x, normals, corners, axes):
-    """Squared distance to a simplex of a point outside of it."""
+    """Compute the squared distance to a simplex of a point outside of it."""
     d = len(axes)
     best = np.inf
     for i in range(d + 1):
@@ -189,7 +188,7 @@ def _outside_distance2(x, normals, corners, axes):
 
 @njit(inline="always")
 def _is_over(x, height, facet, normals, corners):
-    """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
+    """Tell whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
     for other in range(4):
         if other == facet:
             continue
@@ -212,7 +211,7 @@ def _is_over(x, height, facet, normals, corners):
 
 @njit(inline="always")
 def allowed(wish, side):
-    """Whether sides of cuts do not contradict those that are wished for; 0 is either side."""
+    """Tell whether sides of cuts do not contradict those that are wished for; 0 is either side."""
     agreed = True
     for p in range(wish.shape[0]):
         if wish[p] * side[p] < 0:
@@ -301,7 +300,7 @@ def _nearest(x, wish, searched, sides, axes, stack):
 
 @njit(cache=True)
 def box_distance2(x, lower, upper):
-    """Squared distance of `x` to a box, 0 inside."""
+    """Compute the squared distance of `x` to a box, 0 inside."""
     distance2 = 0.0
     for a in range(x.shape[0]):
         gap = max(lower[a] - x[a], x[a] - upper[a])
@@ -311,7 +310,7 @@ def box_distance2(x, lower, upper):
 
 
 def no_sides(places: NDArray[Any]) -> NDArray[np.int8]:
-    """Sides (n, 0) of points or of cells, of which there are n, where no cut is known."""
+    """Return sides (n, 0) of n points or cells, where no cut is known."""
     return np.zeros((len(places), 0), dtype=np.int8)
 
 
@@ -334,10 +333,10 @@ def find_cells(
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
     `directions` is (n, d), or (0, d) where no side is wanted. `wanted` (n, c) is the side of c
-    cuts, −1, 1 or 0 (either), that the cell must lie on, and `sides` (m, c) the one that each cell
-    lies on, 0 if unknown; `searched` is as `SearchedCells`. A point whose wish no cell fulfils
-    gets what it would without one. A point that no cell holds within `tolerance` gets the
-    `nearest` one, or −1.
+    cuts, −1, 1 or 0 (either), on which the cell must lie. `sides` (m, c) are the sides of the
+    cells, 0 if unknown; `searched` is as `SearchedCells`. A point whose wish no cell fulfils gets a
+    cell as if without one. A point that no cell holds within `tolerance` gets the `nearest` one, or
+    −1.
     """
     found = np.full(len(points), -1)
     some = directions if len(directions) == len(points) else points
@@ -452,16 +451,14 @@ def nearest_triangles(
     points: Floats, directions: Floats, wanted: NDArray[np.int8], searched: SearchedCells,
     across: Floats, sides: NDArray[np.int8], tolerance: float,
 ) -> tuple[Ints, Floats]:  # fmt: skip
-    """Triangle (n,) nearest to each of `points` (n, 3), and its distance (n,).
+    """Find the triangle (n,) nearest to each of `points` (n, 3), and its distance (n,).
 
-    Of those that are equally near within `tolerance` it is the one whose centre lies in the
-    direction (n, 3) that is given, if there is one, then the one whose edges are farthest.
-
-    `wanted` (n, p) is the side of p planes, −1, 1 or 0 (either), that the triangle must lie on,
-    and `sides` (m, p) the one that each triangle lies on, 0 if on both. A point whose wish no
-    triangle fulfils gets the nearest of all. `searched` is as `SearchedCells`, with the normals of
-    the edges, `across` (m, 3) are those of the triangles. `directions` has no rows if none is
-    wanted.
+    Several may be equally near within `tolerance`. Then the one whose centre lies in the given
+    direction (n, 3) counts, else the one whose edges are farthest. `wanted` (n, p) is the side of p
+    planes, −1, 1 or 0 (either), on which the triangle must lie. `sides` (m, p) are the sides of the
+    triangles, 0 if on both. A point whose wish no triangle fulfils gets the nearest of all.
+    `searched` is as `SearchedCells`, with normals of the edges; `across` (m, 3) are the normals of
+    the triangles. `directions` has no rows if none is wanted.
     """
     given = points, directions, wanted, searched, across, sides, tolerance
     found: tuple[Ints, Floats] = (_nearest_triangles if COMPILED else _triangles_in_numpy)(*given)
@@ -587,7 +584,7 @@ def _nearest_triangle(x, direction, sided, wish, searched, across, sides, tolera
 
 @njit(cache=True)
 def _distance_and_depth(x, normals, across, corners):
-    """Distance of `x` to a triangle, and of its foot in the plane to the nearest edge, inwards."""
+    """Return distances of `x` to a triangle, and of its foot to the nearest edge, inwards."""
     depth, height = np.inf, 0.0
     for k in range(3):
         inwards = 0.0

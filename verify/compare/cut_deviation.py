@@ -2,8 +2,9 @@
 
 Deviations, lateral and at the ends, are measured from the facets of the realised cut and the cuts
 as asked alone, cut by cut: a facet belongs to the cut that it is nearest to. A point whose nearest
-point is a free end lies beyond it: there something is missing, or too much. All other distances are
-lateral deviations. As geometry a realised cut is polylines in the plane, triangles in space.
+point is a free end lies beyond it: there a part of the cut is missing, or too much. All other
+distances are lateral deviations. As geometry a realised cut is polylines in the plane, triangles in
+space.
 """
 
 from collections import defaultdict
@@ -31,8 +32,8 @@ Ints = NDArray[np.int64]
 
 Flags = NDArray[np.bool_]
 
-# Over the longest edge D of an element: what the linear interpolant of the distance from an arc of
-# radius 2D may be off by (docs/theory/judgement.md, "Where the cut is").
+# Over the longest edge D of an element: largest error of the linear interpolant of the distance
+# from an arc of radius 2D (docs/theory/judgement.md, "Where the cut is").
 LIMIT = {2: 1 / 12, 3: 3 / 32}
 _ORDER = {2: 8, 3: 3}  # of the rule on segments and on triangles
 # Of its distance from a point of the realised cut: a place this close to that cut was cut there.
@@ -47,7 +48,7 @@ class RealisedCut:
     Parameters
     ----------
     record : CutRecord
-        Without what is swept.
+        Without swept surfaces.
     facets : (f, k, d) array
     beyond : (f,) bool array
         Facets at which the lateral deviation is above the limit.
@@ -58,7 +59,7 @@ class RealisedCut:
     beyond: Flags
 
     def beyond_at(self, points: Array) -> Flags:
-        """Whether the facets nearest to points (n, d) lie beyond the limit (n,)."""
+        """Tell whether the facets nearest to points (n, d) lie beyond the limit (n,)."""
         if self.record.continued or not len(points):
             return np.zeros(len(points), dtype=bool)
         return np.asarray(
@@ -116,14 +117,14 @@ def realised_cut(solution: Solution, body: AnyBody, rule: CutRule) -> RealisedCu
 def continued_where(
     solution: Solution, body: AnyBody, record: CutRecord | None
 ) -> bool | RealisedCut:
-    """Where a field is continued across its realised cut, of which the record is known."""
+    """Tell where a field is continued across its realised cut, of which the record is known."""
     if record is None or record.continued:
         return True
     return realised_cut(solution, body, cut_rule_of(body, record.element))
 
 
 def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (c, d) of facets (f, k, d), those within `reach` m made one, and (f, k) numbers."""
+    """Merge corners of facets (f, k, d) within `reach` m: corners (c, d), and numbers (f, k)."""
     points = facets.reshape(-1, facets.shape[-1])
     if not len(points):
         return points, np.zeros(facets.shape[:2], dtype=np.int64)
@@ -135,7 +136,7 @@ def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _of_cuts(body: AnyBody, places: Array, same: float) -> Flags:
-    """Whether groups of places (g, p, d) belong to each cut (c, g): the nearest one."""
+    """Tell whether groups of places (g, p, d) belong to each cut (c, g): the nearest one."""
     if len(body.cuts) == 1:
         return np.ones((1, len(places)), dtype=bool)
     flat = places.reshape(-1, places.shape[2])
@@ -147,7 +148,7 @@ def _of_cuts(body: AnyBody, places: Array, same: float) -> Flags:
 def _to_realised(
     points: Array, normals: Array | None, facets: Array, body: AnyBody, same: float
 ) -> tuple[Array, Flags, Ints]:
-    """Distances (n,) of points from facets, whether these end there (n,), and the nearest (n,)."""
+    """Measure points to facets: distances (n,), whether facets end there (n,), the nearest (n,)."""
     if not len(facets):
         nowhere = np.full(len(points), np.inf), np.ones(len(points), dtype=bool)
         return *nowhere, np.zeros(len(points), dtype=np.int64)
@@ -161,7 +162,7 @@ def _to_realised(
 
 
 def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Array, Array, Flags]:
-    """Distances (n,) of points from a cut as asked, feet (n, d), and whether it ends there (n,)."""
+    """Measure points to a cut as asked: distances (n,), feet (n, d), whether it ends there (n,)."""
     if isinstance(body, MembraneBody):
         ends = body.lines[cut].ends
         away, foot, _ = nearest_segments(points, ends)
@@ -173,7 +174,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
     if isinstance(body, SolidBody):
         nearest = each <= away + same
         rim = np.array([patch.nearest(points)[1] for patch in body.cuts[cut]])
-        # what two patches share is no end
+        # an edge that two patches share is no end
         return away, foot, (nearest & rim).any(axis=0) & (nearest.sum(axis=0) == 1)
     if isinstance(body, Body):
         ends = np.array([piece.point(np.array([0.0, 1.0])) for piece in body.cuts[cut]])
@@ -185,7 +186,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
 
 
 def _ends_aside(facets: Array, body: AnyBody, cut: str, limit: float, same: float) -> bool:
-    """Whether facets end freely beside the middle of a cut as asked."""
+    """Tell whether facets end freely beside the middle of a cut as asked."""
     free = _free_faces(facets, body, same).mean(axis=1)
     away, _, end = _to_asked(free, body, cut, same)
     return bool((~end & (away > limit)).any())
@@ -207,7 +208,7 @@ def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
 
 
 def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, Array, Ints]:
-    """Distance (n,) of points (n, d), the foot (n, d) on segments, and the nearest facet (n,)."""
+    """Return distances (n,) of points (n, d), feet (n, d) on segments, and nearest facets (n,)."""
     if facets.shape[1] == 2:
         return nearest_segments(points, facets)
     thick = np.flatnonzero(heights(facets) > same)
@@ -216,7 +217,7 @@ def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, A
 
 
 def _element(solution: Solution, facets: Array) -> float:
-    """Largest longest edge of the cells within their own diameter of the facets, or of all, m."""
+    """Find the longest edge of cells within their diameter of the facets, or of all, m."""
     corners = cells_of(solution).corners
     longest = np.max(
         [np.linalg.norm(corners - np.roll(corners, k, axis=1), axis=2).max(axis=1)
@@ -230,7 +231,7 @@ def _element(solution: Solution, facets: Array) -> float:
 
 
 def _radius(body: AnyBody) -> float | None:
-    """Least radius of curvature of the cuts of a body, m; None if nothing is curved."""
+    """Compute the least radius of curvature of the cuts of a body, m; None if nothing is curved."""
     if isinstance(body, Body):
         found = [part.piece.radius for part in body.parts if isinstance(part.piece, Arc)]
     else:
@@ -276,7 +277,7 @@ def polylines_of(facets: Array) -> list[Array]:
 
 
 def triangles_of(facets: Array) -> Array:
-    """Return those of the triangles (f, 3, 3) that have an area, corners side by side made one.
+    """Select the triangles (f, 3, 3) that have an area, with corners side by side made one.
 
     A cut that passes within 1e-6 of its size of a node leaves slivers there, of which a scene
     makes no polygons; a conforming mesh has a node on such a cut anyway.
@@ -290,7 +291,7 @@ def triangles_of(facets: Array) -> Array:
 
 
 def _welded(facets: Array, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (c, d), those within `tolerance` of the cut's size made one, and (f, k) numbers."""
+    """Merge corners within `tolerance` of the cut's size: corners (c, d), and numbers (f, k)."""
     points = facets.reshape(-1, facets.shape[-1])
     return welded(facets, tolerance * float(np.ptp(points, axis=0).max()) if len(points) else 0.0)
 

@@ -1,9 +1,10 @@
 """Openings of cuts: at a place, and along the line that an opening profile is drawn on.
 
 A cut in the plane, or in a membrane, is such a line itself. On a cut in space one line is taken:
-the longer axis of a disc, the arc of a cylinder at half its height, a meridian of a sphere, the
-line half-way along a swept polyline, and of a polygon the line through its centroid along its
-longest direction.
+
+- the longer axis of a disc, a meridian of a sphere;
+- the arc of a cylinder at half its height, the line half-way along a swept polyline;
+- of a polygon the line through its centroid along its longest direction.
 """
 
 from collections.abc import Sequence
@@ -37,12 +38,12 @@ Array = NDArray[np.float64]
 def opening(
     field: Field, body: AnyBody, cut: str, place: float | Sequence[float], component: str
 ) -> float:
-    """Jump in m at a place of a cut, along its normal or its tangent.
+    """Compute the jump in m at a place of a cut, along its normal or its tangent.
 
-    In the plane the place is a fraction of the cut's length, and the tangent goes along the
-    cut's direction; in space the place is a point, of which the nearest on the cut is taken,
-    and the tangential jump is the length of what is left of the jump without its normal part.
-    The normal points into the positive side; of a membrane it lies in the surface.
+    In the plane the place is a fraction of the cut's length, and the tangent goes along the cut's
+    direction. In space it is the point of the cut nearest to a given one, and the tangential jump
+    is a length: the jump without its normal part. The normal points into the positive side; of a
+    membrane it lies in the surface.
     """
     at = cut_place(body, cut, place)
     normal, jump = at.normals[0], displacement_jump(field, at)[0]
@@ -54,7 +55,7 @@ def opening(
 
 
 def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRule:
-    """Take the point of a cut where an opening is asked for, as a rule of weight 1."""
+    """Take the point of a cut at which an opening is measured, as a rule of weight 1."""
     if isinstance(body, Body):
         assert isinstance(place, float)
         return place_on_cut(body, cut, place)
@@ -65,7 +66,7 @@ def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRul
 
 
 def point_displacement(field: Field, point: Sequence[float], component: str) -> float:
-    """Displacement in m of `point` in direction ``x``, ``y`` or ``z``."""
+    """Compute the displacement in m of `point` in direction ``x``, ``y`` or ``z``."""
     at = np.array([point], dtype=float)
     return float(field.displacement(at, at)[0, "xyz".index(component)])
 
@@ -161,13 +162,13 @@ def _line_of(patches: Sequence[Patch]) -> tuple[str, list[Array]]:
 
 
 def _half_way(patch: PlanePatch, share: Array) -> Array:
-    """Line between the middles of the two sides of a swept segment (a, b, b + along)."""
+    """Draw a line between the middles of the two sides of a swept segment (a, b, b + along)."""
     a, b, c = patch.cells[0]
     return np.asarray(a + share[:, None] * (b - a) + 0.5 * (c - b))
 
 
 def _longest(patch: PlanePatch, share: Array) -> Array:
-    """Line through the centroid of a polygon, as long as it stays inside."""
+    """Draw a line through the centroid of a polygon, as long as it stays inside."""
     edges = patch.cells[:, 1:] - patch.cells[:, :1]
     area = 0.5 * np.abs(np.linalg.det(edges))
     middle = np.average(patch.cells.mean(axis=1), axis=0, weights=area)
@@ -185,7 +186,7 @@ def _longest(patch: PlanePatch, share: Array) -> Array:
 
 
 def _on_membrane(body: MembraneBody, cut: str) -> ProfileLine:
-    """Middles of the pieces of a cut, in their order along its longest direction."""
+    """Take the middles of the pieces of a cut, in order along its longest direction."""
     lines = body.lines[cut]
     middle = lines.ends.mean(axis=1)
     along = np.linalg.svd(lines.ends.reshape(-1, 3) - middle.mean(axis=0))[2][0]
@@ -210,7 +211,7 @@ def _line(
 
 
 def _towards_ends() -> Array:
-    """Shares (n,) of a line, inside its ends."""
+    """Choose shares (n,) of a line, inside its ends."""
     return 0.5 * (1.0 - np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS))
 
 

@@ -50,7 +50,7 @@ class CutRule:
 
     @classmethod
     def beside(cls, points: Array, weights: Array, normals: Array, away: Array | float) -> Self:
-        """Rule with its sides at distances `away` (n,) along the normals, m."""
+        """Make a rule with its sides at distances `away` (n,) along the normals, m."""
         shift = np.multiply(np.reshape(away, (-1, 1)), normals)
         return cls(points, weights, normals, points + shift, points - shift)
 
@@ -68,7 +68,7 @@ class CutRule:
 
 
 def cut_rule(body: Body, spacing: float) -> CutRule:
-    """Quadrature along all cuts of a body, inside it.
+    """Make a quadrature along all cuts of a body, inside it.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def cut_rule(body: Body, spacing: float) -> CutRule:
 def along_cut(
     ends: Array, length: float, special: NDArray[np.bool_], size: float, spacing: float,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Points of a quadrature along a piece of a cut, graded to those ends that are special.
+    """Make points of a quadrature along a piece of a cut, graded to its special ends.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ _WHOLE = np.array([0.0, 1.0])
 
 
 def membrane_cut_rule(body: MembraneBody, spacing: float) -> CutRule:
-    """Quadrature along all cuts of a membrane; as `cut_rule`.
+    """Make a quadrature along all cuts of a membrane; as `cut_rule`.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _beside(
     lines: SurfaceLines, which: NDArray[np.int64], points: Array, weights: Array,
     away: Array | float,
 ) -> CutRule:  # fmt: skip
-    """Rule on the lines `which` (n,): beside an edge of a fold the two sides are not opposite."""
+    """Make a rule on lines `which` (n,): beside an edge of a fold the sides are not opposite."""
     positive, negative = (points + away * ways[which] for ways in (lines.positive, lines.negative))
     return CutRule(points, weights, lines.normals[which], positive, negative)
 
@@ -181,12 +181,12 @@ def _beside(
 # Where the border of the body is not straight in a patch's parameters, cells on it are halved
 # down to this share of the spacing, and their points outside left out.
 _BORDER = 1 / 16
-_THIN = 1e-12  # of the body: what is as close to a plane is on it
+_THIN = 1e-12  # of the body: points as close to a plane are on it
 _SURFACE_ORDER = 2  # of the rule in each triangle, see `simplex_rule`
 
 
 def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutRule:
-    """Quadrature on all cuts of a body in space, inside it.
+    """Make a quadrature on all cuts of a body in space, inside it.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:
 
 
 def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple[Array, Array]:
-    """Triangles (m, 3, 2) of a patch's parameters inside the body, and their sizes (m,) in m."""
+    """Divide a patch's parameters inside the body: triangles (m, 3, 2), and sizes (m,) in m."""
 
     def in_space(cells: Array) -> Array:
         return patch.point(cells.reshape(-1, 2)).reshape(-1, 3, 3)
@@ -258,7 +258,7 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
     lower, upper = body.corners.min(axis=(0, 1)), body.corners.max(axis=(0, 1))
 
     def meets_body(some: Array, sizes: Array) -> NDArray[np.bool_]:
-        """Whether cells may hold a part of the body: by boxes, wider where a patch bulges."""
+        """Tell whether cells may hold a part of the body: by boxes, wider where a patch bulges."""
         margin = np.full(len(some), AWAY * body.size)
         if patch.curvature:  # a chord of a radius at most has its arc within itself
             margin += np.where(sizes * patch.curvature <= 1.0, sizes, np.inf)
@@ -284,7 +284,7 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
 
 
 def _sections(patch: PlanePatch, body: SolidBody) -> Array:
-    """Triangles (m, 3, 2) of a plane patch's parameters, one or two in each tetrahedron on it."""
+    """Divide a plane patch's parameters: one or two triangles (m, 3, 2) per tetrahedron on it."""
     thin = _THIN * body.size
     levels = patch.level(body.corners.reshape(-1, 3)).reshape(-1, 4)
     crossed = body.corners[(levels.max(axis=1) > thin) & (levels.min(axis=1) <= thin)]
@@ -311,15 +311,15 @@ def _sections(patch: PlanePatch, body: SolidBody) -> Array:
 
 
 def _height(corner: Array, inward: Array, places: Array) -> Array:
-    """Heights (n,) of places (n, 2) over an edge at a corner, positive on its inward side."""
+    """Return heights (n,) of places (n, 2) over an edge at a corner, positive inwards."""
     return np.asarray((places - corner) @ inward)
 
 
 def _faces(box: Array) -> list[tuple[int, float, float]]:
-    """Axis, place and direction inwards of the six faces of a box (2, 3)."""
+    """List axis, place and inward direction of the six faces of a box (2, 3)."""
     return [(a, float(box[k, a]), s) for k, s in ((0, 1.0), (1, -1.0)) for a in range(3)]
 
 
 def _depth_below(patch: Patch, axis: int, end: float, sign: float) -> Callable[[Array], Array]:
-    """Distance from a face of a box, positive inside, as a function of a patch's parameters."""
+    """Return the distance from a face of a box, positive inside, by a patch's parameters."""
     return lambda uv: sign * (patch.point(uv)[:, axis] - end)

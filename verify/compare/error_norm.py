@@ -56,7 +56,7 @@ class ErrorNorm:
 class Squares:
     """Integrands of the squares of both norms at the points of a rule.
 
-    What is near a tip and what is far from it are the same integrands with other weights.
+    Near a tip and far from it the integrands are the same, with other weights.
 
     Parameters
     ----------
@@ -68,16 +68,16 @@ class Squares:
     expected: Array
 
     def norm(self, weights: Array, whole: Array | None = None) -> ErrorNorm:
-        """Norms with the weights (n,) of the points; with those of the `whole`, of the scale."""
+        """Integrate with the weights (n,) of the points, the scale with the weights `whole`."""
         of_scale = weights if whole is None else whole
         return ErrorNorm(
             float(np.sqrt(weights @ self.difference)), float(np.sqrt(of_scale @ self.expected))
         )
 
     def above(self, share: float, whole: float, weights: Array) -> "Squares":
-        """Set to zero what is round-off: the reference, and then a difference as small.
+        """Set round-off to zero: the reference, and then a difference as small.
 
-        Each is where its norm, with the weights (n,), is at most a share of the root of `whole`.
+        A norm with the weights (n,) is round-off if it is at most a share of the root of `whole`.
         """
         bound = share**2 * whole
         if weights @ self.expected > bound:
@@ -87,7 +87,7 @@ class Squares:
         return Squares(nothing if small else self.difference, nothing)
 
     def largest(self) -> ErrorNorm:
-        """Largest values at the points.
+        """Compute largest values at the points.
 
         The points lie close to everything but do not hit the maximum: the difference between
         rules, taken as the integration error, says how much that matters.
@@ -98,7 +98,7 @@ class Squares:
 
 
 def displacement_error(field: Field, reference: Field, rule: Rule) -> ErrorNorm:
-    """‖u − u_ref‖ and ‖u_ref‖ in L2 of the body; units m·m (2D), m·m^1.5 (3D)."""
+    """Compute ‖u − u_ref‖ and ‖u_ref‖ in L2 of the body; units m·m (2D), m·m^1.5 (3D)."""
     return displacement_squares(field, reference, rule).norm(rule.weights)
 
 
@@ -112,20 +112,20 @@ def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorN
 
 
 def jump_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
-    """‖[u] − [u_ref]‖ and ‖[u_ref]‖ in L2 of the cuts as asked."""
+    """Compute ‖[u] − [u_ref]‖ and ‖[u_ref]‖ in L2 of the cuts as asked."""
     return jump_squares(field, reference, rule).norm(rule.weights)
 
 
 def displacement_squares(
     field: Field, reference: Field, rule: Rule, law: Law | None = None
 ) -> Squares:
-    """|u − u_ref|² and |u_ref|² at the points of a rule, m²."""
+    """Compute |u − u_ref|² and |u_ref|² at the points of a rule, m²."""
     expected = reference.displacement(rule.points, rule.points)
     return _squares(field.displacement(rule.points, rule.points), expected)
 
 
 def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squares:
-    """Integrands of the squares of `energy_error` at the points of a rule, J/m^d."""
+    """Compute integrands of the squares of `energy_error` at the points of a rule, J/m^d."""
     law = law.at(rule.points)
     difference, energy, entries = law.compared(rule.gradient(field), rule.gradient(reference))
     # a solution's field has both at once, a formula was asked for these before
@@ -137,7 +137,7 @@ def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squa
 
 
 def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None = None) -> Squares:
-    """|[u] − [u_ref]|² and |[u_ref]|² at the points of a rule of the cuts as asked, m²."""
+    """Compute |[u] − [u_ref]|² and |[u_ref]|² at the points of a rule of the cuts as asked, m²."""
     found, expected = displacement_jump(field, rule), displacement_jump(reference, rule)
     return _of_jumps(found, expected, reference, rule)
 
@@ -145,7 +145,7 @@ def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None 
 def opening_squares(
     field: Field, reference: Field, rule: CutRule, law: Law | None = None
 ) -> Squares:
-    """|[u_n] − [u_ref,n]|² and |[u_ref,n]|² of the jump along the normal of the cuts, m²."""
+    """Compute |[u_n] − [u_ref,n]|² and |[u_ref,n]|² of jump along the normal of the cuts, m²."""
     found, expected = (
         np.einsum("ni,ni->n", displacement_jump(one, rule), rule.normals)[:, None]
         for one in (field, reference)
@@ -154,7 +154,7 @@ def opening_squares(
 
 
 def displacement_jump(field: Field, rule: CutRule) -> Array:
-    """Displacement (n, d) of the positive side minus that of the negative side, m."""
+    """Subtract the displacement of the negative side from the positive side's, (n, d), m."""
     above = field.displacement(rule.points, rule.positive)
     return above - field.displacement(rule.points, rule.negative)
 
@@ -178,8 +178,8 @@ _MOST = 150_000  # cells in space before grading: bounds memory and time
 # What the largest difference of two or three rules is multiplied with. In space the rules are
 # coarser, and their errors have a common part, which falls at least like the spacing: of three it
 # is at most 1 / (1.73 − 1) of the largest difference, of the two coarser 1.31 / (1.73 − 1.31). In
-# the plane it falls at least like the square: 1.31² / (1.73² − 1.31²); what is left is by chance,
-# of which two rules are a smaller sample.
+# the plane it falls at least like the square: 1.31² / (1.73² − 1.31²); the rest is random, and two
+# rules are a smaller sample of it.
 _SAFETY = {2: (0.0, 2.0, 1.0), 3: (0.0, 3.2, 1.5)}
 
 
@@ -192,7 +192,7 @@ class MeasuredNorm:
 
 
 def rule_of(body: AnyBody, size: float, k: int) -> Rule:
-    """Rule `k` of a body for fields on elements of size `size` m; the finest is 0."""
+    """Make the rule `k` of a body for fields on elements of size `size` m; the finest is 0."""
     factor = _FAMILY[k]
     if isinstance(body, Body):
         return area_rule(body, factor * size / 3, slab_angles(body)[k], grading=_GRADING)
@@ -204,12 +204,12 @@ def rule_of(body: AnyBody, size: float, k: int) -> Rule:
 
 
 def rules(body: AnyBody, size: float, count: int = 3) -> list[Rule]:
-    """Rules of a body for fields on elements of size `size` m, the finest first."""
+    """Compute rules of a body for fields on elements of size `size` m, the finest first."""
     return [rule_of(body, size, k) for k in range(count)]
 
 
 def cut_rule_of(body: AnyBody, size: float, k: int = 0) -> CutRule:
-    """Rule `k` on the cuts for fields on elements of size `size` m; the finest is 0."""
+    """Make the rule `k` on the cuts for fields on elements of size `size` m; the finest is 0."""
     factor = _FAMILY[k]
     if isinstance(body, Body):
         return cut_rule(body, factor * size / 8)

@@ -1,4 +1,4 @@
-"""The errors that are measured: of what, where (near tips, far from them), and over time.
+"""Errors of a field: in the body, near tips, far from them, on cuts, and over time.
 
 For pictures there is the error of a solution at its own nodes as well.
 """
@@ -39,12 +39,12 @@ from verify.solution import Solution
 
 Array = NDArray[np.float64]
 
-# Radius of what is near over the length of the cuts, in space the root of their area.
+# Radius called near a tip, over the length of the cuts, in space over the root of their area.
 NEAR = 0.1
 
 
 def near_radius(body: AnyBody) -> float:
-    """Distance from a tip or front that is called near, m; 0 if there is none.
+    """Compute the distance from a tip or front that is called near, m; 0 if there is none.
 
     A tenth of the length of the shortest cut inside the body that has a tip; in a solid of the
     root of the area of the cuts inside the body.
@@ -69,12 +69,12 @@ def near_radius(body: AnyBody) -> float:
 
 
 def near_tip(body: AnyBody, points: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
-    """Whether points (n, d) are nearer to a tip or front than `radius` m."""
+    """Tell whether points (n, d) are nearer to a tip or front than `radius` m."""
     return np.asarray(body.tip_distance(points) < radius)
 
 
 def _lengths_with_tip(body: MembraneBody) -> list[float]:
-    """Lengths of the cuts of a membrane that end inside it, m."""
+    """Compute lengths of the cuts of a membrane that end inside it, m."""
     return [
         float(lines.lengths.sum())
         for lines in body.lines.values()
@@ -130,7 +130,7 @@ ERRORS: dict[str, ErrorMetric] = {
 OVER_TIME = ("displacement_l2", "energy_norm", "jump_l2")
 
 
-# Places in the family of rules: what is measured first, and where that is too coarse.
+# Places in the family of rules: the first measurement, and the one where that is too coarse.
 COARSER, FINEST = (1, 2), (0,)
 
 
@@ -152,23 +152,23 @@ class Rules:
         self._has_cuts = body.has_cuts and bool(len(self.one("cut", 0).weights))
 
     def measured(self) -> list[str]:
-        """Names of the errors that mean something on this body."""
+        """List the names of the errors that mean something on this body."""
         there = {"body": True, "near": self.radius, "far": self.radius, "cut": self._has_cuts}
         return [name for name, metric in ERRORS.items() if there[metric.where]]
 
     def one(self, place: str, k: int) -> Any:
-        """Rule of the body, or on its cuts, at a place in its family: the finest is 0."""
+        """Make the rule of the body, or on its cuts, at a place in its family: the finest is 0."""
         if (place, k) not in self._made:
             make = cut_rule_of if place == "cut" else rule_of
             self._made[place, k] = make(self._body, self._size, k)
         return self._made[place, k]
 
     def on_cuts(self) -> Any:
-        """Finest rule on the cuts; None without any."""
+        """Make the finest rule on the cuts; None without any."""
         return self.one("cut", 0) if self._has_cuts else None
 
     def _weights(self, where: Where, rule: Any) -> Array:
-        """Weights (n,) of the points of a rule at what counts; 0 of others."""
+        """Return weights (n,) of the points of a rule, 0 outside of the region."""
         if where in ("body", "cut"):
             return np.asarray(rule.weights)
         if (where, id(rule)) not in self._made:
@@ -181,11 +181,11 @@ class Rules:
         self, names: Iterable[str], field: Field, reference: Field, law: Law,
         which: Sequence[int] = (0, 1, 2),
     ) -> dict[str, list[ErrorNorm]]:  # fmt: skip
-        """Error norms by name and by rule, of `which` of the family, in that order.
+        """Measure error norms by name and by rule, of `which` of the family, in that order.
 
-        What is measured near a tip or far from it is held against the norm of the reference
-        over the whole body: the squares of both add up to the square of the whole. All three
-        have the same integrands, which are evaluated once.
+        Errors near a tip and far from it are relative to the norm of the reference over the whole
+        body: their squares add up to the square of the whole error. All three have the same
+        integrands, which are evaluated once.
         """
         found: dict[str, list[ErrorNorm]] = {name: [] for name in names}
         measures = dict.fromkeys((ERRORS[n].measure, ERRORS[n].place) for n in found)
@@ -210,7 +210,7 @@ ERROR_NAMES = (
 
 
 def base_of(name: str) -> str:
-    """Error that a name of `ERROR_NAMES` is the maximum or mean over time of, or itself."""
+    """Return the error behind a name of `ERROR_NAMES`: without maximum or mean over time."""
     return name if name in ERRORS else name.rsplit("_", 1)[0]
 
 
@@ -229,7 +229,7 @@ class History:
     norms: dict[str, list[list[ErrorNorm]]]
 
     def after(self, finer: "History") -> "History":
-        """Return both: first what is measured by finer rules, as far as it is."""
+        """Return both, with the measurements by finer rules first where there are any."""
         rows = {
             name: [[*first, *row] for first, row in zip(finer.norms[name], own, strict=True)]
             if name in finer.norms
@@ -239,7 +239,7 @@ class History:
         return History(self.times, rows)
 
     def reported(self) -> dict[str, list[ErrorNorm]]:
-        """Error norms by name and rule.
+        """Collect error norms by name and rule.
 
         Over time every error is held against the largest norm of the reference at any time: at
         the instant at which a vibration passes through zero there is nothing to be relative to.
@@ -261,7 +261,7 @@ class History:
         return found
 
     def series(self) -> dict[str, list[float]]:
-        """Relative errors over time by the finest rule, with the times; empty if static."""
+        """Return relative errors over time by the finest rule, with the times; empty if static."""
         if len(self.times) == 1:
             return {}
         rows = {"time": [float(t or 0.0) for t in self.times]}
@@ -280,7 +280,7 @@ def mean_over(times: Sequence[float], values: Array) -> Array:
 
 
 def compared_times(scene: Scene, solution: Solution) -> list[float | None]:
-    """Output times of a moving solution, which it is compared at; [None] for a static scene."""
+    """Return the output times to compare a moving solution at; [None] for a static scene."""
     if scene.analysis.kind == "static" or len(solution.times) == 1:
         return [None]
     return [float(time) for time in solution.times]
@@ -290,7 +290,7 @@ def error_history(
     field: Motion, reference: Motion, times: Iterable[float | None], rules: Rules, law: Law,
     which: Sequence[int] = (0, 1, 2), names: Iterable[str] | None = None,
 ) -> History:  # fmt: skip
-    """Measure all errors of a field, or those of some `names`, at all times, by some rules."""
+    """Measure all errors of a field, or the ones of `names`, at all times, by some rules."""
     times = list(times)
     asked = rules.measured() if names is None else names
     norms: dict[str, list[list[ErrorNorm]]] = {name: [] for name in asked}
@@ -344,10 +344,10 @@ def nodal_differences(
     solution: Solution, truth: Truth, body: AnyBody | None = None, steps: Sequence[int] = (-1,),
     cut: CutRecord | None = None,
 ) -> Array:  # fmt: skip
-    """Displacement of a solution less the true one, at its nodes, m.
+    """Subtract the true displacement from a solution's, at its nodes, m.
 
-    Both fields are taken a hundredth of the way from the node to the centre of its largest cell,
-    so that a node on the cut is compared on its own side.
+    Both fields are taken a hundredth of the way from the node to the centre of its largest cell. So
+    a node on the cut is compared on its own side.
 
     Parameters
     ----------
@@ -370,7 +370,7 @@ def nodal_differences(
     points, cells = solution.points, solution.cells
     shape = simplices(points, cells)
     owner = np.full(len(points), -1)
-    order = np.argsort(shape.volume, kind="stable")  # of what is assigned twice, the last stays
+    order = np.argsort(shape.volume, kind="stable")  # of two assignments the last stays
     owner[cells[order].ravel()] = np.repeat(order, cells.shape[1])
     used = owner >= 0
     centre = shape.corners.mean(axis=1)[owner[used]]
@@ -390,7 +390,7 @@ def nodal_differences(
 def nodal_error(
     solution: Solution, truth: Field, body: AnyBody | None = None, cut: CutRecord | None = None
 ) -> Array:
-    """Magnitude (n,) of the displacement error at the last output time, as `nodal_differences`."""
+    """Return the magnitude (n,) of `nodal_differences` at the last output time."""
     return np.linalg.norm(nodal_differences(solution, lambda _: truth, body, cut=cut)[0], axis=1)
 
 

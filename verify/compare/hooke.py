@@ -5,10 +5,10 @@ formulation with polar rotations is; U is the stretch of F = I + ∇u = R U. A m
 of the two stretches in its tangent plane, times its thickness, with the λ of plane stress.
 Neo-Hookean: ½μ(‖F‖² − d) + H(J), J = det F, with H of one of two models.
 
-As full tensors in space the strain is ε = sym ∇u and the stress σ = λ tr(ε) I + 2μ ε; corotational
+Strain and stress are full tensors in space: ε = sym ∇u and σ = λ tr(ε) I + 2μ ε. Corotational
 kinematics and membranes have Biot strain U − I and Biot stress of the same form, neo-Hookean bodies
-that of their energy: material tensors that are the same for a body that is turned. What plane
-strain, plane stress or a membrane says of the direction across is filled in.
+Biot stress by their energy. Biot tensors do not change as a body turns. Components across follow
+from plane strain, plane stress or the membrane.
 """
 
 from collections.abc import Callable, Iterator
@@ -31,14 +31,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hooke:
-    """Lamé constants (Pa), those of the plane problem in plane stress; of a membrane in N/m.
+    """Lamé constants (Pa), with the plane λ in plane stress; of a membrane in N/m.
 
     Parameters
     ----------
     lame, shear : float or (n,) array
         λ and μ; one for each of n gradients after `at`.
     material : Material, optional
-        Given where materials differ by region: the constants are then those of ``[material]``.
+        Given where materials differ by region: the constants then belong to ``[material]``.
     """
 
     lame: float | Array
@@ -57,35 +57,35 @@ class Hooke:
         return replace(self, lame=lame, shear=shear, material=None)
 
     def energy_density(self, gradient: Array) -> Array:
-        """½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
+        """Compute ½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
         _, _, trace2, square, _ = difference_squares(gradient, gradient)
         return np.asarray(0.5 * self.lame * trace2 + self.shear * square)
 
     def piola(self, gradient: Array) -> Array:
-        """First Piola-Kirchhoff stress, of which the energy density has the power; as gradients.
+        """Compute the first Piola-Kirchhoff stress, work-conjugate to the gradient, in its shape.
 
         In Pa, of a membrane N/m.
         """
         return self._stress(gradient)
 
     def power_density(self, gradient: Array, rate: Array) -> Array:
-        """Power (n,) in W/m³ of the stress of displacement gradients on velocity gradients."""
+        """Compute the power (n,) in W/m³ of stresses on velocity gradients."""
         return np.einsum("nij,nij->n", self.piola(gradient), rate)
 
     def _stress(self, slope: Array) -> Array:
-        """λ tr(ε) I + 2μ ε (n, k, k) of ε = sym slope."""
+        """Compute λ tr(ε) I + 2μ ε (n, k, k) of ε = sym slope."""
         stress = np.reshape(self.shear, (-1, 1, 1)) * (slope + np.swapaxes(slope, 1, 2))
         trace = self.lame * np.einsum("nii->n", slope)
         return np.asarray(stress + trace[:, None, None] * np.eye(slope.shape[1]))
 
     def error_density(self, difference: Array, expected: Array) -> Array:
-        """Energy density (n,) of the difference of a gradient from an `expected` one."""
+        """Compute energy density (n,) of the difference of a gradient from an `expected` one."""
         return self.energy_density(difference)
 
     def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
-        """Energy densities (n,) of the difference of gradients and of those expected, J/m³.
+        """Compute energy densities (n,) of the difference of gradients and of `expected`, J/m³.
 
-        The third (n,) are the sums of squares of the entries of those expected.
+        The third (n,) are the sums of squares of the entries of `expected`.
         """
         trace2, square, own_trace2, own_square, entries = difference_squares(found, expected)
         difference = 0.5 * self.lame * trace2 + self.shear * square
@@ -97,11 +97,11 @@ class Corotated(Hooke):
     """The same constants, with the energy of the stretch."""
 
     def energy_density(self, gradient: Array) -> Array:
-        """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
+        """Compute μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
         return self._density(_principal_stretches(gradient) - 1.0)
 
     def piola(self, gradient: Array) -> Array:
-        """R (2μ(U − I) + λ tr(U − I) I), as gradients."""
+        """Compute R (2μ(U − I) + λ tr(U − I) I), as gradients."""
         turn, unit = self._turn(gradient), np.eye(*gradient.shape[1:])
         strain = np.swapaxes(turn, 1, 2) @ (unit + gradient) - np.eye(gradient.shape[2])
         return np.asarray(turn @ self._stress(strain))
@@ -112,13 +112,13 @@ class Corotated(Hooke):
         return difference, self.energy_density(expected), squares(expected)
 
     def _density(self, stretch: Array) -> Array:
-        """Energy density (n,) of principal stretches less one (n, k)."""
+        """Compute the energy density (n,) of principal stretches less one (n, k)."""
         density: Array = self.shear * np.sum(stretch**2, axis=1)
         density += 0.5 * self.lame * np.sum(stretch, axis=1) ** 2
         return density
 
     def error_density(self, difference: Array, expected: Array) -> Array:
-        """Energy density (n,) of sym(Rᵀ δ), δ the difference and R the expected rotation.
+        """Compute energy density (n,) of sym(Rᵀ δ), δ the difference and R the expected rotation.
 
         It is the linear one in the frame that turns with the expected field: it does not
         change if both fields are turned, and is the exact one to second order.
@@ -127,7 +127,7 @@ class Corotated(Hooke):
         return Hooke.energy_density(self, turned)
 
     def _turn(self, gradient: Array) -> Array:
-        """Rotations R of displacement gradients, shaped alike."""
+        """Compute the rotations R of displacement gradients, shaped alike."""
         return _rotations(gradient)
 
 
@@ -140,13 +140,13 @@ class MembraneLaw(Corotated):
     """
 
     def energy_density(self, gradient: Array) -> Array:
-        """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m² of displacement gradients (n, 3, 2)."""
+        """Compute μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m² of displacement gradients (n, 3, 2)."""
         along = gradient[:, :2]
         strain = along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
         return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
 
     def _turn(self, gradient: Array) -> Array:
-        """Rotations R (n, 3, 2) of the tangent plane."""
+        """Compute the rotations R (n, 3, 2) of the tangent plane."""
         left, _, right = np.linalg.svd(np.eye(3)[:, :2] + gradient, full_matrices=False)
         return np.asarray(left @ right)
 
@@ -164,7 +164,7 @@ class NeoHookean(Corotated):
     stable: bool = False
 
     def energy_density(self, gradient: Array) -> Array:
-        """½μ(‖F‖² − d) + H(J) (n,) in J/m³; infinite where ln J is not defined."""
+        """Compute ½μ(‖F‖² − d) + H(J) (n,) in J/m³; infinite where ln J is not defined."""
         square = np.einsum("nij,nij->n", gradient, gradient)
         trace, away = np.einsum("nii->n", gradient), _volume_change(gradient)
         # ½μ(‖F‖² − d) − μ (J − 1), without cancellation at rest
@@ -177,7 +177,7 @@ class NeoHookean(Corotated):
         return np.where(away > -1.0, density, np.inf)
 
     def piola(self, gradient: Array) -> Array:
-        """First Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa."""
+        """Compute the first Piola-Kirchhoff stress P = μ F + H′(J) cof F (n, d, d), Pa."""
         J = 1.0 + _volume_change(gradient)
         if self.stable:
             slope = (self.lame + self.shear) * (J - 1.0) - self.shear
@@ -193,17 +193,17 @@ Law = Hooke | Corotated | MembraneLaw | NeoHookean
 
 
 def hooke(material: Material) -> Hooke:
-    """Lamé constants of a scene's material."""
+    """Make Hooke's law of a scene's material."""
     return Hooke(*_constants(material), _if_several(material))
 
 
 def corotated(material: Material) -> Corotated:
-    """Corotated energy of a scene's material."""
+    """Make the corotated law of a scene's material."""
     return Corotated(*_constants(material), _if_several(material))
 
 
 def law_of(scene: Scene) -> Law:
-    """Elasticity that a scene asks for."""
+    """Choose the law of elasticity of a scene."""
     if scene.cell_dimension < scene.dimension:
         return MembraneLaw(*_constants(scene.material), _if_several(scene.material))
     model = scene.material.model
@@ -219,7 +219,7 @@ def _if_several(material: Material) -> Material | None:
 
 
 def _constants(material: Material) -> tuple[float, float]:
-    """λ and μ; in plane stress the λ that is left when the thickness gives way.
+    """Return λ and μ; in plane stress the λ of a thickness that gives way.
 
     That λ is the same in both energies: each is quadratic in its strain measure.
     """
@@ -232,7 +232,7 @@ def _constants(material: Material) -> tuple[float, float]:
 
 
 def _principal_stretches(gradient: Array) -> Array:
-    """Principal stretches (n, d); the smallest is negative where the material is inverted.
+    """Compute principal stretches (n, d); the smallest is negative where the material is inverted.
 
     With a sum and a difference from the gradient itself in the plane, and from C − I, not from
     C, in space: 1 is never added to a small strain before it counts.
@@ -253,7 +253,7 @@ def _principal_stretches(gradient: Array) -> Array:
 
 
 def _volume_change(gradient: Array) -> Array:
-    """J − 1 (n,) of displacement gradients (n, d, d): 1 is not added before it counts."""
+    """Compute J − 1 (n,) of displacement gradients (n, d, d), without adding 1 first."""
     trace = np.einsum("nii->n", gradient)
     minors = 0.5 * (trace**2 - np.einsum("nij,nji->n", gradient, gradient))
     change = trace + minors
@@ -261,7 +261,7 @@ def _volume_change(gradient: Array) -> Array:
 
 
 def _cofactors(F: Array) -> Array:
-    """Cofactors of F (n, d, d)."""
+    """Compute cofactors of F (n, d, d)."""
     if F.shape[1] == 2:
         return np.asarray(F[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]])
     a, b, c = (F[:, k] for k in range(3))
@@ -269,12 +269,12 @@ def _cofactors(F: Array) -> Array:
 
 
 def _less_one(excess: Array) -> Array:
-    """Stretches less one of eigenvalues of C − I."""
+    """Compute the stretches less one of eigenvalues of C − I."""
     return np.asarray(excess / (1.0 + np.sqrt(1.0 + excess)))
 
 
 def _rotations(gradient: Array) -> Array:
-    """Proper rotations (n, d, d) of the polar decomposition of I + gradient."""
+    """Compute proper rotations (n, d, d) of the polar decomposition of I + gradient."""
     d = gradient.shape[1]
     deformation = np.eye(d) + gradient
     if d == 2:
@@ -289,9 +289,9 @@ def _rotations(gradient: Array) -> Array:
 
 
 def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]:
-    """Strain (m, 3, 3) and stress (m, 3, 3) in Pa at the centres of the cells of a solution.
+    """Evaluate strain (m, 3, 3) and stress (m, 3, 3) in Pa at the centres of a solution's cells.
 
-    Of linear cells they are those of the whole cell. A cell without volume has none: zero.
+    In linear cells they are uniform. A cell without volume has none: zero.
     """
     centres = field.shape.corners.mean(axis=1)
     gradient = field.in_cells(centres, np.arange(len(centres)))[1]
@@ -316,11 +316,11 @@ def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]
     law, model = Hooke(lame, shear), scene.material.model
     if model != "hooke":
         law = NeoHookean(lame, shear, stable=model == "stable_neo_hookean")
-    return strain, law.piola(strain)  # of a pure stretch that of Biot
+    return strain, law.piola(strain)  # of a pure stretch Biot's
 
 
 def _biot_strain(gradient: Array) -> Array:
-    """U − I (n, k, k) of displacement gradients (n, d, k), from C − I: 1 is never added to it.
+    """Compute U − I (n, k, k) of displacement gradients (n, d, k) from C − I, without adding 1.
 
     The smallest stretch of a cell that is inside out is negative, as in the energy.
     """
@@ -343,7 +343,7 @@ _FINE = 4
 
 
 def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
-    """Energy of the cells of the solution, J (2D: per metre), exact for its field.
+    """Compute the energy of the cells of the solution, J (2D: per metre), exact for its field.
 
     It needs no reference and no neutral quadrature: it is a functional of the field. Only the
     corotated energy of a quadratic field is no polynomial: there the rule is of degree 7. A cell
@@ -353,17 +353,17 @@ def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
 
 
 def nodal_strain_energy(field: SolutionField, law: Law) -> float:
-    """Energy of the cells of a solution's field, J (2D: per metre)."""
+    """Compute the energy of the cells of a solution's field, J (2D: per metre)."""
     return float(cell_strain_energies(field, law).sum())
 
 
 def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
-    """Energy (m,) of each cell of a solution's field, J (2D: per metre)."""
+    """Compute the energy (m,) of each cell of a solution's field, J (2D: per metre)."""
     return _integrated(field, lambda at, gradient: law.at(at).energy_density(gradient(field)), law)
 
 
 def stress_power(rate: SolutionField, displacement: SolutionField, law: Law) -> float:
-    """Power of the stresses of a displacement on a velocity, ∫ P:∇w, W (2D: per metre)."""
+    """Compute power of the stresses of a displacement on a velocity, ∫ P:∇w, W (2D: per metre)."""
 
     def density(at: Array, gradient: Callable[[SolutionField], Array]) -> Array:
         return law.at(at).power_density(gradient(displacement), gradient(rate))
@@ -374,7 +374,7 @@ def stress_power(rate: SolutionField, displacement: SolutionField, law: Law) -> 
 def viscous_power(
     rate: SolutionField, velocity: SolutionField, displacement: SolutionField, law: Law
 ) -> float:
-    """w·Kv of two velocities, of which `cell_dissipation` has the square."""
+    """Compute w·Kv of two velocities, of which `cell_dissipation` has the square."""
     total = velocity.nodal + rate.nodal, velocity.nodal - rate.nodal
     more, less = (cell_dissipation(rate.with_nodal(v), displacement, law).sum() for v in total)
     return 0.25 * float(more - less)
@@ -383,10 +383,10 @@ def viscous_power(
 def cell_dissipation(
     velocity: SolutionField, displacement: SolutionField, law: Law
 ) -> NDArray[np.float64]:
-    """v·Kv (m,) of each cell, J/s² (2D: per metre), K the stiffness that turns with the body.
+    """Compute v·Kv (m,) of each cell, J/s² (2D: per metre), K turned with the body.
 
-    Twice the linear energy of the velocity gradient in the frame of the displacement: what damping
-    proportional to the stiffness takes, over its factor.
+    Twice the linear energy of the velocity gradient in the frame of the displacement: the power of
+    damping proportional to the stiffness, over its factor.
     """
 
     def density(at: Array, gradient: Callable[[SolutionField], Array]) -> Array:
@@ -425,7 +425,7 @@ def _points_of_cells(field: SolutionField, order: int) -> Iterator[tuple[Array, 
 
 
 def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
-    """Energy of the body by quadrature, J (2D: per metre); for exact fields."""
+    """Compute the energy of the body by quadrature, J (2D: per metre); for exact fields."""
     return float(rule.weights @ law.at(rule.points).energy_density(rule.gradient(field)))
 
 
@@ -435,7 +435,7 @@ _ORDER = 3  # points per direction: the exact field may be singular in a cell
 def difference_energy(
     solution: Solution, step: int, exact: Any, law: Law, density: Density
 ) -> tuple[float, float]:
-    """Kinetic and strain energy of the difference at an output time, J (2D: per metre).
+    """Compute the kinetic and strain energy of the difference at an output time, J (2D: per metre).
 
     Parameters
     ----------
@@ -470,12 +470,12 @@ def difference_energy(
 
 
 def short_wave_energy(solution: Solution, period: float, density: Density) -> float:
-    """Kinetic energy in motions faster than a period at the end, J (2D: per metre).
+    """Compute the kinetic energy in motions faster than a period at the end, J (2D: per metre).
 
-    That of the velocity less its mean over the last period, and less the mean of that over each
-    part of the body, which falls or swings as a whole; averaged over that period. A motion
-    of that period, or a whole part of it, counts in full; one of a period P times longer by
-    about (π/P)²/3 of itself.
+    Subtract from the velocity its mean over the last period. Subtract the mean of the result over
+    each part of the body, which falls or swings as a whole. The energy of the rest is averaged over
+    the period. A motion of that period, or of a whole fraction of it, counts in full. One of a
+    period P times longer counts by about (π/P)²/3.
 
     Raises
     ------

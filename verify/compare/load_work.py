@@ -32,8 +32,8 @@ def load_work(
 ) -> tuple[Array, Array] | None:
     """Work (t,) of a load since the first output time, and the half-width of its interval, J.
 
-    The half-width is what the cubic and a line between output times differ by: zero while the
-    factor of the load stands still. None where the work is not known from the fields: the load is
+    The half-width is the difference between the cubic and a line between output times: zero while
+    the factor of the load is constant. None where fields do not determine the work: the load is
     another field at every time.
 
     Parameters
@@ -80,7 +80,7 @@ def nodal_forces(
     scene: Scene, load: BodyForce | Traction, solution: Solution, time: float = 0.0,
     clip: Callable[[Pieces, Array], Pieces] | None = None,
 ) -> Array:  # fmt: skip
-    """Consistent nodal forces (n, d) of a load at a time, s, without its factor, N.
+    """Compute consistent nodal forces (n, d) of a load at a time, s, without its factor, N.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def spread(
     pieces: Pieces,
     force: Callable[[Array, Array, Ints], Array],
 ) -> Array:
-    """Consistent nodal forces (n, d) of a force per measure on pieces of simplices, N.
+    """Compute consistent nodal forces (n, d) of a force per measure on pieces of simplices, N.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def spread(
 
 
 def boundary_nodes_of_facets(solution: Solution) -> Ints:
-    """Nodes (b, f) of the facets of the outer boundary, corners first, then those of edges."""
+    """Find nodes (b, f) of the facets of the outer boundary: corners first, then edges."""
     k = solution.cell_dimension
     cell, opposite = boundary_facets(solution)
     columns = np.array([facet_nodes(k, corner, solution.order) for corner in range(k + 1)])
@@ -176,7 +176,7 @@ class PrescribedNodes:
         return [time for history in histories for time, _ in history or ()]
 
     def values(self, time: float) -> Array:
-        """Displacements (n, d), m; zero where nothing is held."""
+        """Compute displacements (n, d), m; zero where nothing is held."""
         found = np.zeros(self.held.shape)
         for nodes, components, one in self.supports:
             factor = factor_at(one.support.history, time)
@@ -184,7 +184,7 @@ class PrescribedNodes:
         return found
 
     def velocities(self, time: float) -> Array:
-        """Velocities (n, d), m/s, after a kink; zero where nothing is held."""
+        """Compute velocities (n, d), m/s, after a kink; zero where nothing is held."""
         found = np.zeros(self.held.shape)
         for nodes, components, one in self.supports:
             found[np.ix_(nodes, components)] = one.velocities(time)
@@ -192,7 +192,7 @@ class PrescribedNodes:
 
 
 def nodes_held(scene: Scene, solution: Solution, where: Sequence[str]) -> list[Ints]:
-    """Nodes (h,) of a solution that supports on parts hold, of each: all solvers follow one rule.
+    """Find nodes (h,) of a solution that supports on parts hold, by the rule of all solvers.
 
     Raises
     ------

@@ -37,7 +37,7 @@ from verify.solution import Solution
 def evaluate_linear(
     points: Floats, found: Ints, origins: Floats, values: Floats, slopes: Floats
 ) -> Floats:
-    """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
+    """Evaluate u = u_0 + G (x - x_0), (n, d), with x_0 and u_0 at the first corner."""
     if not COMPILED:
         return values[found] + np.einsum("nca,na->nc", slopes[found], points - origins[found])
     result = np.empty(points.shape)
@@ -142,7 +142,7 @@ def _squares(values, found):
 
 
 def difference_squares(found: Floats, expected: Floats) -> Floats:
-    """Squares (5, n) of the strains of what gradients (n, d, d) differ by, and of those `expected`.
+    """Square the strains of the difference of gradients (n, d, d), and of `expected`: (5, n).
 
     tr² ε and ε : ε of either; the last row is the sum of the squares of all entries of `expected`.
     """
@@ -187,11 +187,11 @@ class Field(Protocol):
     """A displacement field that can be compared: of a solution, or exact."""
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d) in m at `points` (n, d)."""
+        """Compute the displacement (n, d) in m at `points` (n, d)."""
         ...
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d), ``[:, i, j]`` = ∂u_i/∂x_j, at `points` (n, d)."""
+        """Evaluate the gradient (n, d, d), ``[:, i, j]`` = ∂u_i/∂x_j, at `points` (n, d)."""
         ...
 
 
@@ -315,15 +315,15 @@ class SolutionField:
         return found
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
-        """Sides (n, 0) of cuts that are wanted: no cut is known here."""
+        """Return the wanted sides (n, 0) of cuts: no cut is known here."""
         return no_sides(points)
 
     def inner_points(self, cells: NDArray[np.int64]) -> Array:
-        """Points (n, d) on the sides of the cuts on which given cells (n,) lie: their centres."""
+        """Find points (n, d) on sides of the cuts on which given cells (n,) lie: their centres."""
         return np.asarray(self._centres[cells])
 
     def in_cells(self, points: Array, cells: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Displacement (n, d) and gradient (n, d, d) of the polynomial of each given cell."""
+        """Evaluate displacement (n, d) and gradient (n, d, d) by given cells (n,)."""
         points = np.ascontiguousarray(points, dtype=float)
         if self.solution.order == 1:
             u = evaluate_linear(points, cells, self._origin, self._first, self._slope)
@@ -332,15 +332,15 @@ class SolutionField:
         return evaluate_quadratic(points, cells, self._origin, self._first, self._slope, slopes)
 
     def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
-        """Displacement (n, d) and gradient (n, d, d) at `points` (n, d)."""
+        """Compute the displacement (n, d) and gradient (n, d, d) at `points` (n, d)."""
         return self.in_cells(points, self.cells_at(points, near))
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d) in m at `points` (n, d)."""
+        """Compute the displacement (n, d) in m at `points` (n, d)."""
         return self.evaluate(points, near)[0]
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d) at `points` (n, d)."""
+        """Compute the displacement gradient (n, d, d) at `points` (n, d)."""
         return self.evaluate(points, near)[1]
 
 

@@ -47,8 +47,8 @@ class Kinetic:
     spin : (t, 1 or 3) array
         The same about the current centre of mass, N m s.
     linear_scale, angular_scale : float
-        Largest ∫ ρ |v| and ∫ ρ |x − c||v| over time, c the centre of mass: what the momenta
-        are small against when they cancel.
+        Largest ∫ ρ |v| and ∫ ρ |x − c||v| over time, c the centre of mass: the scale of momenta
+        that cancel.
     """
 
     mass: float
@@ -62,7 +62,7 @@ class Kinetic:
 
 
 def density_of(scene: Scene, solution: Solution) -> float | Array:
-    """Density in kg/m³ (of a membrane kg/m²): one, or (m,) that at the centroid of each cell.
+    """Return the density in kg/m³ (membrane: kg/m²): one, or (m,) at the centroids of cells.
 
     0 where the scene has none.
     """
@@ -175,7 +175,7 @@ def _add_motion(x, v, nodes, hats, mass, centre, axes, sums):
 
 
 def shape_functions(place: Array, k: int, order: int) -> Array:
-    """Values (q, n) of the nodes' shape functions at barycentric points (q, k + 1)."""
+    """Compute values (q, n) of the nodes' shape functions at barycentric points (q, k + 1)."""
     if order == 1:
         return place
     edges = [4 * place[:, a] * place[:, b] for a, b in EDGES[k]]
@@ -183,10 +183,10 @@ def shape_functions(place: Array, k: int, order: int) -> Array:
 
 
 def _lumping(solution: Solution, density: float | Array) -> tuple[Array, Array]:
-    """Bound what a mass that is lumped at nodes changes, where it is not said whether it is.
+    """Bound the effect of lumping, where the solver does not declare its mass.
 
     Cells along a cut may be pieces of larger ones, at whose nodes their mass may be lumped: as
-    much larger as the largest cell beside. What lumping changes goes with the square of that
+    much larger as the largest cell beside. The effect of lumping grows with the square of that
     size; and the mass of a piece then acts at the centre of the whole, up to half that size away.
 
     Parameters
@@ -228,7 +228,7 @@ def _lumping(solution: Solution, density: float | Array) -> tuple[Array, Array]:
 
 
 def nodal_weights(solution: Solution, density: float | Array) -> Array:
-    """Integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
+    """Compute the integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
     k = solution.cell_dimension
     shares = _consistent(k, solution.order).sum(axis=1)
     mass = (density * cells_of(solution).volume)[:, None] * shares
@@ -236,7 +236,7 @@ def nodal_weights(solution: Solution, density: float | Array) -> Array:
 
 
 def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
-    """Masses ∫ρ N_i N_j (n, n) in kg of a solution's nodes."""
+    """Compute the masses ∫ρ N_i N_j (n, n) in kg of a solution's nodes."""
     nodes, count = solution.cells, len(solution.points)
     mass = density * cells_of(solution).volume
     local = mass[:, None, None] * _consistent(solution.cell_dimension, solution.order)
@@ -244,7 +244,7 @@ def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
 
 
 def assembled(local: Array, nodes: NDArray[np.int64], count: int) -> csr_array:
-    """Matrix (count, count) of those (m, k, k) of cells with given nodes (m, k)."""
+    """Assemble matrices (m, k, k) of cells with nodes (m, k) to a matrix (count, count)."""
     rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
     columns = np.tile(nodes, nodes.shape[1]).ravel()
     return csr_array((local.ravel(), (rows, columns)), shape=(count, count))
@@ -252,7 +252,7 @@ def assembled(local: Array, nodes: NDArray[np.int64], count: int) -> csr_array:
 
 @cache
 def lumped_shares(k: int, order: int) -> Array:
-    """Shares (n,) of the mass of a cell of k dimensions that its nodes have when it is lumped.
+    """Compute shares (n,) of mass of a cell of k dimensions that its nodes have when it is lumped.
 
     The diagonal of the consistent mass, scaled to the mass of the cell (Hinton, Rock, Zienkiewicz
     1976, Earthq. Eng. Struct. Dyn. 4): for linear cells the sums of its rows.
@@ -264,7 +264,7 @@ def lumped_shares(k: int, order: int) -> Array:
 
 @cache
 def lumping_range(k: int, order: int) -> tuple[float, float]:
-    """Smallest and largest of lumped over consistent kinetic energy of a cell of k dimensions.
+    """Bound the ratio of lumped to consistent kinetic energy of a cell of k dimensions.
 
     The consistent mass of a linear simplex is (I + 11ᵀ)/((k + 1)(k + 2)) of its mass and the
     lumped one I/(k + 1): they differ by 1, for a velocity that is uniform, to k + 2, where its
@@ -276,7 +276,7 @@ def lumping_range(k: int, order: int) -> tuple[float, float]:
 
 
 def _consistent(k: int, order: int) -> Array:
-    """Mass (n, n) of a cell of mass 1."""
+    """Make the mass (n, n) of a cell of mass 1."""
     place, share = simplex_rule(k, 2 if order == 1 else 4)
     hats = shape_functions(place, k, order)
     matrix: Array = hats.T @ (share[:, None] * hats)
@@ -284,7 +284,7 @@ def _consistent(k: int, order: int) -> Array:
 
 
 def _sizes(nodes: NDArray[np.int64], corners: Array) -> tuple[Array, Array]:
-    """Diameter (m,) of each cell, and of the largest that shares a node with it, m."""
+    """Compute the diameter (m,) of each cell, and of the largest that shares a node with it, m."""
     edges = corners[:, :, None] - corners[:, None, :]
     size = np.linalg.norm(edges, axis=3).max(axis=(1, 2))
     largest = np.zeros(nodes.max() + 1)
@@ -293,7 +293,7 @@ def _sizes(nodes: NDArray[np.int64], corners: Array) -> tuple[Array, Array]:
 
 
 def _along_cuts(solution: Solution) -> NDArray[np.bool_]:
-    """Whether cells (m,) have a node whose place another node has too, or a point of a cut."""
+    """Tell whether cells (m,) have a node whose place another node has too, or a point of a cut."""
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     near = 10 * ROUND_OFF * size
     tree = cKDTree(solution.points)
@@ -335,7 +335,7 @@ class Part:
 
 
 def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
-    """Parts of a solution, from the top down (in the plane by y, in space by z; then by y, x).
+    """Find parts of a solution, from the top down (in the plane by y, in space by z; then by y, x).
 
     Cells are one part if a chain of facets leads from one to the other of which neighbours share
     the nodes: nodes are doubled where a cut separates. Parts that touch in a point, or in space
@@ -360,7 +360,7 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
 
 @kept_with
 def _connected(solution: Solution) -> list[Ints]:
-    """Cells of each part."""
+    """Find cells of each part."""
     facets, cell = _facets(solution.cells[:, : solution.cell_dimension + 1])
     _, number = np.unique(facets, axis=0, return_inverse=True)
     link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel())))
@@ -371,13 +371,13 @@ def _connected(solution: Solution) -> list[Ints]:
 
 
 def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
-    """Mass and inertia of given cells (c,), connected or not."""
+    """Compute the mass and inertia of given cells (c,), connected or not."""
     shape = cells_of(solution)
     return _part(cells, shape.corners, density * shape.volume)
 
 
 def boundary_nodes(solution: Solution) -> NDArray[np.bool_]:
-    """Whether nodes (n,) are corners of a facet of the outer boundary, not of faces of cuts."""
+    """Tell whether nodes (n,) are corners of a facet of outer boundary, not of faces of cuts."""
     cell, opposite = boundary_facets(solution)
     corners = solution.cells[cell, : solution.cell_dimension + 1]
     found = np.zeros(len(solution.points), dtype=bool)
@@ -386,7 +386,7 @@ def boundary_nodes(solution: Solution) -> NDArray[np.bool_]:
 
 
 def boundary_facets(solution: Solution) -> tuple[Ints, Ints]:
-    """Cell (b,) and opposite corner (b,) of the facets of the outer boundary, not of faces of cuts.
+    """Find the cells (b,) and opposite corners (b,) of facets of the outer boundary.
 
     On the faces of a cut two facets have the same place; on the outer boundary each is alone.
     """
@@ -402,7 +402,7 @@ def boundary_facets(solution: Solution) -> tuple[Ints, Ints]:
 
 
 def _facets(corners: Ints) -> tuple[Ints, Ints]:
-    """Sorted nodes (f, k) of all facets of all cells, and their cell (f,)."""
+    """Compute sorted nodes (f, k) of all facets of all cells, and their cell (f,)."""
     k = corners.shape[1]
     rest = [[j for j in range(k) if j != i] for i in range(k)]
     facets = np.sort(corners[:, rest].reshape(-1, k - 1), axis=1)
@@ -424,13 +424,13 @@ def _part(cells: Ints, corners: Array, mass: Array) -> Part:
     return Part(cells, total, np.asarray(centre), inertia)
 
 
-_WRONG = 0.01  # of the body's mass: beyond, a declared mass is that of another body
+_WRONG = 0.01  # of the body's mass: beyond, a declared mass belongs to another body
 _NOTHING = 1e-9  # of the largest kinetic energy of a motion
 
 
 @dataclass(frozen=True)
 class Inertia:
-    """Kinetic energy over the output times, and at what gravity pulls.
+    """Kinetic energy over the output times, and the mass under gravity.
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ class Inertia:
     matrix : (n, n) sparse array
         Mass of the nodes, kg.
     off : float
-        By how much of itself the mass may be off; beside how it is lumped.
+        Relative error of the mass, lumping apart.
     lumped : (n, n) sparse array or None
         Another mass that it may as well be, kg.
     note : str
@@ -465,12 +465,12 @@ class Inertia:
 def inertia_of(
     solution: Solution, density: float | Array, whole: Kinetic, parts: Sequence[Part]
 ) -> Inertia:
-    """Take the mass of a solution as declared, or that of its field if none is or it cannot be.
+    """Take the declared mass of a solution, or the mass of its field if it has none or is wrong.
 
-    A declared mass is accepted if its total, its first moments and its share of each separated
-    part are those of the body, and the kinetic energy at all output times is within what lumping
-    may do to that of the field. Cells that are cut may have less: the mass of a part of one acts
-    at the centre of the whole cell. So the lower end gives way by the size of a cell.
+    A declared mass must have the total, the first moments and the share of each separated part of
+    the body. Its kinetic energy at all output times must be within the effect of lumping on the
+    kinetic energy of the field. Cut cells may have less: the mass of a part of one acts at the
+    centre of the whole cell. So the lower bound decreases by the size of a cell.
 
     Parameters
     ----------
@@ -517,7 +517,7 @@ def _velocities(solution: Solution) -> Array:
 
 
 def _round_off(solution: Solution, matrix: csr_array) -> Array:
-    """Error (t,) of kinetic energies by that of velocities: of thin pieces large terms cancel."""
+    """Bound the error (t,) of kinetic energies by round-off: in thin pieces large terms cancel."""
     sizes = np.abs(_velocities(solution))
     products = np.array([float(np.sum(v * (abs(matrix) @ v))) for v in sizes])
     return 4.0 * np.finfo(float).eps * products
@@ -528,7 +528,7 @@ def _matrix(mass: Any) -> csr_array:
 
 
 def _off(solution: Solution, own: Array, weights: Array, parts: Sequence[Part]) -> float:
-    """Largest difference of nodal masses in total, moments and parts, over that of the body."""
+    """Compare nodal masses with the body in total, moments and parts: largest relative error."""
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     more = own - weights
     off = [abs(more.sum()), float(np.abs(more @ solution.points).max()) / size]
@@ -539,7 +539,7 @@ def _off(solution: Solution, own: Array, weights: Array, parts: Sequence[Part]) 
 
 
 def _outside(solution: Solution, energy: Array, whole: Kinetic) -> str:
-    """Why kinetic energies are not those of any lumping, if they are not."""
+    """Say why kinetic energies belong to no lumping, if they do not."""
     corners = cells_of(solution).corners
     largest = float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).max())
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))

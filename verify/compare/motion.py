@@ -1,4 +1,4 @@
-"""Fields over time: a solution's between its output times, an exact one, one that stands still.
+"""Fields over time: of a solution between its output times, exact, or constant in time.
 
 Between two output times a solution is linear in time: nothing else is known of it.
 """
@@ -43,7 +43,7 @@ class Sampled:
         return sum(values.nbytes for *_, values in self._kept.values())
 
     def cells(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
-        """Cells (n,) of a solution that hold `points` (n, d), on the side of `near`."""
+        """Find cells (n,) of a solution that hold `points` (n, d), on the side of `near`."""
         assert isinstance(self._field, SolutionField)
         key = id(points), id(near)
         if key not in self._found:  # holds the arrays, so that their ids stay theirs
@@ -56,18 +56,18 @@ class Sampled:
             if isinstance(self._field, SolutionField):
                 both = self._field.in_cells(points, self.cells(points, near))
                 found = dict(zip(("displacement", "gradient"), both, strict=True))
-            else:  # a formula: only what is asked for
+            else:  # a formula: only the one quantity
                 found = {what: getattr(self._field, what)(points, near)}
             for name, values in found.items():  # holds the arrays, so ids stay theirs
                 self._kept[(*key, name)] = points, near, values
         return self._kept[(*key, what)][2]
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d) in m at `points` (n, d)."""
+        """Compute the displacement (n, d) in m at `points` (n, d)."""
         return self._at("displacement", points, near)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d) at `points` (n, d)."""
+        """Compute the displacement gradient (n, d, d) at `points` (n, d)."""
         return self._at("gradient", points, near)
 
 
@@ -95,11 +95,11 @@ class Motion(Protocol):
     """A displacement field over time."""
 
     def at(self, time: float | None = None) -> Field:
-        """Field at a time in s; None is the last."""
+        """Compute the field at a time in s; None is the last."""
         ...
 
     def known_at(self, time: float) -> bool:
-        """Whether the field is known at that time, not interpolated."""
+        """Tell whether the field is known at that time, not interpolated."""
         ...
 
     def afresh(self) -> "Motion":
@@ -149,7 +149,7 @@ class SolutionMotion:
 
     @property
     def off_surface(self) -> float:
-        """Distance of the surface of a membrane from that of its body, m; 0 of other bodies."""
+        """Distance of a membrane's solution from the surface of its body, m; 0 of other bodies."""
         return getattr(self._field, "off_surface", 0.0)
 
     def afresh(self) -> "SolutionMotion":
@@ -159,7 +159,7 @@ class SolutionMotion:
         return other
 
     def known_at(self, time: float) -> bool:
-        """Whether `time` is an output time."""
+        """Tell whether `time` is an output time."""
         times = self.solution.times
         close: bool = bool(np.abs(times - time).min() <= _SAME_TIME * max(np.ptp(times), 1e-300))
         return close
@@ -169,12 +169,12 @@ class SolutionMotion:
         return self._field.cells_at(points, near)
 
     def differs(self, other: "SolutionMotion", points: Array) -> NDArray[np.bool_]:
-        """Whether another motion of the same solution is of another cell at points (n, d)."""
+        """Tell whether another motion of the same solution is of another cell at points (n, d)."""
         own, others = (Sampled(m._field, m._found).cells(points, points) for m in (self, other))
         return np.asarray(own != others)
 
     def at(self, time: float | None = None) -> Field:
-        """Field at a time in s; None is the last.
+        """Compute the field at a time in s; None is the last.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class SolutionMotion:
         )
 
     def nodal(self, time: float | None = None) -> Array:
-        """Nodal displacements (n, d) in m at a time in s; None is the last.
+        """Compute nodal displacements (n, d) in m at a time in s; None is the last.
 
         Raises
         ------
@@ -233,11 +233,11 @@ class ExactMotion:
         return other
 
     def known_at(self, time: float) -> bool:
-        """Whether the field is known: always."""
+        """Tell whether the field is known: always."""
         return True
 
     def at(self, time: float | None = None) -> Field:
-        """Field at a time in s; None is its last or only one."""
+        """Return the field at a time in s; None is its last or only one."""
         time = self._end if time is None else time
         return self._times.at(time, lambda: Sampled(field_at(self._exact, time)))
 

@@ -1,12 +1,12 @@
 """The account of a motion: energies, momenta and separated parts over the output times.
 
-Energies are measured on what the solver hands over, each with its interval. Strain energy is that
-of the displacements, kinetic energy that of the velocities with the declared mass
-(`verify.compare.mass`), which gravity pulls at. Work of dead loads follows from the
-displacements, that of supports that move from momenta and stresses (`verify.compare.support_work`),
-what damping takes from its rate at the output times. The solver's own ledger is kept beside them,
-to be compared. Its word is the interval only of what no field shows: the work of loads that change
-in place, and of supports that jump or follow an exact field.
+Energies are measured on the fields of the solver, each with its interval. Strain energy follows
+from displacements; kinetic energy from velocities with the declared mass (`verify.compare.mass`),
+which gravity pulls at. Work of dead loads follows from displacements. Work of moving supports
+follows from momenta and stresses (`verify.compare.support_work`), damping from its rate at the
+output times. The solver's own ledger is kept beside them, to be compared. It is taken alone only
+where no field shows the work: of loads that change in place, and of supports that jump or follow an
+exact field.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,14 +50,14 @@ class Energies:
         Half-widths of their intervals, J; a part that is not in it is known.
     lacking : str
         Why there are none; empty if there are.
-    said : dict of str to str
+    sources : dict of str to str
         Which mass was taken, and which parts are the solver's word.
     """
 
     parts: Ledger = field(default_factory=dict)
     widths: Ledger = field(default_factory=dict)
     lacking: str = ""
-    said: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
 
     @property
     def width(self) -> Array:
@@ -94,7 +94,7 @@ def measured_energies(
     inertia = inertia_of(solution, density, whole, separated)
     found = {"kinetic": inertia.kinetic, "strain": strain}
     widths = {"kinetic": inertia.width}
-    said = {"kinetic_energy": inertia.note}
+    sources = {"kinetic_energy": inertia.note}
     weight = [load.acceleration for load in scene.loads if isinstance(load, Gravity)]
     if weight:
         pulled = np.einsum("n,tna->ta", inertia.weights, solution.displacement)
@@ -112,14 +112,14 @@ def measured_energies(
         if unknown:
             own = np.asarray(solution.ledger[name]) - solution.ledger[name][0]
             known, width = own, width + np.abs(own - known)
-            said[name] = f"{unknown}; it is the solver's word"
+            sources[name] = f"{unknown}; it is the solver's word"
         if known.any() or width.any():
             found[name], widths[name] = known, width
-    return Energies(found, {n: w for n, w in widths.items() if w.any()}, "", said)
+    return Energies(found, {n: w for n, w in widths.items() if w.any()}, "", sources)
 
 
 def _loads(scene: Scene, solution: Solution) -> tuple[Array, Array, str]:
-    """Work of all loads but gravity, its half-width, and what of it cannot be measured."""
+    """Sum the work of all loads but gravity, its half-width, and the loads that it lacks."""
     total, width = np.zeros((2, len(solution.times)))
     for load in scene.loads:
         if isinstance(load, Gravity):
@@ -135,7 +135,7 @@ def _loads(scene: Scene, solution: Solution) -> tuple[Array, Array, str]:
 
 
 def _is_let_go(table: Sequence[tuple[float, float]]) -> bool:
-    """Whether a load ends at t = 0, so that it does no work in the motion."""
+    """Tell whether a load ends at t = 0, so that it does no work in the motion."""
     before = [factor for time, factor in table if time <= 0.0]
     return bool(before) and not any([before[-1], *(f for time, f in table if time > 0.0)])
 
@@ -159,7 +159,7 @@ def _supports(
 
 
 def _stands_still(scene: Scene, support: Support) -> bool:
-    """Whether a support is from the start where it stays."""
+    """Tell whether a support stays in one place from the start."""
     if support.history or support.timed or support.displacement == "exact":
         return False
     at_home = support.rotation is None and not any(support.displacement)
@@ -167,11 +167,11 @@ def _stands_still(scene: Scene, support: Support) -> bool:
 
 
 def _damped(scene: Scene, solution: Solution, law: Law, inertia: Inertia) -> tuple[Array, Array]:
-    """Energy (t,) that Rayleigh damping took, and its half-width, J.
+    """Compute the energy (t,) that Rayleigh damping took, and its half-width, J.
 
     Its rate is α v·Mv + β v·Kv, never negative, at the output times. Between them it is taken as a
-    cubic spline; the half-width is what lines between the same rates differ by, with less than four
-    output times all of it.
+    cubic spline; the half-width is the difference from lines between the same rates, with less than
+    four output times all of it.
     """
     mass, stiffness = scene.analysis.damping
     rate = 2.0 * mass * inertia.kinetic
@@ -193,26 +193,26 @@ def _damped(scene: Scene, solution: Solution, law: Law, inertia: Inertia) -> tup
 
 
 def _between(times: Array, rate: Array) -> Array:
-    """Integrals (t − 1,) of a rate that is a line between output times."""
+    """Compute integrals (t − 1,) of a rate that is a line between output times."""
     steps: Array = 0.5 * np.diff(times) * (rate[1:] + rate[:-1])
     return steps
 
 
 _ROUND_OFF = 1e-12  # of the largest energy: a sum of energies is not known better
-# Parts of a ledger and the sign with which they enter what stays constant: what is stored and
-# what dampers take count, what loads and supports have put in is taken off.
+# Parts of a ledger and the sign with which they enter the constant sum: stored and damped energy is
+# added, work of loads and supports is subtracted.
 SIGNS = {
     "kinetic": 1.0, "strain": 1.0, "gravity": 1.0, "damping": 1.0, "work_of_loads": -1.0,
     "work_of_supports": -1.0,
 }  # fmt: skip
-# what the time scheme itself takes, the tie forces of a cut that is released, and what goes with
-# material that is removed or a state that is projected: only where it is asked about
+# energy taken by the time scheme, by tie forces of a released cut, with removed material and by a
+# projected state: only on request
 SCHEME = {"algorithmic": 1.0, "cut_work": 1.0, "projection": 1.0, "removed_energy": 1.0}
 
 
 @dataclass(frozen=True)
 class Balance:
-    """What a total does over time, in its own unit.
+    """Trend, jumps and oscillation of a total over time, in its own unit.
 
     Parameters
     ----------
@@ -223,11 +223,11 @@ class Balance:
     slope_error : float
         Its standard error, 1/s; zero if nothing is left to estimate it from.
     oscillation : float
-        Largest distance from trend and jumps: what stays bounded if the slope is zero.
+        Largest distance from trend and jumps: it stays bounded if the slope is zero.
     jumps : (c,) array
         Step at each cut beside the trend.
     off : Balance or None
-        By how much each of these may be off, of a total that is not known to round-off.
+        Half-widths of all these, for a total that is not known to round-off.
     """
 
     drift: float
@@ -241,8 +241,8 @@ class Balance:
 def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | None:
     """Sum (t,) of a ledger's parts that physics keeps constant; None without any of them.
 
-    The solver's own ``total`` is not read. With `scheme`, what the time scheme dissipates and what
-    was removed is added: then it is an identity of the solver's steps, and its changes are errors
+    The solver's own ``total`` is not read. `scheme` adds energy that the time scheme dissipates or
+    that was removed. The sum is then an identity of the solver's steps, and its changes are errors
     of account.
     """
     signs = {**SIGNS, **(SCHEME if scheme else {})}
@@ -251,7 +251,7 @@ def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | N
 
 
 def energy_scale(ledger: Mapping[str, Array]) -> float:
-    """Energy that drifts are measured against, J: the largest that moved from part to part.
+    """Compute energy that drifts are measured against, J: the largest that moved from part to part.
 
     The largest kinetic or strain energy, or change of any other part: a potential has no zero.
     It is 0 if that is round-off of the largest part.
@@ -299,7 +299,7 @@ def balance(
 
 
 def _off(columns: Array, width: Array, span: float) -> Balance:
-    """Largest change of a balance by changes of its total up to `width`."""
+    """Propagate half-widths `width` of a total to a balance."""
     fit = np.linalg.pinv(columns)
     solved = np.abs(fit) @ width
     rest = np.abs(np.eye(len(width)) - columns @ fit) @ width
@@ -313,7 +313,7 @@ _MOST = 24  # parts
 
 @dataclass(frozen=True)
 class MotionAccount:
-    """What is kept, or not, over the output times of a solution (2D: per metre of thickness).
+    """Energies, momenta and parts over the output times of a solution (2D: per metre).
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ class MotionAccount:
     strain : (t, parts) array
         Strain energies of the parts, integrated from the displacements, J.
     strain_of_all : (t,) array
-        That of the whole body, J.
+        Strain energy of the whole body, J.
     whole : Kinetic or None
         Of the whole body; None without velocities.
     parts : list of Part

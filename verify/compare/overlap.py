@@ -1,9 +1,8 @@
 """Overlap of the faces of cuts in the deformed body: how deep, and where.
 
-Without contact an answer may put two parts of a body into one place. Faces that
-slide along each other at a finite rotation have no opposite points left; therefore points of all
-faces are looked for in the deformed cells of whatever is there: the other side of their cut, or
-another part of the body.
+Without contact a solution may put two parts of a body into one place. Faces that slide along each
+other at a finite rotation have no opposite points left. Therefore points of all faces are located
+in the deformed cells of any material: the other side of their cut, or another part of the body.
 
 The deformed body x = X + u is of linear simplices. Cells of a quadratic solution are divided at
 their mid-edge nodes, so that faces follow the deformed nodes; between them they are straight.
@@ -46,7 +45,7 @@ class Faces:
     behind : (f,) int array
         The cell of the solution that each belongs to.
     across : (f,) int array
-        The cell on the other side of a cut; that of `behind` where there is none, outside.
+        The cell on the other side of a cut; outside, where there is none, the same as `behind`.
     """
 
     nodes: Ints
@@ -146,7 +145,7 @@ def deformed_cells(
 
 
 def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[np.bool_]:
-    """Whether both sides of facets (f,) move as one: a cut that has not opened yet, or none.
+    """Tell whether both sides of facets (f,) move as one: a cut that has not opened yet, or none.
 
     Parameters
     ----------
@@ -162,7 +161,7 @@ def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[
 
 
 def _turn(corners: Array) -> Array:
-    """Signed volume (m,), up to a factor."""
+    """Compute the signed volume (m,), up to a factor."""
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], (1, 2), (0, 1))
     if len(edges) == 2:
         return np.asarray(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
@@ -201,8 +200,8 @@ class Overlap:
     material, deformed : (d,) arrays or None
         Where the largest depth is: the point of the face before and after the deformation.
     inside_out : int
-        Facets of cuts whose cells are inside out in the deformed body: they have no inside that
-        something could be in, and are left out.
+        Facets of cuts whose cells are inverted in the deformed body: they have no inside, and are
+        left out.
     """
 
     depth: float = 0.0
@@ -237,7 +236,7 @@ class OverlapSearch:
         self._size = self._field.scale
 
     def at(self, step: int = -1) -> Overlap:
-        """Overlap at an output time, by its number."""
+        """Measure the overlap at an output time, by its number."""
         u = self.solution.displacement[step]
         if not np.isfinite(u).all():
             return Overlap()
@@ -272,7 +271,7 @@ class OverlapSearch:
     def _depths(
         self, faces: Faces, cells: DeformedCells, places: Array
     ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Penetration (n,) of points of faces, their shares (n, d) of corners, and facets (n,)."""
+        """Return penetration (n,) of points of faces, shares (n, d) of corners, and facets (n,)."""
         corners = np.ascontiguousarray(places[faces.nodes])
         normals = facet_normals(corners)
         height = _smallest_height(corners)
@@ -308,15 +307,15 @@ class OverlapSearch:
     def _ways_out(
         self, faces: Faces, cells: DeformedCells, held: NDArray[np.int64], points: Array
     ) -> NDArray[np.int64]:
-        """Facets (n,) by which deformed points inside the cells `held` (n,) are nearest to get out.
+        """Find the facet (n,) nearest to each deformed point inside the cells `held` (n,).
 
-        A ray along a normal may be longer than the way out, and where faces turn by a right angle,
-        as at a tip that closes, it misses them. Nearest is told in the material: there a point of
-        a cell is on the inner side of the faces of its own part, and of no other.
+        A ray along a normal may be longer than the way out. Where faces turn by a right angle, as
+        at a tip that closes, it misses them. Nearest is told in the material: there a point of a
+        cell is on the inner side of the faces of its own part, and of no other.
         """
         shape = cells.shape
         height = shape.heights(points, held)
-        # barycentric: height over a facet, over that of the opposite corner
+        # barycentric: height over a facet, over the height of the opposite corner
         shares = height * np.linalg.norm(shape.gradients[held], axis=2)
         places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
         corners = np.ascontiguousarray(self.solution.points[faces.nodes])
@@ -333,7 +332,7 @@ class OverlapSearch:
 
 
 def _smallest_height(corners: Array) -> Array:
-    """Length (f,) of segments (f, 2, 2), or smallest height of triangles (f, 3, 3), m."""
+    """Compute length (f,) of segments (f, 2, 2), or smallest height of triangles (f, 3, 3), m."""
     edges = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
     if corners.shape[2] == 2:

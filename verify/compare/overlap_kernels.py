@@ -15,7 +15,7 @@ _EDGE = 1e-9
 
 @njit(inline="always")
 def _meets_box(x, way, low, high):
-    """Whether the ray x + t way, t ≥ 0, meets a box."""
+    """Tell whether the ray x + t way, t ≥ 0, meets a box."""
     first, last = 0.0, np.inf
     for a in range(x.shape[0]):
         if way[a] == 0.0:
@@ -30,7 +30,7 @@ def _meets_box(x, way, low, high):
 
 @njit(cache=True)
 def _crossing(x, way, facet):
-    """Parameter t at which the line x + t way crosses a facet, or −1."""
+    """Compute the parameter t at which the line x + t way crosses a facet, or −1."""
     if x.shape[0] == 2:
         ex, ey = facet[1, 0] - facet[0, 0], facet[1, 1] - facet[0, 1]
         ox, oy = facet[0, 0] - x[0], facet[0, 1] - x[1]
@@ -60,7 +60,7 @@ def first_exits(
     points: Floats, ways: Floats, lower: Floats, upper: Floats, cells: Ints, facets: Floats,
     normals: Floats,
 ) -> tuple[Floats, Ints]:  # fmt: skip
-    """Distance (n,) to the first facet through which a ray leaves material, and which (n,).
+    """Compute distance (n,) to the first facet through which a ray leaves material, and which (n,).
 
     Facets through which it enters are passed; infinite and −1 where it leaves nothing. `ways`
     (n, d) are unit vectors, `facets` is (f, d, d), `normals` (f, d).
@@ -102,7 +102,7 @@ def _first_exits(points, ways, lower, upper, cells, facets, normals, stack, dist
 
 @njit(cache=True)
 def _facet_distance2(x, facet, normal):
-    """Squared distance of a point to a facet."""
+    """Compute the squared distance of a point to a facet."""
     d = x.shape[0]
     best = np.inf
     for i in range(d):
@@ -127,7 +127,7 @@ def _facet_distance2(x, facet, normal):
 
 
 def facet_distances(points: Floats, which: Ints, facets: Floats, normals: Floats) -> Floats:
-    """Distance (n,) of each point to one facet, `which` (n,); infinite for facet −1."""
+    """Compute the distance (n,) of each point to one facet, `which` (n,); infinite for facet −1."""
     found = np.full(len(points), np.inf)
     _facet_distances(points, which, facets, normals, found)
     return found
@@ -144,7 +144,7 @@ def _facet_distances(points, which, facets, normals, found):
 def nearest_before(
     points: Floats, lower: Floats, upper: Floats, cells: Ints, facets: Floats, normals: Floats
 ) -> Ints:
-    """Nearest facet (n,) that has a point on its inner side; −1 where none has."""
+    """Find the nearest facet (n,) that has a point on its inner side; −1 where none has."""
     found, stack = np.full(len(points), -1), np.empty(64, dtype=np.int64)
     _nearest_before(points, lower, upper, cells, facets, normals, stack, found)
     return found
@@ -199,7 +199,7 @@ def cells_run_through(
 
 @njit(cache=True)
 def _clipped(start, end, normals, offsets):
-    """Whether a segment has a part where all normals · x > offsets (Cyrus and Beck, 1978)."""
+    """Tell whether a segment has a part where all normals · x > offsets (Cyrus and Beck, 1978)."""
     first, last = 0.0, 1.0
     for k in range(len(offsets)):
         at_start = at_end = -offsets[k]

@@ -1,4 +1,4 @@
-"""Separated parts of a moving solution: how each moves, what it keeps, and metrics of that.
+"""Separated parts of a moving solution: motion, energy and momentum of each, and metrics.
 
 No metric here needs a reference: energy and momentum of the parts, and of the body, are kept.
 """
@@ -72,7 +72,7 @@ def part_records(scene: Scene, solution: Solution, account: MotionAccount) -> li
 def part_metrics(
     parts: list[PartRecord], account: MotionAccount
 ) -> tuple[list[Metric], dict[str, str]]:
-    """Largest drift of the momenta of the free parts, or why there is none."""
+    """Measure the largest drift of the momenta of the free parts, or say why there is none."""
     drifts = [part.drift for part in parts if part.drift]
     if drifts:
         return [
@@ -87,7 +87,7 @@ def part_metrics(
 
 
 def momentum_components(linear: Array, angular: Array) -> dict[str, list[float]]:
-    """Momenta (t, d) and (t, 1 or 3) by name and component."""
+    """Name the components of momenta (t, d) and (t, 1 or 3)."""
     axes = _AXES[-angular.shape[1] :]
     rows = {f"linear_momentum_{_AXES[k]}": row.tolist() for k, row in enumerate(linear.T)}
     return rows | {f"angular_momentum_{axes[k]}": row.tolist() for k, row in enumerate(angular.T)}
@@ -109,12 +109,12 @@ def _drift(times: Array, motion: Kinetic, force: Array, start: float) -> dict[st
 
 
 def _all_open(scene: Scene) -> float:
-    """When the last cut is open all through, s."""
+    """Return the time at which the last cut is open all through, s."""
     return max((float(getattr(cut, "ends_at", cut.opens_at)) for cut in scene.cuts), default=0.0)
 
 
 def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
-    """Whether nodes (n,) of the outer boundary are held, or pulled at."""
+    """Tell whether nodes (n,) of the outer boundary are held, or pulled at."""
     boundary = np.flatnonzero(boundary_nodes(solution))
     held = np.zeros(len(solution.points), dtype=bool)
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
@@ -126,7 +126,7 @@ def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
 
 
 def motion_history(account: MotionAccount) -> dict[str, list[float]]:
-    """Return what moves, by name, with ``time`` (s).
+    """Return energies and momenta over time, by name, with ``time`` (s).
 
     Energies are those measured (J, in 2D per metre), with what the solver states of its scheme;
     ``total`` is the sum that physics keeps constant. ``linear_momentum_x`` … (N s) and
@@ -155,7 +155,7 @@ _UNITS = {
 def part_quantity(
     scene: Scene, solution: Solution, motion: SolutionMotion, law: Law, asked: PartQuantity
 ) -> float:
-    """Value of a number of a part (2D: per metre of thickness).
+    """Evaluate a quantity of a part (2D: per metre of thickness).
 
     Raises
     ------
@@ -182,7 +182,7 @@ def part_quantity(
 
 
 def part_unit(asked: PartQuantity, dimension: int) -> str:
-    """SI unit; plane scenes are per metre of thickness."""
+    """Return the SI unit; plane scenes are per metre of thickness."""
     unit = _UNITS[asked.of]
     return unit if dimension == 3 else f"{unit}/m"
 
@@ -215,23 +215,23 @@ _ABSOLUTE = ("kinetic", "strain")  # the others are potentials and work, counted
 
 
 def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[str, str]]:
-    """Measure what a moving solution keeps, all relative.
+    """Measure drifts of energy and momentum of a moving solution, all relative.
 
     Energies are measured (`verify.compare.motion_account`), without what the time scheme
     dissipates, over the largest energy that moved from one form to another in the run
     (`energy_scale`). ``energy_drift`` is the largest change over the run; ``energy_slope`` the
-    secular change over the whole run (its uncertainty: two standard errors);
-    ``energy_oscillation`` what is left beside trend and jumps; ``energy_jump`` the largest step at
-    a cut. The uncertainty of all has that of the energies. ``ledger_mismatch`` is the largest
-    difference of the solver's own ledger from what is measured, part by part, and of its sum, the
-    scheme's dissipation included, from its first value. Momenta are integrated from the velocities.
+    secular change over the whole run (its uncertainty: two standard errors). ``energy_oscillation``
+    is the rest beside trend and jumps; ``energy_jump`` the largest step at a cut. All uncertainties
+    include the intervals of the energies. ``ledger_mismatch`` compares the solver's own ledger with
+    the measurement: the largest difference of a part, or change of its sum, with the dissipation of
+    the scheme. Momenta are integrated from the velocities.
 
     Returns
     -------
     metrics : list of Metric
     notes : dict of str to str
-        For what could not be measured, why; what is the solver's word (``work_of_loads``,
-        ``work_of_supports``), and where its ledger differs (``ledger``).
+        Reasons for metrics that could not be measured; entries that the solver states alone
+        (``work_of_loads``, ``work_of_supports``); and where its ledger differs (``ledger``).
     """
     metrics, notes = _energies(scene, account)
     found = account.whole
@@ -251,7 +251,7 @@ def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric],
 
 
 def ledger_notices(records: Sequence[SolveRecord]) -> list[Notice]:
-    """Warn of each solver whose own ledger is not that of its fields, on its finest such level."""
+    """Warn of each solver whose own ledger differs from its fields, on its finest such level."""
     worst = {}
     for record in sorted(records, key=lambda one: one.level):
         found = record.metric(MISMATCH)
@@ -277,7 +277,7 @@ def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[
         "energy_slope": (abs(found.slope) * span, (2 * found.slope_error + off.slope) * span),
         "energy_oscillation": (found.oscillation, off.oscillation),
     }
-    notes = dict(energies.said)
+    notes = dict(energies.sources)
     source = f"fields of the solution; kinetic energy by {notes.pop('kinetic_energy')}"
     if len(found.jumps):
         jump = float(np.abs(found.jumps).max())
@@ -309,9 +309,9 @@ def _relative(
 
 
 def _mismatch(account: MotionAccount, named: float) -> tuple[tuple[float, float], dict[str, float]]:
-    """Largest difference of a ledger from what is measured, with its half-width, J.
+    """Find the largest difference of a ledger from the measurement, with its half-width, J.
 
-    And by what more than `named` each part differs.
+    Return also each part that differs by more than `named`.
     """
     stated, energies = account.stated, account.energies
     still = np.zeros_like(account.times)

@@ -1,22 +1,20 @@
 """Fields on the sides of the cuts as asked, of solutions whose cut deviates from them.
 
-Between the cut as asked and the cut as realised (facets of an arc, a snapped cut), the cell that
-holds a point lies on the wrong side. There the field is continued from the nearest cell on the
-right side of the realised cut, where that is a matter of facets; beside facets beyond the limit
-(`RealisedCut`) it stands as it was stored. Where a solver has no cut at all (ahead of a tip that it
-moved back), nothing is changed: the field there is what the solver says it is, and the error is
-real.
+A cut as realised may differ from the cut as asked: facets of an arc, a snapped cut. Between the
+two, the cell that holds a point lies on the wrong side. There the field is continued from the
+nearest cell on the right side of the realised cut. Facets beyond the limit (`RealisedCut`) are the
+exception: beside them the field stays as stored. Where a solver has no cut at all (ahead of a tip
+that it moved back), nothing is changed: the error is real.
 
-Sides of cells come from doubled nodes. No coordinate is compared across the cut: a cell that has a
-facet of the realised cut lies on the side of that facet on which its last corner is, and its nodes
-are nodes of that side. From there the side goes on from node to node, never across the cut, because
-nodes are doubled there. So a sliver has the right side however thin it is, and a corner of the cut
-has as well.
+Sides of cells come from doubled nodes. No coordinate is compared across the cut. A cell with a
+facet of the realised cut lies on the side of its opposite corner, and its nodes belong to that
+side. From there the side goes on from node to node, never across the cut, because nodes are doubled
+there. So a sliver has the right side however thin it is, and so has a corner of the cut.
 
-A point of a membrane belongs to the nearest triangle of the solution. Where the two surfaces are
-the same that is the triangle that holds it; where they are two triangulations of one curved surface
-they lie a sagitta apart, and the foot of a point beside a cut might fall across it. So only those
-triangles count that lie on the point's side of the planes of the cuts, or ahead of a tip on both.
+A point of a membrane belongs to the nearest triangle of the solution: on the same surface, the
+triangle that holds it. Two triangulations of one curved surface lie a sagitta apart, and the foot
+of a point beside a cut might fall across it. So only triangles on the point's side of the planes of
+the cuts count, or ahead of a tip on both.
 """
 
 from collections.abc import Sequence
@@ -43,7 +41,7 @@ Array = NDArray[np.float64]
 # A facet within 60° of the cut as asked says which side is which. Steeper ones (of a cut that was
 # snapped to mesh lines) get their sides from these.
 _ALONG = 0.5
-# Sine of the angle to a cut that is as doubtful as to lie off it by the whole deviation.
+# Sine of the angle to a cut that is as doubtful as a distance of the whole deviation.
 _STEEP = 0.5
 # Facets are asked in the order of how sure it is which cut they realise.
 _MARGINS = (1.0, 0.5, 0.2, 0.1, 0.0)
@@ -53,7 +51,7 @@ _PLUS, _MINUS, _BOTH = 1, 2, 3
 def sides_of_cells(
     solution: Solution, shape: Simplices, cuts: Sequence[AskedCut], reach: float, same: float
 ) -> NDArray[np.int8]:
-    """Side (m, c) of each cut on which cells lie: 1, −1; 0 of both, or far from the cut.
+    """Compute side (m, c) of each cut on which cells lie: 1, −1; 0 of both, or far from the cut.
 
     Parameters
     ----------
@@ -96,7 +94,7 @@ def sides_of_cells(
 def _cells_on_facets(
     points: Array, nodes: Ints, facets: Array, same: float
 ) -> tuple[Ints, Ints, Ints]:
-    """Cells (k,) with a facet of the cut, the corner (k,) opposite to it, and that facet (k,)."""
+    """Find cells (k,) with a facet of cut, the corner (k,) opposite to it, and that facet (k,)."""
     d = facets.shape[1]
     places, of_corner = np.unique(facets.reshape(-1, facets.shape[2]), axis=0, return_inverse=True)
     low, high = places.min(axis=0) - same, places.max(axis=0) + same
@@ -127,7 +125,7 @@ def _cells_on_facets(
 def _beside_facets(
     shape: Simplices, cell: Ints, corner: Ints, facet: Ints, facets: Array, normal: Array
 ) -> Array:
-    """Side (k,) of a facet's own normal on which cells lie: of two that share it, the opposite."""
+    """Find the side (k,) of a facet's own normal of its cells: of two cells, opposite sides."""
     off = shape.corners[cell, corner] - facets[facet, 0]
     height = np.sum(off * normal[facet], axis=1)
     # the higher of the two is sure of its side; the other may be as thin as round-off
@@ -174,7 +172,7 @@ def _spread(nodes: Ints, near: NDArray[np.bool_], fresh: Ints, bits: Bits, at_no
     while len(fresh):
         given = np.zeros_like(at_node)
         np.bitwise_or.at(given, nodes[fresh], bits[fresh, None])
-        given[at_node != 0] = 0  # a layer at a time: who was first, stays
+        given[at_node != 0] = 0  # a layer at a time: the first stays
         at_node |= given
         open_ = open_[bits[open_] == 0]
         sides, both = np.zeros(len(open_), dtype=np.int8), np.zeros(len(open_), dtype=bool)
@@ -221,7 +219,7 @@ class MembraneField(SolutionField):
         self.off_surface = float(self._on_surface(probes)[1].max())
 
     def _wanted(self, points: Array, near: Array | None) -> Sides:
-        """Find the sides (n, p) of planes that points lie on; of one on it, that of `near`."""
+        """Find the sides (n, p) of planes that points lie on; on a plane, the side of `near`."""
         wanted = np.zeros((len(points), len(self._patches)), dtype=np.int8)
         for k, patch in enumerate(self._patches):
             level = patch.level(points)
@@ -232,7 +230,7 @@ class MembraneField(SolutionField):
 
 
 def _sides_of(level: Array) -> Sides:
-    """Sides (m, p) of planes that triangles lie on, of the levels (p, m, 3) of their corners."""
+    """Tell sides (m, p) of planes of triangles, by the levels (p, m, 3) of their corners."""
     low, high = level.min(axis=2), level.max(axis=2)
     both = np.minimum(-low, high) > _ACROSS * (high - low)
     return np.ascontiguousarray(np.where(both, 0, np.sign(low + high)).T.astype(np.int8))
@@ -247,10 +245,10 @@ def field_of(
 ) -> SolutionField:
     """Make the field of a solution, with the sides of the cuts of `body` as asked.
 
-    `deviation` in m is that of another solution's cut, if the field is asked on that one's sides,
-    or what is known of its own. Unless it is `continued`, the field is that of the cell that holds
-    a point, whatever its side; with a `RealisedCut`, beside facets beyond the limit (of a membrane
-    everywhere, if there are any).
+    `deviation` in m belongs to another solution's cut, if the field is asked on the sides of that
+    cut, or is known of its own. Unless it is `continued`, the cell that holds a point gives the
+    field, whatever its side. With a `RealisedCut` this is so beside facets beyond the limit (of a
+    membrane everywhere, if there are any).
     """
     cut = continued if isinstance(continued, RealisedCut) else None
     if isinstance(body, MembraneBody):
@@ -261,7 +259,7 @@ def field_of(
 
 
 def cut_deviation(solution: Solution, body: AnyBody) -> float:
-    """Largest distance of the realised cut from the cuts as asked, m, beyond tips left out."""
+    """Measure the largest distance of the realised cut from the cuts as asked, m, tips apart."""
     facets = solution.cut_facets
     if not len(facets) or not body.has_cuts:
         return 0.0
@@ -306,10 +304,10 @@ class SidedField(SolutionField):
         self._sides = sides_of_cells(solution, self.shape, self._cuts, self._reach, same)
 
     def inner_points(self, cells: NDArray[np.int64]) -> Array:
-        """Points (n, d) on the sides of the cuts as asked on which given cells (n,) lie.
+        """Find points (n, d) on the sides of the cuts as asked on which given cells (n,) lie.
 
-        They are the centres; that of a cell between a cut as asked and as realised is on the
-        wrong side, and replaced by that of the nearest cell with the same sides that is right.
+        They are the centres of the cells. A cell between a cut as asked and as realised has its
+        centre on the wrong side: the centre of the nearest cell that is right replaces it.
         """
         reach = np.full(len(self._centres), self._reach)
         asked = asked_sides(self._cuts, self._centres, reach, self._size)
@@ -327,7 +325,7 @@ class SidedField(SolutionField):
         return np.asarray(self._centres[at])
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
-        """Sides (n, c) of the cuts as asked on which `near` lies, of points close to these."""
+        """Find sides (n, c) of the cuts as asked on which `near` lies, of points close to these."""
         side = points if near is None else np.asarray(near, dtype=float)
         reach = np.full(len(points), self._reach)
         if side is not points:
@@ -340,6 +338,6 @@ class SidedField(SolutionField):
         return wanted
 
     def _in_material(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points (n, d) lie in a cell: in a hole that a method left nothing is stored."""
+        """Tell whether points (n, d) lie in a cell, and not in a hole that a method left."""
         tolerance = ROUND_OFF * self.scale
         return holding_cells(points, self._searched, tolerance, nearest=False) >= 0

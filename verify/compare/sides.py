@@ -18,14 +18,14 @@ _Floats = NDArray[np.float64]
 
 
 def distance_to_segments(points: _Floats, segments: _Floats) -> _Floats:
-    """Distance (n,) of points (n, d) to the nearest segment (k, 2, d); infinite without any."""
+    """Measure distances (n,) of points (n, d) to the nearest segment (k, 2, d)."""
     return nearest_segments(points, segments)[0]
 
 
 def nearest_segments(
     points: _Floats, segments: _Floats
 ) -> tuple[_Floats, _Floats, NDArray[np.int64]]:
-    """Distance (n,) of points (n, d) to the nearest segment, its foot (n, d), and which it is (n,).
+    """Find the nearest segment of points (n, d): distance (n,), foot (n, d), number (n,).
 
     Without any segment the distance is infinite, the foot the point, and the segment −1.
     """
@@ -84,12 +84,12 @@ _NORMAL = 1e-9
 
 
 def asked_sides(cuts: Sequence[AskedCut], points: Array, reach: Array, size: float) -> Sides:
-    """Side (n, c) of each of c cuts on which points (n, d) lie: 1, −1, or 0.
+    """Compute the side (n, c) of each of c cuts on which points (n, d) lie: 1, −1, or 0.
 
-    It is 0 of points farther from the cut than their `reach` (n,) in m, and of those beyond an
-    end of the cut, which lie beside no part of it. At a corner of the cut the side is that of the
-    piece whose plane is farther: the nearer plane is continued into the other side. What lies on
-    the cut to the last bit is on the positive side. `size` is that of the body, m.
+    It is 0 of points farther from the cut than their `reach` (n,) in m, and of points beyond an
+    end. At a corner the piece whose plane is farther gives the side: the nearer plane is continued
+    into the other side. Points on the cut to the last bit are on the positive side. `size` is the
+    size of the body, m.
     """
     sides = np.zeros((len(points), len(cuts)), dtype=np.int8)
     for k, pieces in enumerate(cuts):
@@ -98,7 +98,7 @@ def asked_sides(cuts: Sequence[AskedCut], points: Array, reach: Array, size: flo
 
 
 def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Distances (n,) of points to a cut as asked, m, feet (n, d), and the nearest pieces (n,)."""
+    """Find the distance (n,) of points to a cut as asked, m, feet (n, d), nearest pieces (n,)."""
     feet = np.array([piece.foot(points) for piece in pieces])
     away = np.linalg.norm(points - feet, axis=2)
     nearest, rows = away.argmin(axis=0), np.arange(len(points))

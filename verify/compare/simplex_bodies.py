@@ -75,11 +75,11 @@ class SimplexBody:
         return bool(self.cuts)
 
     def tip_distance(self, points: Array) -> Array:
-        """Distance (n,) of points (n, 3) to the nearest front; infinite without one."""
+        """Compute the distance (n,) of points (n, 3) to the nearest front; infinite without one."""
         return distance_to_segments(points, self.front)
 
     def frames_at(self, points: Array) -> Array | None:
-        """Two tangents and the normal (n, 3, 3) of a surface at points (n, 3); a solid has none."""
+        """Return tangents and normal (n, 3, 3) of a surface at points (n, 3); None of a solid."""
         return None
 
 
@@ -102,7 +102,7 @@ class SolidBody(SimplexBody):
     inside: Inside
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Nearest points (n, 3) on the cuts as asked, and whether they are ends of these (n,)."""
+        """Find nearest points (n, 3) on cuts as asked, and whether they are ends of these (n,)."""
         found = [patch.nearest(points) for patch in self.patches]
         feet, rims = (np.array(column) for column in zip(*found, strict=True))
         nearest = np.linalg.norm(points - feet, axis=2).argmin(axis=0), np.arange(len(points))
@@ -150,7 +150,7 @@ def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
 
 
 def _box_tetrahedra(box: Array) -> Array:
-    """Six tetrahedra (6, 4, 3) around the diagonal of a box (Kuhn)."""
+    """Divide a box into six tetrahedra (6, 4, 3) around its diagonal (Kuhn)."""
     unit = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=float)
     paths = [[0, *path, 7] for path in ([1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6])]
     return np.asarray((box[0] + unit * (box[1] - box[0]))[np.array(paths)])
@@ -169,7 +169,7 @@ def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
 
 
 def _trimmed(rim: Array, inside: Inside, size: float) -> Array:
-    """Pieces (f, 2, 3) of the segments of a rim that run inside the body, not on its surface."""
+    """Find pieces (f, 2, 3) of segments of a rim that run inside the body, not on its surface."""
     pieces = []
     for a, b in rim:
         n = max(1, int(np.ceil(_RIM * np.linalg.norm(b - a) / size)))
@@ -188,7 +188,7 @@ def _trimmed(rim: Array, inside: Inside, size: float) -> Array:
 
 Cells = NDArray[np.int64]
 
-# of the surface's size: a corner that close to the plane of a cut is on it, and what is shorter is
+# of the surface's size: a corner that close to the plane of a cut is on it, and a shorter line is
 # no piece of a cut
 _ON = 1e-12
 SHORT = 1e-10
@@ -225,7 +225,7 @@ class SurfaceLines:
 def surface_lines(
     points: Array, cells: Cells, patches: Sequence[PlanePatch], name: str
 ) -> SurfaceLines:
-    """Lines along which the patches of a cut cross a surface.
+    """Find lines along which the patches of a cut cross a surface.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def surface_lines(
 
 
 def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
-    """Segments (s, 2, 3) across triangles, and the ways (s, 2, 3) into both their sides."""
+    """Find segments (s, 2, 3) across triangles, and ways (s, 2, 3) into both their sides."""
     value = level[cells]
     crossed = np.flatnonzero((value.max(axis=1) > 0.0) & (value.min(axis=1) < 0.0))
     corners, value = points[cells[crossed]], value[crossed]
@@ -275,7 +275,7 @@ def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
 
 
 def _edges_on(cells: Cells, level: Array) -> tuple[Cells, Cells]:
-    """Edges (e, 2) of triangles that lie on the plane, and the triangles' third corners (e,)."""
+    """Find edges (e, 2) of triangles that lie on plane, and the triangles' third corners (e,)."""
     pairs = np.concatenate([cells[:, list(edge)] for edge in _EDGES])
     third = np.concatenate([cells[:, 3 - sum(edge)] for edge in _EDGES])
     on = (level[pairs] == 0.0).all(axis=1)
@@ -283,7 +283,7 @@ def _edges_on(cells: Cells, level: Array) -> tuple[Cells, Cells]:
 
 
 def _along(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
-    """Edges (s, 2, 3) of triangles that lie on either side of the plane, and the ways into both."""
+    """Find edges (s, 2, 3) of triangles on either side of the plane, and ways into both."""
     pairs, third = _edges_on(cells, level)
     above = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] > 0.0}
     below = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] < 0.0}
@@ -320,7 +320,7 @@ def _square(way: Array, ends: Array) -> Array:
 
 
 def _clipped(ends: Array, patch: PlanePatch, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
-    """Parts (p, 2, 3) of segments on the plane of a patch that lie on it; of which each is (p,)."""
+    """Clip segments on the plane of a patch to it: parts (p, 2, 3), and of which each is (p,)."""
     flat = (ends - patch.origin) @ patch.axes[:2].T
     parts, which = [], []
     for k, (a, b) in enumerate(flat):
@@ -332,7 +332,7 @@ def _clipped(ends: Array, patch: PlanePatch, tolerance: float) -> tuple[Array, N
 
 
 def _within(a: Array, b: Array, triangles: Array, tolerance: float) -> list[tuple[float, float]]:
-    """Ranges of the parameter of a segment ab inside a union of triangles (m, 3, 2)."""
+    """Compute ranges of the parameter of a segment ab inside a union of triangles (m, 3, 2)."""
     found = []
     for triangle in triangles:
         low, high = 0.0, 1.0
@@ -379,12 +379,12 @@ class MembraneBody(SimplexBody):
         return np.asarray(self.front[:, 0])
 
     def frames_at(self, points: Array) -> Array:
-        """Two tangents and the normal (n, 3, 3) of the triangles that points (n, 3) lie in."""
+        """Return tangents and normal (n, 3, 3) of the triangles that hold points (n, 3)."""
         found, _ = nearest_of_triangles(points, self.corners, 1e-10 * self.size)
         return triangle_frames(self.corners[found])
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Nearest points (n, 3) on the lines of the cuts, and whether they are tips (n,)."""
+        """Find nearest points (n, 3) on the lines of the cuts, and whether they are tips (n,)."""
         ends = np.concatenate([lines.ends for lines in self.lines.values()])
         _, foot, _ = nearest_segments(points, ends)
         return foot, self.tip_distance(foot) <= _SAME * self.size

@@ -1,9 +1,9 @@
 """Linear simplices: gradients, normals, volumes; Gauss rules on them; their division.
 
-Of triangles in space all geometry is tangential: what lies across them has no gradient there. The
-rules have positive weights and all points inside. A quadrature needs no conforming mesh, so that
-every simplex may be divided for itself: an edge is split, and each half of the simplex keeps one of
-its ends. Volumes add up to round-off.
+Of triangles in space all geometry is tangential: gradients have no part across them. The rules have
+positive weights and all points inside. A quadrature needs no conforming mesh, so that every simplex
+may be divided for itself: an edge is split, and each half of the simplex keeps one of its ends.
+Volumes add up to round-off.
 """
 
 from collections.abc import Callable
@@ -57,13 +57,13 @@ class Simplices:
     degenerate: NDArray[np.bool_]
 
     def heights(self, points: Array, cells: NDArray[np.int64]) -> Array:
-        """Heights (n, k+1) of points (n, d) over the facets of given cells (n,), m."""
+        """Compute heights (n, k+1) of points (n, d) over the facets of given cells (n,), m."""
         off = points[:, None] - np.roll(self.corners[cells], -1, axis=1)
         return np.asarray(np.sum(self.normals[cells] * off, axis=2))
 
 
 def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
-    """Geometry of the simplices with corners ``points[cells[:, :k + 1]]``."""
+    """Compute the geometry of the simplices with corners ``points[cells[:, :k + 1]]``."""
     count = _CORNERS[cells.shape[1]]
     corners = points[cells[:, :count]]
     across = triangle_frames(corners)[:, 2] if count == points.shape[1] == 3 else None
@@ -108,16 +108,16 @@ def kept_with[T](make: Callable[[Solution], T]) -> Callable[[Solution], T]:
 
 @kept_with
 def cells_of(solution: Solution) -> Simplices:
-    """Geometry of the cells of a solution."""
+    """Compute the geometry of the cells of a solution."""
     return simplices(solution.points, solution.cells)
 
 
 def triangle_frames(corners: Array) -> Array:
-    """Orthonormal frames (m, 3, 3) of triangles (m, 3, 3) in space, as rows: two along, one across.
+    """Make orthonormal frames (m, 3, 3) of triangles in space, as rows: two along, one across.
 
-    The first is along the longest edge and the others are square to it to the last digit, so that
-    of a sliver only the turn about its length is not resolved. Of a triangle without area the frame
-    is some frame.
+    The first is along the longest edge and the others are normal to it to the last digit. So of a
+    sliver only the turn about its length is not resolved. Of a triangle without area the frame is
+    arbitrary.
     """
     edges = np.roll(corners, -1, axis=1) - corners
     longest = np.argmax(np.linalg.norm(edges, axis=2), axis=1)
@@ -136,8 +136,8 @@ def triangle_frames(corners: Array) -> Array:
 def in_frames(gradient: Array, frames: Array) -> Array:
     """Take derivatives (m, 3, 2) along the tangents of `frames` (m, 3, 3), components along rows.
 
-    `gradient` (m, 3, 3) may be tangential to another triangulation of the surface: then this is
-    the gradient of what it becomes by way of the nearest points.
+    `gradient` (m, 3, 3) may be tangential to another triangulation of the surface: then the field
+    is carried over by nearest points.
     """
     return np.asarray(frames @ gradient @ np.swapaxes(frames[:, :2], 1, 2))
 
@@ -154,7 +154,7 @@ def facet_normals(corners: Array) -> Array:
 
 
 def facet_nodes(d: int, corner: int, order: int) -> list[int]:
-    """Local nodes of the facet opposite to a corner; of order 2 with its mid-edge nodes."""
+    """Compute local nodes of the facet opposite to a corner; of order 2 with its mid-edge nodes."""
     own = [k for k in range(d + 1) if k != corner]
     if order == 1:
         return own
@@ -193,7 +193,7 @@ def _perpendicular(edges: list[Array]) -> Array:
 
 @cache
 def simplex_rule(k: int, order: int) -> tuple[Array, Array]:
-    """Barycentric points (n, k + 1) and weights (n,) that sum to 1.
+    """Make barycentric points (n, k + 1) and weights (n,) that sum to 1.
 
     Order 2 is the symmetric rule of k + 1 points, exact for quadratic polynomials; any other
     is Stroud's conical product of order^k points, exact to degree 2 · order − 1.
@@ -216,7 +216,7 @@ def simplex_rule(k: int, order: int) -> tuple[Array, Array]:
 
 
 def points_in(corners: Array, order: int) -> tuple[Array, Array]:
-    """Points (n, d) and weights (n,) of the rule of an order on simplices (m, k + 1, d)."""
+    """Make points (n, d) and weights (n,) of the rule of an order on simplices (m, k + 1, d)."""
     place, share = simplex_rule(corners.shape[1] - 1, order)
     points = np.einsum("qk,mkd->mqd", place, corners).reshape(-1, corners.shape[2])
     return points, (measures(corners)[:, None] * share).ravel()
@@ -228,7 +228,7 @@ _ROUNDS = 64  # of bisection: every edge could be halved 20 times
 
 
 def heights(corners: Array) -> Array:
-    """Smallest heights (m,) of simplices (m, k + 1, d), k ≤ d: 0 of a flat one."""
+    """Compute smallest heights (m,) of simplices (m, k + 1, d), k ≤ d: 0 of a flat one."""
     count = corners.shape[1]
     largest = np.max([measures(np.delete(corners, k, axis=1)) for k in range(count)], axis=0)
     volume = (count - 1) * measures(corners)
@@ -313,7 +313,7 @@ def divide(corners: Array, wanted: Callable[[Array, Array], NDArray[np.bool_]]) 
 
 
 def _halves(corners: Array, i: NDArray[np.int64], j: NDArray[np.int64], middle: Array) -> Array:
-    """Both parts of each simplex: `middle` replaces corner i in the first, j in the second."""
+    """Halve each simplex: `middle` replaces corner i in the first half, j in the second."""
     rows = np.arange(len(corners))
     first, second = corners.copy(), corners.copy()
     first[rows, i], second[rows, j] = middle, middle

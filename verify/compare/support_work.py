@@ -1,25 +1,25 @@
 """Work of supports that move, from the fields of a solution: the weak form tested with a motion.
 
-A reaction r balances M a + f(u) + f_v(v) − p at the components that supports hold. Its power is
-that of the residual on any test function w that has the prescribed velocity there,
+A reaction r balances M a + f(u) + f_v(v) − p at the components that supports hold. Let w be any
+test function that has the prescribed velocity there. The power of r is the power of the residual on
+w,
 
     r·w = ∫ P(∇u):∇w + f_v(v)·w − p·w + d/dt (w·Mv) − ẇ·Mv,
 
-and so its work does not hang on accelerations, which no field shows between output times. Any w
-gives the same; a smooth one the most accurate, since waves of the mesh hardly work on it, neither
-between output times nor where the solver has other test functions than its mesh of output (at
-cuts). A rigid motion of the body as it is deformed has no internal power at all: its work is the
+and so its work does not depend on accelerations, which no field shows between output times. Any w
+gives the same work. A smooth one is the most accurate, since waves of the mesh hardly work on it.
+That holds between output times, and at cuts, where the solver has other test functions than its
+mesh of output. A rigid motion of the deformed body has no internal power at all: its work is the
 change of momenta, to round-off. An affine field is a velocity that every linear method can have,
-whatever it does at its cuts. So what of the prescribed velocity is rigid, then what is affine, is
-taken exactly (`Extension`); only the rest is harmonic in the body, in one piece across all cuts, as
-it is while they are closed. One layer of elements, the other extreme, sees every wave at the
-support.
+whatever it does at its cuts. So the rigid part of the prescribed velocity, then its affine part, is
+taken exactly (`Extension`). Only the rest is harmonic in the body, in one piece across all cuts, as
+if they were closed. One layer of elements, the other extreme, sees every wave at the support.
 
-Between output times displacements are the cubic of those and of the velocities at both ends
-(Hermite), at held nodes what is prescribed. Each part between output times and kinks of histories
-is integrated by a Lobatto rule of four points. The half-width is Richardson's from every second and
-every fourth output time. An extension that is not affine is no test function of every solver: there
-the half-width is that of the one in one layer of elements, and what the two differ by.
+Between output times displacements are Hermite's cubic; at held nodes they are prescribed. Each part
+between output times and kinks of histories is integrated by a Lobatto rule of four points. The
+half-width is Richardson's from every second and every fourth output time. An extension that is not
+affine is no test function of every solver. There the half-width comes from the extension in one
+layer of elements, and from the difference of the two.
 """
 
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ class Extension:
     held : (n, d) bool array
         Which components of which nodes have values.
     in_layer : bool
-        Whether what is not affine ends in the cells at what is held; else it is harmonic.
+        Whether the part that is not affine ends in the cells at held nodes; else it is harmonic.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Extension:
 
     @cached_property
     def _solvers(self) -> list["_Known"]:
-        """For each component what is held, and the solver of the rest."""
+        """Make for each component the held places, and the solver of the rest."""
         found: dict[bytes, _Known] = {}
         for own in self.held.T:
             if own.tobytes() not in found:
@@ -162,7 +162,7 @@ class Extension:
 
 
 class _Known(NamedTuple):
-    """Places (p,) that are held, what couples the others to them, and the solver of the others."""
+    """Places (p,) that are held, their coupling to the others, and the solver of the others."""
 
     fixed: NDArray[np.bool_]
     coupling: csr_array
@@ -183,7 +183,7 @@ def _rigid(points: Array) -> Array:
 
 
 def _affine(points: Array) -> Array:
-    """Fields (q, n, d) that are affine in the points."""
+    """Compute fields (q, n, d) that are affine in the points."""
     n, d = points.shape
     away = np.column_stack([np.ones(n), _scaled(points)])
     modes = np.zeros((d, d + 1, n, d))
@@ -199,7 +199,7 @@ def _scaled(points: Array) -> Array:
 
 
 def _slopes(at: Array, gradients: Array, order: int) -> Array:
-    """Gradients (m, nodes, d) of the shape functions of cells at barycentric coordinates (k+1,)."""
+    """Compute gradients (m, nodes, d) of shape functions at barycentric coordinates (k+1,)."""
     if order == 1:
         return gradients
     corners = (4.0 * at - 1.0)[:, None] * gradients
@@ -219,7 +219,7 @@ _RATES = np.linalg.solve(
     np.array([[0.0, 1.0, 2 * s, 3 * s * s] for s in _PLACES]).T,
 ).T
 _ORDERS, _SAFETY = (0.5, 4.0), 3.0
-_INSIDE = 1e-9  # of an interval: so far from its ends what jumps there is asked for
+_INSIDE = 1e-9  # of an interval: distance from its ends at which jumps are evaluated
 _SAME_TIME = 1e-9  # of the duration
 
 
@@ -266,7 +266,7 @@ def _since(steps: Array) -> Array:
 
 
 def _forces(scene: Scene, solution: Solution, weights: Array) -> list[_Force]:
-    """Nodal forces (n, d) of loads without their factors, N, and their histories."""
+    """Compute nodal forces (n, d) of loads without their factors, N, and their histories."""
     found: list[_Force] = []
     for load in scene.loads:
         if isinstance(load, Gravity):
@@ -297,12 +297,12 @@ class _Work:
         return np.array([self._between(a, b) for a, b in pairwise(self._picks(stride))])
 
     def off(self, steps: Array) -> Array:
-        """Half-width (t − 1,) of the steps between all output times, J.
+        """Compute the half-width (t − 1,) of the steps between all output times, J.
 
         Three times Richardson's (Roache's factor of safety), from steps of twice and four times the
-        length, with the order at which all of them together change: at most the 4 of Hermite's
-        cubic; a motion that output times do not resolve has an order of next to nothing. A step
-        that has no other to make one of twice the length with has the largest width of all.
+        length. The order is observed on all of them together: at most the 4 of Hermite's cubic, and
+        near zero for a motion that output times do not resolve. A step without a neighbour to
+        double it has the largest width of all.
         """
         first, second, fourth = (self._picks(stride) for stride in (1, 2, 4))
         done, twice = _since(steps), _since(self.steps(2))
@@ -324,7 +324,7 @@ class _Work:
         return width
 
     def _picks(self, stride: int) -> NDArray[np.int64]:
-        """Numbers of output times of which so many are one step, but for those with a kink."""
+        """Choose output times at a stride, apart from times with a kink."""
         times = self.solution.times
         ends = [i for i in range(len(times)) if self._is_knot(times[i])]
         ends = sorted({*ends, len(times) - 1})
@@ -345,7 +345,7 @@ class _Work:
         return SolutionField(self.solution)
 
     def _between(self, first: int, last: int) -> float:
-        """Work between two output times, J, from before what jumps there as far as they show it."""
+        """Sum the work between two output times, J, including jumps at their ends."""
         times = self.solution.times
         same = _SAME_TIME * float(np.ptp(times))
         a, b = float(times[first]), float(times[last])
@@ -356,9 +356,9 @@ class _Work:
         return done
 
     def _smooth(self, first: int, last: int, start: float, end: float) -> float:
-        """Work in a part of an interval without kinks, and of what jumps at its ends, J.
+        """Integrate the work in a part of an interval without kinks, with jumps at its ends, J.
 
-        A velocity that supports take up at once is a change of kinetic energy at what is held.
+        A velocity that supports take up at once changes the kinetic energy of held nodes.
         """
         span = end - start
         prescribed = [start + span * float(np.clip(s, _INSIDE, 1 - _INSIDE)) for s in _PLACES]
@@ -396,7 +396,7 @@ class _Work:
         return bool(np.abs(np.array(kinks) - time).min() <= near)
 
     def _state(self, first: int, last: int, time: float) -> tuple[Array, Array]:
-        """Displacements and velocities (n, d) at a time: Hermite's between two output times."""
+        """Interpolate displacements and velocities (n, d) at a time by Hermite's cubic."""
         solution, held = self.solution, self.nodes.follows
         assert solution.velocity is not None
         a, b = solution.times[first], solution.times[last]
@@ -415,19 +415,19 @@ class _Work:
         return u, v
 
     def _points(self, u: Array) -> Array:
-        """Places in which a motion is rigid, m: of linear kinematics those at rest."""
+        """Return the places in which a motion is rigid, m: at rest for linear kinematics."""
         moved = self.scene.analysis.kinematics == "corotational"
         return self.solution.points + u if moved else self.solution.points
 
     def _power(self, time: float, v: Array, w: Array) -> float:
-        """Power of damping by the mass, less that of loads, on velocities w, W."""
+        """Subtract the power of loads from the power of damping by the mass, on velocities w, W."""
         power = self.scene.analysis.damping[0] * float(np.sum(w * (self.mass @ v)))
         for force, history in self.forces:
             power -= factor_at(history, time) * float(np.sum(force * w))
         return power
 
     def _internal(self, u: Array, v: Array, w: Array) -> float:
-        """Power of stresses, and of damping by the stiffness, on velocities w, W."""
+        """Compute the power of stresses, and of damping by the stiffness, on velocities w, W."""
         test, displacement = self._field.with_nodal(w), self._field.with_nodal(u)
         power = stress_power(test, displacement, self.law)
         if damping := self.scene.analysis.damping[1]:
@@ -437,7 +437,7 @@ class _Work:
 
 
 def taken_up(mass: csr_array, held: NDArray[np.bool_], rates: Array, given: Array) -> Array:
-    """Rates (n, d) after held nodes take up given ones at once: M × rates is the same elsewhere."""
+    """Let held nodes take up given rates (n, d) at once: M × rates stays the same elsewhere."""
     change = np.where(held, given - rates, 0.0)
     if not change.any():
         return rates

@@ -323,7 +323,7 @@ def _kept(account: MotionAccount) -> Finding:
     if least > _LOST:
         return Finding(float(missing.max()), _LOST, "energy changes that nothing accounts for")
     if most > _LOST:
-        why = energies.said.get("work_of_supports", energies.said["kinetic_energy"])
+        why = energies.sources.get("work_of_supports", energies.sources["kinetic_energy"])
         return Finding(0.0, None, f"known within {width.max():.1g} only: {why}")
     loss = float(taken.max())
     note = f"its method takes {loss:.2g} of the energy in play, as it states"

@@ -2,9 +2,9 @@
 
 A solver states its pressure at points of its realised cut, with the length or area of each. It is
 compared there with p = −n·σn of the exact field, or with the pressure of the reference. Errors are
-in L2 over the cut, and over the output times of a motion; the oscillation is the part of the error
-that is left of it without its mean over two elements to all sides. How well the reference is known
-follows from its levels, as of all other numbers (`verify.judge.convergence`).
+in L2 over the cut, and over the output times of a motion. The oscillation is the error less its
+mean over two elements to all sides. How well the reference is known follows from its levels, as of
+all other numbers (`verify.judge.convergence`).
 """
 
 from collections.abc import Callable, Sequence
@@ -97,7 +97,7 @@ def known_contact(
 
 
 def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
-    """Pressure of an exact field on the faces of the cuts of a rule, zero where they are drawn."""
+    """Return the pressure of an exact field on the faces of cuts, zero in tension."""
     tree = cKDTree(rule.points)
 
     def at(points: Array, time: float) -> Array:
@@ -113,7 +113,7 @@ def exact_pressure(exact: Any, law: Law, rule: CutRule) -> Pressure:
 
 
 def stated_pressure(solution: Solution) -> Pressure:
-    """Pressure that a solution states, between its points by the inverse of the distances."""
+    """Interpolate the pressure that a solution states, by inverse distances."""
     contact = solution.contact
     assert contact is not None
     count = min(solution.dimension, len(contact.points))
@@ -132,7 +132,7 @@ def stated_pressure(solution: Solution) -> Pressure:
 def contact_metrics(
     solution: Solution, field: Field, rule: CutRule, truth: ContactTruth | None, size: float
 ) -> tuple[list[Metric], dict[str, str]]:
-    """Measure what a solution says of the contact of its faces.
+    """Measure the contact of faces that a solution states.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def contact_metrics(
         ``contact_extent`` (m, in space m²), ``contact_force`` (N) and ``contact_slip`` of faces
         that are together, the largest in elements.
     notes : dict of str to str
-        By what is not measured, why.
+        Reasons, by the name of each metric that could not be measured.
     """
     contact = solution.contact
     if contact is None or not len(contact.weights):
@@ -203,7 +203,7 @@ def _errors(
 
 
 def _resultants(pressure: Array, weights: Array) -> tuple[float, float]:
-    """Length or area of the faces that are together, and the force between them."""
+    """Compute the length or area of the faces that are together, and the force between them."""
     return float(weights[_pressed(pressure, weights)].sum()), float(weights @ pressure)
 
 
@@ -212,7 +212,7 @@ def _pressed(pressure: Array, weights: Array) -> NDArray[np.bool_]:
 
 
 def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
-    """Largest displacement along each other of faces that are together, m."""
+    """Compute the largest displacement along each other of faces that are together, m."""
     points = contact.points[_pressed(contact.pressure[-1], contact.weights)]
     if not len(points):
         return 0.0
