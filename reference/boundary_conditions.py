@@ -36,7 +36,7 @@ _DEGREE = 8  # of the rule over pieces of facets
 def constrained_values(
     scene: Scene, space: ConformingSpace, exact: Any, share: float = 1.0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Unknowns that the supports hold, and their values.
+    """Find unknowns that the supports hold, and their values.
 
     A discontinuous prescribed field is taken on the side of the cell that owns the node. A later
     support wins where two hold the same node. A `share` below 1 is a point on the way there: of
@@ -73,7 +73,7 @@ def constrained_values(
 def nodes_on_part(
     scene: Scene, space: ConformingSpace, where: str, key: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes (k,) that a support on a part holds, each on its own side of the cuts.
+    """Find nodes (k,) that a support on a part holds, each on its own side of the cuts.
 
     Returns
     -------
@@ -181,7 +181,7 @@ class RigidMotions:
 
 
 def best_rotation(now: Array, wanted: Array) -> Array:
-    """Rotation (d, d) of centred points (k, d) that brings them nearest to others.
+    """Compute the rotation (d, d) of centred points (k, d) that brings them nearest to others.
 
     In space the eigenvector of Horn's matrix (B. K. P. Horn, J. Opt. Soc. Am. A 4, 1987, 629).
     """
@@ -349,7 +349,7 @@ def _given(space: ConformingSpace, components: Any, time: float) -> Any:
 def _pairs(
     space: ConformingSpace, cell: NDArray[np.int64], opposite: NDArray[np.int64]
 ) -> NDArray[np.int32]:
-    """DOLFINx's pairs of cell and local facet of the facets opposite to corners of cells."""
+    """Compute DOLFINx's pairs of cell and local facet of facets opposite to corners of cells."""
     # facet i lies opposite corner i; other ranks integrate over their cells themselves
     pairs = np.column_stack([space.dolfinx_cell[cell], opposite])
     own = space.function_space.mesh.topology.index_map(space.mesh.cell_dimension).size_local
@@ -472,7 +472,7 @@ def _values(
 
 
 def _facet_shapes(barycentric: Array, edges: list[tuple[int, int]]) -> Array:
-    """Shape functions (…, q) of a facet at barycentric coordinates (…, k).
+    """Compute shape functions (…, q) of a facet at barycentric coordinates (…, k).
 
     Functions of the corners, and in a quadratic space of the middles of edges.
     """

@@ -1,10 +1,10 @@
 """Unilateral contact of the faces of cuts, without friction: gaps, pressures, the active set.
 
-The gap g = (u₊ − u₋)·n at the doubled nodes of a cut is not negative, the pressure p on its faces
-neither, and p g = 0. Pressures are linear over facets, with a value at each doubled corner; the gap
-that belongs to one is weighted by its hat function. Of linear elements that is one value per node
-(the rule of the corners); of quadratic ones it is the pair P2/P1, which is stable (S. Hüeber, M.
-Mair, B. Wohlmuth, Appl. Numer. Math. 54, 2005). Corners of a facet at a tip have the pressure of
+At the doubled nodes of a cut the gap is g = (u₊ − u₋)·n, and p is the pressure on its faces.
+Neither is negative, and p g = 0. Pressures are linear over facets, with a value at each doubled
+corner; the gap that belongs to one is weighted by its hat function. Of linear elements that is one
+value per node (the rule of the corners). Of quadratic ones it is the stable pair P2/P1 (S. Hüeber,
+M. Mair, B. Wohlmuth, Appl. Numer. Math. 54, 2005). Corners of a facet at a tip have the pressure of
 its other corners, so that a uniform pressure is one.
 
 With weighted gaps B u, forces on the nodes are Bᵀ p. The pressures solve a complementarity problem
@@ -121,7 +121,7 @@ class FaceContact:
 def _shares(
     space: ConformingSpace, facing: NDArray[np.int64], moves: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Integrals (f, q, q) of pressures times functions of nodes, and of pressures (f, q).
+    """Compute integrals (f, q, q) of pressures times functions of nodes, and of pressures (f, q).
 
     Per size of the facet. Corners whose gap is prescribed, not `moves` (f, q), give their hat to
     the other corners of the facet.

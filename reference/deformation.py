@@ -36,7 +36,7 @@ from verify.scene import Material
 
 
 def lame(material: Material) -> tuple[float, float]:
-    """Lamé constants (λ, μ) in Pa of one material; of a plane or thin body the reduced λ.
+    """Compute Lamé constants (λ, μ) in Pa of one material; of a plane or thin body the reduced λ.
 
     That is so in plane stress and of membranes. Where materials differ by region, they are those
     outside the regions.
@@ -72,7 +72,7 @@ def density(material: Material, test: Any) -> Any:
 
 
 def wave_speed(material: Material) -> float:
-    """Speed of pressure waves in the quickest of the materials, m/s."""
+    """Compute the speed of pressure waves in the quickest of the materials, m/s."""
     speeds = []
     for one in material.each:
         assert one.density is not None  # the scene has checked it
@@ -83,7 +83,7 @@ def wave_speed(material: Material) -> float:
 
 
 def _by_cell(material: Material, test: Any, rows: Sequence[tuple[float, ...]]) -> tuple[Any, ...]:
-    """Coefficients of which each has one value per material (rows)."""
+    """Compute coefficients of which each has one value per material (rows)."""
     from dolfinx import fem
     from ufl.algorithms import extract_arguments, extract_coefficients
 
@@ -326,7 +326,7 @@ def _stretch_sum(F: Array) -> Array:
 
 
 def _right(F: Array) -> Array:
-    """Fᵀ F."""
+    """Compute Fᵀ F."""
     C = np.empty_like(F)
     for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
         C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]

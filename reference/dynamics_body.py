@@ -172,7 +172,7 @@ def _passed_at(cut: ToolPathCut, delay: float, points: Array) -> Array:
 
 
 def _weights(corners: Array, nodes: Array) -> Array:
-    """Weights (f, d, q) of the nodes (f, q, d) of facets at their corners.
+    """Compute weights (f, d, q) of the nodes (f, q, d) of facets at their corners.
 
     A node at a corner has the hat of the corner. A node between two corners has both hats: as N
     over a segment except for the shape, and never negative.
@@ -496,7 +496,7 @@ class MovingBody:
         return load
 
     def _forces(self, load: Any, time: float = 0.0) -> Array:
-        """Nodal forces (k,) of a load at a time, N, without the factor of its history."""
+        """Compute nodal forces (k,) of a load at a time, N, without the factor of its history."""
         alone = self.scene.model_copy(update={"loads": [load]})
         alone._file, alone._name = self.scene.file, self.scene.name
         return load_forces(alone, self.space, self.exact, time)

@@ -43,7 +43,7 @@ class Scheme:
     """Parameters of one-step schemes with one unknown acceleration a₊.
 
     M a_{n+1−α_m} + C v_{n+1−α_f} + K u_{n+1−α_f} = f, where n+1−α is (1−α)·new + α·old. The ends
-    are u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
+    are: u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
     """
 
     alpha_m: float
@@ -219,7 +219,7 @@ class Stepper:
         return np.asarray((guess - still) / (h**2 * scheme.beta))
 
     def _spread(self, start: State) -> Array:
-        """Acceleration at which Newton's method starts where `_first` leads inside out.
+        """Compute the acceleration at which Newton's method starts where `_first` leads inside out.
 
         What the supports move by is spread over the body by the tangent at the start.
         """
@@ -244,7 +244,7 @@ class Stepper:
         )
 
     def _end(self, start: State, a: Array) -> tuple[Array, Array]:
-        """Displacement and velocity at the end of a step that ends with an acceleration."""
+        """Compute displacement and velocity at the end of a step that ends with an acceleration."""
         scheme, h = self.scheme, self.size
         reach = scheme.beta_old * start.acceleration + scheme.beta * a
         u = start.displacement + h * start.velocity + h**2 * reach
@@ -359,7 +359,7 @@ class Stepper:
         self._solver = body.step_solver(matrix, kind)
 
     def _scale(self, forces: StepForces) -> float:
-        """Norm of the largest of the forces, without those inside that ties pass on.
+        """Compute the norm of the largest of the forces, without those inside that ties pass on.
 
         Loads count in full: those on the faces of a closed cut leave the round-off of their sum.
         """
@@ -427,7 +427,7 @@ class Ledger:
         self._kinetic, self._strain = kinetic, strain
 
     def state(self, body: MovingBody, state: State) -> dict[str, float]:
-        """Energies of the state that was entered last, J."""
+        """Compute energies of the state that was entered last, J."""
         gravity = -float(body.weight @ state.displacement)
         return {"kinetic": self._kinetic, "strain": self._strain, "gravity": gravity}
 
@@ -469,7 +469,7 @@ class ShortWaves:
 
 
 def momenta_of(body: MovingBody, state: State) -> tuple[Array, Array]:
-    """Linear (d,) and angular momentum (1 or 3,) of a state, kg m/s and kg m²/s."""
+    """Compute the linear (d,) and angular momentum (1 or 3,) of a state, kg m/s and kg m²/s."""
     d = body.space.dimension
     momenta = (body.mass @ state.velocity).reshape(-1, d)
     places = body.space.node_points + state.displacement.reshape(-1, d)

@@ -70,7 +70,7 @@ class LinearSolve:
 
 
 def wants_pressure(scene: Scene, degree: int) -> bool:
-    """Whether a scene is solved better with a pressure.
+    """Tell whether a scene is solved better with a pressure.
 
     In plane stress nothing locks: the sheet is free to become thicker. The pressure is continuous,
     but jumps where materials meet: several materials are solved without.
@@ -101,7 +101,7 @@ def solve_linear(
         MUMPS, or CG with multigrid (with a pressure MINRES with GAMG); default by
         the number of unknowns.
     tolerance : float
-        Of multigrid: the norm of the true residual over that of the loads.
+        Of multigrid: the norm of the true residual over the norm of the loads.
     pressure : bool
         Whether the pressure is an unknown: in plane strain or in space, on a space of degree 2.
 
@@ -217,7 +217,7 @@ def _unknowns_of_flat_cells(matrix: Any, space: ConformingSpace) -> NDArray[np.i
 def linear_system(
     scene: Scene, space: ConformingSpace, exact: Any
 ) -> tuple[csr_array, csr_array | None, NDArray[np.bool_]]:
-    """Stiffness, consistent mass and held unknowns of a scene, in one process.
+    """Make the stiffness, consistent mass and held unknowns of a scene, in one process.
 
     Returns
     -------

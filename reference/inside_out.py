@@ -112,7 +112,7 @@ class OrientationCheck:
         return Orientation(value, place, sum(shares) / whole, max(reaches), said)
 
     def _worst(self, least: Array, among: Ints) -> tuple[float, tuple[float, ...]]:
-        """Least value of some cells, and the centroid of its cell."""
+        """Compute the least value of some cells, and the centroid of its cell."""
         if not len(among):
             return np.inf, ()
         cell = among[int(np.argmin(least[among]))]
@@ -131,7 +131,7 @@ class OrientationCheck:
 
 
 def singular_nodes(space: ConformingSpace, unknowns: NDArray[np.int32]) -> Ints:
-    """Corner nodes (k,) at which strains may be unbounded.
+    """Find corner nodes (k,) at which strains may be unbounded.
 
     Nodes of tips and fronts, re-entrant corners and edges, kinks and junctions of cuts: the
     material around a corner of the boundary (in space, an edge) takes more than 195°. And nodes
@@ -164,7 +164,7 @@ _BASE = 1 << 31  # of the number of an edge, by its nodes
 
 
 def _hinges(facets: Ints, d: int) -> Ints:
-    """Numbers of the corners, in space of the edges, of facets."""
+    """Find numbers of the corners, in space of the edges, of facets."""
     if d == 2:
         return np.asarray(facets.ravel())
     return np.concatenate(
@@ -177,7 +177,7 @@ def _numbers(one: Ints, two: Ints) -> Ints:
 
 
 def _angles(cells: Ints, points: Array, d: int) -> tuple[Ints, Array]:
-    """Numbers of all corners or edges of cells, and the angle of the cell there, rad."""
+    """Find numbers of all corners or edges of cells, and the angle of the cell there, rad."""
     hinges, angles = [], []
     for across in combinations(range(d + 1), 2):
         on = [i for i in range(d + 1) if i not in across]

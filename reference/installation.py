@@ -38,7 +38,7 @@ _PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", 
 
 @cache
 def guard_form_cache() -> Path:
-    """Have FFCx compile under locks, in a folder that can be written; once per process.
+    """Let FFCx compile under locks, in a folder that can be written; once per process.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def _temporary(wanted: Path) -> Path:
 
 
 def _placed(options: Callable[..., Any], folder: Path) -> Callable[..., Any]:
-    """Have DOLFINx's options name another folder, unless a caller does."""
+    """Let DOLFINx's options name another folder, unless a caller does."""
 
     def get_options(priority_options: Any = None) -> Any:
         return options({"cache_dir": folder, **(priority_options or {})})
@@ -146,7 +146,7 @@ def _is_free(lock: IO[str]) -> bool:
 
 
 def _is_abandoned(stem: Path, lock: IO[str]) -> bool:
-    """Whether nobody compiles a module of which there is no end, its lock being free."""
+    """Tell whether nobody compiles a module of which there is no end, its lock being free."""
     if os.fstat(lock.fileno()).st_size:
         return True  # who did, did so under the lock
     changes = [path.stat().st_mtime for path in stem.parent.glob(f"{stem.name}.*c")]
@@ -293,7 +293,7 @@ def _compiled(folder: str) -> str:
 
 
 def _cache() -> str:
-    """Where compiled forms are kept; in a folder of temporary files, the reason."""
+    """Find where compiled forms are kept; in a folder of temporary files, the reason."""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         import_dolfinx()

@@ -199,7 +199,7 @@ class StrainEquations:
         return reasons.ITERATING
 
     def _round_off(self) -> float:
-        """Residual, in N, that may be left where round-off does not let it fall."""
+        """Compute the residual, in N, that may be left where round-off does not let it fall."""
         lost = _ROUND_OFF * abs(self._diagonal) * float(np.linalg.norm(self.displacement()))
         return max(_GOOD_ENOUGH * self._force, lost)
 
@@ -237,7 +237,7 @@ class StrainEquations:
         return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
 
     def displacement(self) -> Array:
-        """Nodal displacements (n, d) on every rank, m."""
+        """Compute nodal displacements (n, d) on every rank, m."""
         return self._unknowns.everywhere(np.asarray(self.solution.x.array, dtype=float))
 
     def energy(self) -> float:
@@ -384,7 +384,7 @@ class StrainEquations:
 
 
 def quadrature_points(space: ConformingSpace) -> Array:
-    """Points (q, d) of the reference cell at which energies of `space` are integrated."""
+    """Find points (q, d) of the reference cell at which energies of `space` are integrated."""
     import basix
 
     plane = space.mesh.cell_dimension == 2

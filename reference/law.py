@@ -1,9 +1,9 @@
 """Laws of elasticity: an energy in UFL, whose derivatives are forces and tangents.
 
 The density is μ S + ½ λ θ², of a measure S of the shape and θ of the volume. With the pressure p =
-λ θ as an unknown of its own it is μ S + p θ − p² / 2λ, stationary in p. With quadratic
-displacements and linear pressures the error is bounded uniformly in λ. Source: Brezzi & Fortin,
-Mixed and Hybrid Finite Element Methods, 1991, VI. Statics and motions use the same law.
+λ θ as an unknown it is μ S + p θ − p² / 2λ, stationary in p. With quadratic displacements and
+linear pressures the error is bounded uniformly in λ. Source: Brezzi & Fortin, Mixed and Hybrid
+Finite Element Methods, 1991, VI. Statics and motions use the same law.
 
 A step-averaged force of the energy–momentum scheme is a discrete gradient of the energy: its work
 over a step is the change of the stored energy, and it turns nothing, whatever the step (Simo &
@@ -67,7 +67,7 @@ class Strain(NamedTuple):
 
 
 def linear(state: Deformation) -> Strain:
-    """Linear elasticity: ε : ε and tr ε."""
+    """Set up linear elasticity: ε : ε and tr ε."""
     import ufl
 
     strain = ufl.sym(state.H)
@@ -75,7 +75,7 @@ def linear(state: Deformation) -> Strain:
 
 
 def corotated(state: Any) -> Strain:
-    """Corotational elasticity with polar rotations: ‖U − I‖² and tr (U − I).
+    """Set up corotational elasticity with polar rotations: ‖U − I‖² and tr (U − I).
 
     The out-of-plane stretch is 1 in plane strain, and eliminated by λ in plane stress.
     """
@@ -350,11 +350,11 @@ class LinearLaw(Law):
             self._pressure = factorised(self._compliance)
 
     def energy(self, u: Array) -> float:
-        """½ u·K u."""
+        """Compute ½ u·K u."""
         return 0.5 * float(u @ self.force(u))
 
     def force(self, u: Array) -> Array:
-        """K u."""
+        """Compute K u."""
         x, product = self._x, self._product
         x.array[:] = self.unknowns.own_part(u)
         self._matrix.mult(x, product)
@@ -368,7 +368,7 @@ class LinearLaw(Law):
         return self.unknowns.everywhere(product.array).ravel()
 
     def tangent(self, u: Array) -> Any:
-        """K, or the saddle point."""
+        """Compute K, or the saddle point."""
         return self._matrix.copy()
 
     def averaged(self, u: Array, later: Array) -> Array:
@@ -376,17 +376,17 @@ class LinearLaw(Law):
         return self.force(0.5 * (u + later))
 
     def averaged_tangent(self, u: Array, later: Array) -> Any:
-        """½ K."""
+        """Compute ½ K."""
         half = self.tangent(u)
         half.scale(0.5)
         return half
 
     def viscous(self, u: Array, v: Array) -> Array:
-        """K v."""
+        """Compute K v."""
         return self.force(v)
 
     def viscous_tangent(self, u: Array) -> Any:
-        """K."""
+        """Compute K."""
         return self.tangent(u)
 
 
@@ -425,12 +425,12 @@ def mass_matrix(material: Material, unknowns: Unknowns, where: str = "") -> Any:
 
 
 def quadrature(space: ConformingSpace) -> int:
-    """Degree of the rule by which energies at finite rotation are integrated."""
+    """Compute the degree of the rule by which energies at finite rotation are integrated."""
     return 4 * space.degree - 2
 
 
 def _mean_turn(first: Any, last: Any) -> tuple[Any, Any]:
-    """D of the module, a discrete gradient of tr U; and F̄ − D without cancellation."""
+    """Compute D of the module, a discrete gradient of tr U; and F̄ − D without cancellation."""
     import ufl
 
     mean = 0.5 * (first.F + last.F)
@@ -447,7 +447,7 @@ def _mean_turn(first: Any, last: Any) -> tuple[Any, Any]:
 
 
 def _mean_slope(energy: str, lam: Any, mu: Any, before: Any, after: Any) -> Any:
-    """(H₁ − H₀)/(J₁ − J₀) of a neo-Hookean energy, from J₀ `before` to J₁ `after`."""
+    """Return (H₁ − H₀)/(J₁ − J₀) of a neo-Hookean energy, from J₀ `before` to J₁ `after`."""
     import ufl
 
     both = before + after
@@ -462,7 +462,7 @@ def _mean_slope(energy: str, lam: Any, mu: Any, before: Any, after: Any) -> Any:
 
 
 def _mean_cofactors(mean: Any, first: Any, last: Any) -> Any:
-    """D of the module, a discrete gradient of J, with the mean F̄ of both gradients."""
+    """Compute D of the module, a discrete gradient of J, with the mean F̄ of both gradients."""
     import ufl
 
     def cofactors(A: Any) -> Any:

@@ -61,9 +61,9 @@ class Answer(NamedTuple):
     ----------
     method : str
     round_off : float
-        Relative size of the last correction of the solution: what it is good to.
+        Relative size of the last correction of the solution: its accuracy.
     residual : float
-        Norm of the true residual over that of the loads, with the supports in place.
+        Norm of the true residual over the norm of the loads, with the supports in place.
     iterations : int
     """
 
@@ -81,7 +81,7 @@ class IllConditionedError(RuntimeError):
     correction : (l,) array
         Last correction of the unknowns of this rank: largest where the system is weak.
     size : float
-        Its norm over that of the solution.
+        Its norm over the norm of the solution.
     """
 
     def __init__(self, correction: NDArray[np.float64], size: float) -> None:

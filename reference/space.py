@@ -181,7 +181,7 @@ class TiedUnknowns(Unknowns):
         return np.asarray(values.reshape(self.shape)[self.leader].ravel())
 
     def all_tied_to(self, displacements: NDArray[np.int32]) -> NDArray[np.int32]:
-        """All nodal displacements in groups of which one is among some, ascending."""
+        """Return all nodal displacements in groups of which one is among some, ascending."""
         mark = np.zeros(self.shape, dtype=bool)
         mark.ravel()[displacements] = True
         np.logical_or.at(mark, self.leader, mark.copy())
@@ -252,12 +252,12 @@ class ConformingSpace(Unknowns):
     def facet_nodes(
         self, cell: NDArray[np.int64], opposite: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Nodes (f, q) of facets, each of a cell (f,) and opposite one of its corners (f,)."""
+        """Find nodes (f, q) of facets, each of a cell (f,) and opposite one of its corners (f,)."""
         on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
         return np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
 
     def edges_of_facet(self, opposite: int) -> list[tuple[int, int]]:
-        """Edges with a node in their middle of the facet opposite a corner, in order of nodes.
+        """Find edges with a node in their middle of the facet opposite a corner, in order of nodes.
 
         By the numbers of their ends among the corners of the facet; none of linear elements.
         """
@@ -270,7 +270,7 @@ class ConformingSpace(Unknowns):
     def broken_facet_dofs(
         self, broken: Any, cell: NDArray[np.int64], opposite: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Unknowns (f, q) of a discontinuous space of this degree at the nodes of facets.
+        """Find unknowns (f, q) of a discontinuous space of this degree at the nodes of facets.
 
         They are in the order of `facet_nodes`; the cells must be this rank's.
         """
@@ -280,7 +280,7 @@ class ConformingSpace(Unknowns):
         return np.take_along_axis(dofs, on_facet, axis=1)
 
     def outward_normals(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Outward unit normals (f, d) of facets of the boundary, by their rows (f,) there."""
+        """Compute outward unit normals (f, d) of facets of boundary, by their rows (f,) there."""
         cell, opposite = self.mesh.boundary[rows].T
         corners = self.boundary_facets[1][rows]
         inward = self.mesh.points[self.mesh.cells[cell, opposite]] - corners[:, 0]
@@ -290,7 +290,7 @@ class ConformingSpace(Unknowns):
         return normals
 
     def boundary_nodes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Nodes (b,) on the outer boundary (not on the faces of the cut), and a cell of each."""
+        """Find nodes (b,) on outer boundary (not on the faces of the cut), and a cell of each."""
         cell, opposite = self.mesh.boundary.T
         nodes = self.facet_nodes(cell, opposite)
         found, first = np.unique(nodes, return_index=True)
@@ -304,7 +304,7 @@ class ConformingSpace(Unknowns):
         return owner
 
     def beside_nodes(self) -> NDArray[np.float64]:
-        """Centroid (n, d) of a cell of each node, m: on which side of a cut the node is."""
+        """Compute centroid (n, d) of a cell of each node, m: on which side of a cut the node is."""
         beside = np.empty_like(self.node_points)
         beside[self.cell_nodes] = self.centroids[:, None]
         return beside
@@ -418,7 +418,7 @@ class LinearElements:
         self._ends = number[fine.edge_ends]
 
     def refined(self, u: Array) -> Array:
-        """Displacements of the quadratic space that are those (n, d) of the linear elements."""
+        """Compute displacements of quadratic space that are those (n, d) of the linear elements."""
         return np.asarray(u[self._ends].mean(axis=1))
 
     def forces(self, fine: Array) -> Array:
@@ -460,7 +460,7 @@ def mixed_unknowns(space: ConformingSpace) -> Unknowns:
 
 
 def _nodes(mesh: ConformingMesh, degree: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes of each cell in VTK's order, and their places: corners, then middles of edges."""
+    """Find nodes of each cell in VTK's order, and their places: corners, then middles of edges."""
     cells, points = mesh.cells, mesh.points
     if degree == 1:
         return cells, points
@@ -474,7 +474,7 @@ def _nodes(mesh: ConformingMesh, degree: int) -> tuple[NDArray[np.int64], NDArra
 
 
 def _facet_nodes(dimension: int, degree: int) -> NDArray[np.int64]:
-    """Nodes of the facet opposite each corner of a cell, by their place in VTK's order."""
+    """Find nodes of the facet opposite each corner of a cell, by their place in VTK's order."""
     facets = []
     for k in range(dimension + 1):
         nodes = [corner for corner in range(dimension + 1) if corner != k]

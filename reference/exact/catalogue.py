@@ -139,7 +139,7 @@ def exact_of(scene: Scene) -> Any:
 
 
 def exact_solution_names() -> dict[str, str]:
-    """Names of the exact solutions, each with one line on what it is and its parameters."""
+    """Find names of the exact solutions, each with one line on what it is and its parameters."""
     own = {name: text for name, (_, text) in _CATALOGUE.items()} | {"layers": _LAYERS}
     return {name: f"from {point.value}" for name, point in _registered().items()} | own
 

@@ -41,8 +41,8 @@ class _Potentials(NamedTuple):
 class ArcCrack(ExactSolution):
     """Both faces free, from N. I. Muskhelishvili's linear relationship for circular arcs.
 
-    With z over the radius, the crack from e^{−iα} to e^{iα}, c = cos α and
-    X = √(z² − 2cz + 1), X → z far away,
+    Let z be over the radius and the crack go from e^{−iα} to e^{iα}. With c = cos α and X = √(z² −
+    2cz + 1), X → z far away,
 
         φ  = ½ [(d − Ḡ/z) X − Ḡ/z + C z],
         ψ  = {½ [G z² − C̄ − (d̄ − G z) X] − φ'} / z,
@@ -98,7 +98,7 @@ class ArcCrack(ExactSolution):
         return np.asarray(self._centre + at @ self._axes)
 
     def intensity_at(self, tip: Array) -> tuple[float, float]:
-        """K_I and K_II at the tip (2,) nearest to a point, Pa·√m.
+        """Compute K_I and K_II at the tip (2,) nearest to a point, Pa·√m.
 
         Shear is positive as the sides slide in the axes of the tip: x ahead of the crack, y to
         the left of it.
@@ -112,14 +112,14 @@ class ArcCrack(ExactSolution):
         return float(k.real), float(-sign * k.imag)
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 2), m; see `ExactSolution`."""
+        """Compute the displacement (n, 2), m; see `ExactSolution`."""
         z, f = self._evaluate(points, near)
         w = self.law.kolosov * f.phi - z * f.phi_1.conj() - f.psi.conj()
         w = w * self._radius / (2 * self.law.shear)
         return np.asarray(np.column_stack([w.real, w.imag]) @ self._axes)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
         z, f = self._evaluate(points, near)
         with np.errstate(invalid="ignore"):  # at a tip ∞ − ∞: the limit depends on the way there
             dz = self.law.kolosov * f.phi_1 - f.phi_1.conj()
@@ -131,7 +131,7 @@ class ArcCrack(ExactSolution):
         return turned
 
     def kinks(self, start: Array, end: Array) -> list[float]:
-        """Where a segment crosses the crack; see `ExactSolution`."""
+        """Find where a segment crosses the crack; see `ExactSolution`."""
         a, b = self._local(np.stack([start, end]))
         along = b - a
         middle = -(a.conjugate() * along).real / abs(along) ** 2
@@ -147,7 +147,7 @@ class ArcCrack(ExactSolution):
         return np.asarray(x + 1j * y)
 
     def _on_arc(self, z: Complex) -> NDArray[np.bool_]:
-        """Whether points of the circle lie on the crack."""
+        """Tell whether points of the circle lie on the crack."""
         return np.asarray(np.abs(np.angle(z)) < self._alpha)
 
     def _evaluate(self, points: Array, near: Array | None) -> tuple[Complex, _Potentials]:
@@ -174,7 +174,7 @@ class ArcCrack(ExactSolution):
             return np.asarray((z - tip) / (z - tip.conjugate()) * tip.conjugate() + 0.0)
 
     def _closed(self, z: Complex, sheet: Array) -> _Potentials:
-        """Potentials in closed form; `sheet` is −1 where they are continued across the crack."""
+        """Return potentials in closed form; `sheet` is −1 where they are continued across crack."""
         d, g, c, cosine = self._d, self._g, self._c, np.cos(self._alpha)
         tip = np.exp(1j * self._alpha)
         # conj(tip)·√((z−a)/(z−b)) has its branch cut on the crack
@@ -227,14 +227,14 @@ class CircularCut(ExactSolution):
         return np.asarray(points, dtype=float) - self._centre, inside
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m; see `ExactSolution`."""
+        """Compute the displacement (n, d), m; see `ExactSolution`."""
         r, inside = self._from_centre(points, near)
         power = np.linalg.norm(r, axis=1) ** self.dimension
         factor = self._a + self._inverse / np.where(inside, np.inf, power)
         return np.asarray(np.where(inside, 0.0, factor)[:, None] * r)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d); see `ExactSolution`."""
+        """Compute the displacement gradient (n, d, d); see `ExactSolution`."""
         r, inside = self._from_centre(points, near)
         d, squared = self.dimension, np.where(inside, np.inf, np.sum(r**2, axis=1))
         round_ = self._inverse / squared ** (d / 2)
@@ -251,7 +251,7 @@ class CircularCut(ExactSolution):
         return _radial_energy(box_of(body), self._centre, self._b, (uniform, 6 * shear * b**2))
 
     def kinks(self, start: Array, end: Array) -> list[float]:
-        """Where a segment crosses the cut; see `ExactSolution`."""
+        """Find where a segment crosses the cut; see `ExactSolution`."""
         along, away = end - start, start - self._centre
         a, b, c = along @ along, along @ away, away @ away - self._b**2
         root = b * b - a * c
@@ -264,11 +264,11 @@ class CircularCut(ExactSolution):
 def _radial_energy(
     corners: Array, centre: Array, radius: float, terms: tuple[float, float]
 ) -> float:
-    """Integral over a box, outside a ball, of the density w₀ + w₁/r⁶, J.
+    """Compute the integral over a box, outside a ball, of the density w₀ + w₁/r⁶, J.
 
     With g r³ = ∫_b^r s² (w₀ + w₁/s⁶) ds, which is 0 inside the ball, the density is div(x g). Its
-    flux through a face at the distance h is h ∫ g dA. With G(ϱ) = ∫_0^ϱ g s ds around the foot of
-    the centre, ∫ g dA = Σ ∫ G (ξ dη − η dξ)/ϱ² over the edges.
+    flux through a face at the distance h is h ∫ g dA. Let G(ϱ) = ∫_0^ϱ g s ds around the foot of
+    the centre. Then ∫ g dA = Σ ∫ G (ξ dη − η dξ)/ϱ² over the edges.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ def _radial_energy(
     w0, w1, b = *terms, radius
 
     def primitive(r: Array) -> Array:
-        """∫ g r dr from b to r ≥ b."""
+        """Compute ∫ g r dr from b to r ≥ b."""
 
         def at(r: Array) -> Array:
             return np.asarray(
@@ -323,7 +323,7 @@ def _over_rectangle(
 def _smooth_parts(
     start: Array, edge: Array, height: float, radius: float
 ) -> list[tuple[float, float]]:
-    """Parts of [0, 1], halved towards the point next to the foot, without the sphere inside."""
+    """Find parts of [0, 1], halved towards point next to the foot, without the sphere inside."""
     a, b = edge @ edge, edge @ start
     stops = {0.0, 1.0, float(np.clip(-b / a, 0.0, 1.0))}
     root = b * b - a * (start @ start + height**2 - radius**2)
@@ -357,10 +357,10 @@ class Penny(ExactSolution):
     Opening by a pull N (I. N. Sneddon, Proc. R. Soc. Lond. A 187, 1946), around the axis, with z
     along it: 2μ u_r = B [(1−2ν) f_r + z f_rz]; 2μ u_z = B [−2(1−ν) f_z + z f_zz]; B = 2Na²/3π.
     Shear T along x (M. K. Kassir & G. C. Sih, J. Appl. Mech. 33, 1966): 2μ u_x = C [−2(1−ν) f_z + z
-    f_xx], 2μ u_y = C z f_xy, 2μ u_z = C [−(1−2ν) f_x + z f_xz], C = 4Ta²/(3π(2−ν)), u_x and u_y odd
-    in z. The function f is harmonic; in oblate coordinates z = aζm, r² = a²(1+ζ²)(1−m²) its
-    derivatives are elementary, with r² + (z+ia)² = R², R = a(ζ+im). To both comes the field of the
-    uniform remote stress.
+    f_xx]; 2μ u_y = C z f_xy; 2μ u_z = C [−(1−2ν) f_x + z f_xz]; C = 4Ta²/(3π(2−ν)). Both u_x and
+    u_y are odd in z. The function f is harmonic; in oblate coordinates z = aζm, r² = a²(1+ζ²)(1−m²)
+    its derivatives are elementary, with r² + (z+ia)² = R², R = a(ζ+im). To both comes the field of
+    the uniform remote stress.
 
     Parameters: ``centre`` (m, default the origin); ``normal`` of the crack (default z); radius
     ``a`` (m); remote ``tension`` across the crack (Pa) or in its place the remote ``stress`` (3 ×
@@ -415,7 +415,7 @@ class Penny(ExactSolution):
         return super().strain_energy(body) + 0.5 * self._pressure * opened
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 3), m; see `ExactSolution`."""
+        """Compute the displacement (n, 3), m; see `ExactSolution`."""
         s, z, upper, f = self._evaluate(points, near)
         nu, x, y = self._ratio, s[:, 0], s[:, 1]
         with np.errstate(invalid="ignore"):  # z f_rz is 0 · ∞ at the front, and 0 there
@@ -429,7 +429,7 @@ class Penny(ExactSolution):
         return np.asarray((local + s @ self._strain) @ self._axes)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
         s, z, upper, f = self._evaluate(points, near)
         # on the axis 0/0, and at the front ∞ − ∞: the limit depends on the way there
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -440,7 +440,7 @@ class Penny(ExactSolution):
         return turned
 
     def _opening(self, s: Array, z: Array, upper: Array, f: _Derivatives) -> Array:
-        """Gradient of what a pull opens, of B = 2μ."""
+        """Compute the gradient of the opening by a pull, of B = 2μ."""
         nu, (x, y) = self._ratio, s[:, :2].T
         spread = (1 - 2 * nu) * f.r_r + z * f.rz_r
         bend = (1 - 2 * nu) * f.bend + z * f.bend_z
@@ -455,7 +455,7 @@ class Penny(ExactSolution):
         return matrices(rows)
 
     def _shearing(self, s: Array, z: Array, upper: Array, f: _Derivatives) -> Array:
-        """Gradient of what a shear along x slides, of C = 2μ."""
+        """Compute the gradient of the sliding by a shear along x, of C = 2μ."""
         nu, (x, y) = self._ratio, s[:, :2].T
         xx, xy = f.r_r + x * x * f.bend, x * y * f.bend
         xxz, xyz = f.rz_r + x * x * f.bend_z, x * y * f.bend_z
@@ -474,7 +474,7 @@ class Penny(ExactSolution):
     def _evaluate(
         self, points: Array, near: Array | None
     ) -> tuple[Array, Array, Array, _Derivatives]:
-        """Local points, |z|, the sign of the side, and the derivatives of f."""
+        """Compute local points, |z|, the sign of the side, and the derivatives of f."""
         s = (np.asarray(points, dtype=float) - self._centre) @ self._axes.T
         side = s[:, 2]
         if near is not None:

@@ -57,7 +57,7 @@ class BladeStrip(ExactSolution):
         return float(self.law.shear * self._w**2 / self._b)
 
     def strain_energy(self, body: Array | Scene) -> float:
-        """Strain energy of a body around the strip at rest, J; see `ExactSolution`.
+        """Compute the strain energy of a body around the strip at rest, J; see `ExactSolution`.
 
         Raises
         ------
@@ -69,14 +69,14 @@ class BladeStrip(ExactSolution):
         return super().strain_energy(body)
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 3), m; see `ExactSolution`."""
+        """Compute the displacement (n, 3), m; see `ExactSolution`."""
         s, sign, _ = self._evaluate(points, near)
         u = np.zeros((len(s), 3))
         u[:, 2] = sign * self._w * (1.0 - 2.0 / np.pi * np.arcsin(s).real)
         return u
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 3, 3), infinite at the tip. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 3, 3), infinite at the tip. See `ExactSolution`."""
         s, sign, mirror = self._evaluate(points, near)
         slope = self._slope(s)
         gradient = np.zeros((len(s), 3, 3))
@@ -86,7 +86,7 @@ class BladeStrip(ExactSolution):
         return gradient
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
-        """Velocity (n, 3), m/s; see `ExactSolution`."""
+        """Compute the velocity (n, 3), m/s; see `ExactSolution`."""
         s, sign, _ = self._evaluate(points, near)
         v = np.zeros((len(s), 3))
         if self._v:
@@ -123,7 +123,7 @@ class BladeStrip(ExactSolution):
         return s, sign, mirror
 
     def _local(self, points: Array) -> tuple[Array, Array]:
-        """Places ahead of the tip and across the cut, m."""
+        """Find the places ahead of the tip and across the cut, m."""
         x, y = ((np.asarray(points, dtype=float)[:, :2] - self._tip) @ self._axes.T).T
         return x - self._v * self.time, y
 
@@ -166,7 +166,7 @@ class ReleasedBar(ExactSolution):
         return self._at * axis, axis
 
     def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
-        """Whether no front of a wave is within a distance of points; see `ExactField`."""
+        """Tell whether no front of a wave is within a distance of points; see `ExactField`."""
         _, far, length = self._local(points, None)
         run = self._speed * self.time
         front = length - np.abs(run % (2 * length) - length)
@@ -177,24 +177,24 @@ class ReleasedBar(ExactSolution):
         raise InputError("the strain energy of a moving field is no work on the surface")
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m; see `ExactSolution`."""
+        """Compute the displacement (n, d), m; see `ExactSolution`."""
         side, far, length = self._local(points, near)
         start = np.asarray(points)[:, 0] - self._origin
         return self._along(start + side * wave(far, length, self._speed * self.time)[0])
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
+        """Compute displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
         _, far, length = self._local(points, near)
         slope = 1.0 + wave(far, length, self._speed * self.time)[1]
         return self._along(slope)[:, :, None] * np.eye(self.dimension)[0]
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
-        """Velocity (n, d), m/s; see `ExactSolution`."""
+        """Compute the velocity (n, d), m/s; see `ExactSolution`."""
         side, far, length = self._local(points, near)
         return self._along(side * self._speed * wave(far, length, self._speed * self.time)[2])
 
     def _along(self, values: Array) -> Array:
-        """Vectors (n, d) along the bar, of values (n,) per strain."""
+        """Compute vectors (n, d) along the bar, of values (n,) per strain."""
         return self._strain * values[:, None] * np.eye(self.dimension)[0]
 
     def _local(self, points: Array, near: Array | None) -> tuple[Array, Array, Array]:
@@ -237,7 +237,7 @@ class Impact(ExactSolution):
         return self._at * axis, axis
 
     def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
-        """Whether no front of a wave is within a distance of points; see `ExactField`."""
+        """Tell whether no front of a wave is within a distance of points; see `ExactField`."""
         _, far = self._local(points, None)
         return np.asarray(np.abs(far - self._front()[0]) > reach)
 
@@ -246,20 +246,20 @@ class Impact(ExactSolution):
         raise InputError("the strain energy of a moving field is no work on the surface")
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m; see `ExactSolution`."""
+        """Compute the displacement (n, d), m; see `ExactSolution`."""
         side, far = self._local(points, near)
         way = -self._v / self._speed * np.minimum(far, self._front()[0])
         return (side * way)[:, None] * np.eye(self.dimension)[0]
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
+        """Compute displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
         along = np.eye(self.dimension)[0]
         pressed = self._local(points, near)[1] < self._front()[0]
         strain = -self._v / self._speed * pressed
         return np.asarray(strain[:, None, None] * np.outer(along, along))
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
-        """Velocity (n, d), m/s; see `ExactSolution`."""
+        """Compute the velocity (n, d), m/s; see `ExactSolution`."""
         side, far = self._local(points, near)
         front, direction = self._front()
         rate = -self._v * direction * (far > front)
@@ -271,7 +271,7 @@ class Impact(ExactSolution):
         return self._length - abs(run - self._length), 1.0 if run < self._length else -1.0
 
     def _local(self, points: Array, near: Array | None) -> tuple[Array, Array]:
-        """Side (n,) of the meeting place, 1 or −1, and distance from it, m."""
+        """Compute the side (n,) of the meeting place, 1 or −1, and distance from it, m."""
         x = np.asarray(points, dtype=float)[:, 0]
         side = np.where((x if near is None else np.asarray(near)[:, 0]) >= self._at, 1.0, -1.0)
         return side, side * (x - self._at)
@@ -346,7 +346,7 @@ def sudden_intensity(
 
 
 def sudden_slip(traction: float, law: Hooke, distance: float, time: float) -> float:
-    """Displacement jump along the front at a distance behind it, m: antiplane.
+    """Compute the displacement jump along the front at a distance behind it, m: antiplane.
 
     The velocity of a face is (τc/μ) [1 − (2/π) arctan √(ct/r − 1)], c the speed of shear waves. The
     pole ζ = 0 is the plane wave, the branch cut from b on the wave from the tip.

@@ -43,11 +43,11 @@ class Linear(ExactSolution):
         self._shift = parameters.take("shift", (d,), default=np.zeros(d))
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m."""
+        """Compute the displacement (n, d), m."""
         return np.asarray(points, dtype=float) @ self._matrix.T + self._shift
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d)."""
+        """Compute the displacement gradient (n, d, d)."""
         return np.broadcast_to(self._matrix, (len(points), *self._matrix.shape)).copy()
 
 
@@ -90,7 +90,7 @@ class Patch(TwoSidedSolution):
 
 
 def _free_stretch(law: Hooke, along: float) -> float:
-    """Stretch across a neo-Hookean body whose stretches along have the product `along`."""
+    """Compute stretch across a neo-Hookean body whose stretches along have the product `along`."""
     lame, shear = law.lame, law.shear
     if law.model == "stable_neo_hookean":
         return float((lame + 2 * shear) * along / (shear + (lame + shear) * along**2))
@@ -269,12 +269,12 @@ class Layers(TwoSidedSolution):
         return np.asarray(side(self._stress, above)[:, None, None] * unit)
 
     def kinks(self, start: Array, end: Array) -> list[float]:
-        """Parameters in (0, 1) at which a segment crosses the interface."""
+        """Compute parameters in (0, 1) at which a segment crosses the interface."""
         a, b = ((point - self._origin) @ self._axes.T @ self._normal for point in (start, end))
         return [float(a / (a - b))] if a * b < 0 else []
 
     def _laws_beside(self, material: Material, along: Array) -> list[Hooke]:
-        """Laws to the left and to the right of the interface, as the scene has them."""
+        """Return laws to the left and to the right of the interface, as the scene has them."""
         steps = [(step, aside) for aside in (1.0, -1.0) for step in (1.0, -1.0)]
         beside = self._origin + np.array(
             [
@@ -301,12 +301,12 @@ class Layers(TwoSidedSolution):
 class RolledHalves(TwoSidedSolution):
     """Strips on both sides of a cut, each bent away from the other to a circle of its own.
 
-    A strip |ξ| < h/2 takes the places (r cos cs, r sin cs), with stretches λ₁ = dr/dξ across and λ₂
-    = c r along it. There is no body force, and no traction at ξ = ±h/2. In the energy W(λ₁, λ₂)
+    A strip |ξ| < h/2 takes the places (r cos cs, r sin cs). Its stretches are λ₁ = dr/dξ across and
+    λ₂ = c r along it. There is no body force, and no traction at ξ = ±h/2. In the energy W(λ₁, λ₂)
     equilibrium is d/dξ ∂W/∂λ₁ = c ∂W/∂λ₂, with ∂W/∂λ₁ = 0 at both ends (Rivlin, Proc. R. Soc. Lond.
-    A 195, 1949). In the energy μ‖U − I‖² + ½ λ tr²(U − I) that is r = A cosh cξ + B sinh cξ + b/c,
-    b = 2(λ + μ)/(λ + 2μ); in a neo-Hookean one it is found by collocation, to 1e-12. At s = 0 the
-    middle lines stay where they are.
+    A 195, 1949). In the energy μ‖U − I‖² + ½ λ tr²(U − I) that is r = A cosh cξ + B sinh cξ + b/c.
+    Here b = 2(λ + μ)/(λ + 2μ); in a neo-Hookean one it is found by collocation, to 1e-12. At s = 0
+    the middle lines stay where they are.
 
     Parameters ``thickness`` h (m) and ``curvature`` c (1/m, positive) per side; ``shift`` (m,
     normal to the cut) per side.
@@ -334,7 +334,7 @@ class RolledHalves(TwoSidedSolution):
         raise InputError("the strain energy at finite rotation is integrated over the body")
 
     def _radius(self, xi: Array, above: Above) -> tuple[Array, Array]:
-        """Radius r (n,), m, and dr/dξ (n,)."""
+        """Compute the radius r (n,), m, and dr/dξ (n,)."""
         c = side(self._curvature, above)
         if self._bent is not None:
             sides = zip(self._bent, self._curvature * self._thickness, strict=True)
@@ -379,7 +379,7 @@ def _bent(law: Hooke, angle: float) -> Chebyshev:
     lame, shear = law.lame, law.shear
 
     def slopes(one: Array, two: Array) -> tuple[Array, Array]:
-        """∂W/∂λ₁ and ∂W/∂λ₂, over μ."""
+        """Compute ∂W/∂λ₁ and ∂W/∂λ₂, over μ."""
         J = one * two
         volume = (lame * np.log(J) / shear - 1) / J
         if law.model == "stable_neo_hookean":

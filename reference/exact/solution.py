@@ -1,8 +1,8 @@
 """Bases of exact solutions: a field known at every point, its law, parameters and stored energy.
 
-Energies are integrals over facets of the body (edges of a polygon, faces of a box) or over the
-cones that join them to a point. Where a cut plane goes through, they run over the parts on either
-side. Each part takes the field of its side, which is smooth beyond the cut.
+Energies are integrals over facets of the body (edges of a polygon, faces of a box), or over cones
+from a point to them. Where a cut plane goes through, they run over the parts on either side. Each
+part takes the field of its side, which is smooth beyond the cut.
 """
 
 from abc import ABC, abstractmethod
@@ -85,7 +85,7 @@ class Hooke:
         return (self.lame + 3 * self.shear) / (self.lame + self.shear)
 
     def stress(self, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Stress (…, d, d) in Pa of displacement gradients (…, d, d)."""
+        """Compute the stress (…, d, d) in Pa of displacement gradients (…, d, d)."""
         strain = 0.5 * (gradient + gradient.swapaxes(-1, -2))
         trace = np.trace(strain, axis1=-2, axis2=-1)
         stress: NDArray[np.float64] = 2 * self.shear * strain
@@ -94,7 +94,7 @@ class Hooke:
 
 
 def hooke(material: Material) -> Hooke:
-    """Hooke's law of a scene's material; in space where it names no plane state."""
+    """Compute Hooke's law of a scene's material; in space where it names no plane state."""
     young, poisson = material.young, material.poisson
     shear = young / (2 * (1 + poisson))
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
@@ -122,7 +122,7 @@ class Parameters:
         self._missing: list[str] = []
 
     def has(self, name: str) -> bool:
-        """Whether `name` is given."""
+        """Tell whether `name` is given."""
         self._known.append(name)
         return name in self._given
 
@@ -231,14 +231,14 @@ class ExactField(ABC):
 
     @abstractmethod
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m."""
+        """Compute the displacement (n, d), m."""
 
     @abstractmethod
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d): entry i, j is ∂u_i/∂x_j."""
+        """Compute the displacement gradient (n, d, d): entry i, j is ∂u_i/∂x_j."""
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
-        """Velocity (n, d), m/s: zero, if it stands still."""
+        """Compute the velocity (n, d), m/s: zero, if it stands still."""
         return np.zeros_like(points, dtype=float)
 
     def body_force(self, points: Array, near: Array | None = None) -> Array:
@@ -246,7 +246,7 @@ class ExactField(ABC):
         return np.zeros_like(points, dtype=float)
 
     def stress(self, points: Array, near: Array | None = None) -> Array:
-        """Stress (n, d, d), Pa."""
+        """Compute the stress (n, d, d), Pa."""
         return self.law.stress(self.gradient(points, near))
 
     def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
@@ -254,7 +254,7 @@ class ExactField(ABC):
         return np.ones(len(points), dtype=bool)
 
     def kinks(self, start: Array, end: Array) -> list[float]:
-        """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`.
+        """Compute parameters in (0, 1) at which field jumps on the segment from `start` to `end`.
 
         In the plane; not across `cut_plane`.
         """
@@ -265,7 +265,7 @@ class ExactSolution(ExactField):
     """An exact field whose strain energy in a body is computed to round-off; see `ExactField`."""
 
     def strain_energy(self, body: Array | Scene) -> float:
-        """Strain energy of a body, J (in the plane per metre of thickness), to 1e-11.
+        """Compute the strain energy of a body, J (in the plane per metre of thickness), to 1e-11.
 
         Half the work of the tractions on the surface; with a body force, or a plane cut through
         the body in space, half the integral of stress times strain.
@@ -289,7 +289,7 @@ class ExactSolution(ExactField):
 
 
 def outline_of(body: Array | Scene) -> Array:
-    """Corners (k, 2) of a polygonal body, counter-clockwise.
+    """Find corners (k, 2) of a polygonal body, counter-clockwise.
 
     Raises
     ------
@@ -329,7 +329,7 @@ def box_of(body: Array | Scene) -> Array:
 
 
 def _faces(corners: Array) -> list[Array]:
-    """Faces (4, 3) of a box, anticlockwise seen from outside."""
+    """Return faces (4, 3) of a box, anticlockwise seen from outside."""
     faces = []
     for axis, side in product(range(3), (0, 1)):
         b, c = (axis + 1) % 3, (axis + 2) % 3
@@ -372,7 +372,7 @@ def _above(corners: Array, height: Array) -> Array:
 
 
 def _energy_inside(field: ExactField, facets: list[Array]) -> float:
-    """Half the integral of stress times strain, J: over cones over the facets, signed.
+    """Compute half the integral of stress times strain, J: over cones over the facets, signed.
 
     They meet at a point of the cut plane, which has no volume below it.
     """
@@ -429,13 +429,13 @@ def _settled(integral: Callable[[int], float], where: str, hint: str = "") -> fl
 
 
 def _unit_rule(order: int) -> tuple[Array, Array]:
-    """Gauss points and weights (k,) on [0, 1]."""
+    """Compute Gauss points and weights (k,) on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     return 0.5 * (nodes + 1), 0.5 * weights
 
 
 def _simplex_rule(order: int, d: int) -> tuple[Array, Array]:
-    """Barycentric points (k, d) of all corners but the first, and weights (k,), of volume 1/d!.
+    """Compute barycentric points (k, d) of all corners but first, and weights (k,), of volume 1/d!.
 
     The cube collapsed onto the simplex.
     """
@@ -447,7 +447,7 @@ def _simplex_rule(order: int, d: int) -> tuple[Array, Array]:
 
 
 def _work_on_outline(field: ExactField, edges: list[Array]) -> float:
-    """Half the work of the tractions on a closed polygon (counter-clockwise), J/m.
+    """Compute half the work of the tractions on a closed polygon (counter-clockwise), J/m.
 
     Faces of cuts are free of traction in all solutions here and do no work.
     """
@@ -584,7 +584,7 @@ class TwoSidedSolution(ExactSolution):
 
     @abstractmethod
     def _local_displacement(self, s: Array, above: Above) -> Array:
-        """Displacement (n, d) in local axes at local points (n, d)."""
+        """Compute the displacement (n, d) in local axes at local points (n, d)."""
 
     @abstractmethod
     def _local_gradient(self, s: Array, above: Above) -> Array:
@@ -594,17 +594,17 @@ class TwoSidedSolution(ExactSolution):
         return np.zeros_like(s)
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m; see `ExactSolution`."""
+        """Compute the displacement (n, d), m; see `ExactSolution`."""
         s, above = self._local(points, near)
         return (self._local_displacement(s, above) + side(self._shift, above)) @ self._axes
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d); see `ExactSolution`."""
+        """Compute the displacement gradient (n, d, d); see `ExactSolution`."""
         turned: Array = self._axes.T @ self._local_gradient(*self._local(points, near)) @ self._axes
         return turned
 
     def body_force(self, points: Array, near: Array | None = None) -> Array:
-        """Body force (n, d), N/m³; see `ExactSolution`."""
+        """Compute the body force (n, d), N/m³; see `ExactSolution`."""
         return self._local_body_force(*self._local(points, near)) @ self._axes
 
     def _local(self, points: Array, near: Array | None) -> tuple[Array, Above]:
@@ -614,10 +614,10 @@ class TwoSidedSolution(ExactSolution):
 
 
 def side(pair: Array, above: Above) -> Array:
-    """Values (n, …) of a per-side parameter (2, …) at points on those sides."""
+    """Return values (n, …) of a per-side parameter (2, …) at points on those sides."""
     return np.asarray(pair[np.where(above, 0, 1)])
 
 
 def matrices(rows: list[list[Array]]) -> Array:
-    """Matrices (n, d, d) from rows of entries (n,)."""
+    """Compute matrices (n, d, d) from rows of entries (n,)."""
     return np.moveaxis(np.array(rows), 2, 0)

@@ -54,14 +54,14 @@ class ComplexCrack(ExactSolution):
 
     @abstractmethod
     def _potentials(self, z: Complex, sheet: Array) -> Potentials:
-        """Potentials; `sheet` is −1 where the root is to be continued across the crack."""
+        """Return potentials; `sheet` is −1 where the root is to be continued across the crack."""
 
     @abstractmethod
     def _on_crack(self, x: Array) -> NDArray[np.bool_]:
-        """Whether points of the x axis lie on the crack."""
+        """Tell whether points of the x axis lie on the crack."""
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 2), m; see `ExactSolution`."""
+        """Compute the displacement (n, 2), m; see `ExactSolution`."""
         z, f = self._evaluate(points, near)
         # at a tip φ' is infinite, but its factor is zero there
         slope = np.where(z.imag == 0.0, 0.0, f.phi_1)
@@ -70,7 +70,7 @@ class ComplexCrack(ExactSolution):
         return np.column_stack([w.real, w.imag]) @ self._axes
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
         z, f = self._evaluate(points, near)
         with np.errstate(invalid="ignore"):  # at a tip ∞ − ∞: the limit depends on the way there
             dz = self.law.kolosov * f.phi_1 - f.phi_1.conj()
@@ -90,7 +90,7 @@ class ComplexCrack(ExactSolution):
         return [t] if 0.0 < t < 1.0 and self._on_crack(np.array([x0 + t * (x1 - x0)]))[0] else []
 
     def potentials(self, points: Array, near: Array | None = None) -> Potentials:
-        """Potentials at points (n, 2), on the sides of `near` (n, 2)."""
+        """Return potentials at points (n, 2), on the sides of `near` (n, 2)."""
         return self._evaluate(points, near)[1]
 
     def _evaluate(self, points: Array, near: Array | None) -> tuple[Complex, Potentials]:
@@ -156,8 +156,8 @@ class Griffith(ComplexCrack):
     S = σ_yy − iσ_xy and Γ = (σ_xx − σ_yy)/4 + iσ_xy/2 of the remote stress in the crack's axes.
     Parameters: ``centre`` (m, default the origin); half-length ``a`` (m); ``angle`` (degrees,
     default 0); the remote ``stress`` (σ_xx, σ_yy, σ_xy) in the axes of the scene; the ``pressure``
-    p (Pa, default 0) on the faces. With p it is the field of free faces under the remote stress σ +
-    p I, less the field of the uniform stress p I.
+    p (Pa, default 0) on the faces. A pressure gives the field of free faces under the remote stress
+    σ + p I, less the uniform stress p I.
     """
 
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
@@ -185,15 +185,15 @@ class Griffith(ComplexCrack):
         return self._s.real * root, -self._s.imag * root
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 2), m; see `ExactSolution`."""
+        """Compute the displacement (n, 2), m; see `ExactSolution`."""
         return super().displacement(points, near) - self._shrinkage * (points - self._origin)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
         return super().gradient(points, near) - self._shrinkage * np.eye(2)
 
     def strain_energy(self, body: Array | Scene) -> float:
-        """Strain energy of a body, J/m: half the work on its outline and on the faces."""
+        """Compute strain energy of a body, J/m: half the work on its outline and on the faces."""
         energy = super().strain_energy(body)
         if self._pressure == 0.0:
             return energy
@@ -230,7 +230,7 @@ class Griffith(ComplexCrack):
 
 
 def _root(z: Complex, sheet: Array, a: float) -> Complex:
-    """√(z−a) √(z+a), cut along the crack."""
+    """Compute √(z−a) √(z+a), cut along the crack."""
     # z ∓ a by parts, which keeps a negative zero of the imaginary part
     left, right = z.copy(), z.copy()
     left.real -= a
@@ -340,13 +340,13 @@ class StraightFrontField(ExactSolution):
         raise InputError("the strain energy around a straight front is not computed")
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, 3), m; see `ExactSolution`."""
+        """Compute the displacement (n, 3), m; see `ExactSolution`."""
         x, beside = self._local(points), None if near is None else self._local(near)
         third = 2 * self._k[2] / self.law.shear * self._unit.potentials(x, beside).phi.imag
         return np.column_stack([self._plane.displacement(x, beside), third]) @ self._axes
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
+        """Compute the displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
         x, beside = self._local(points), None if near is None else self._local(near)
         slope = 2 * self._k[2] / self.law.shear * self._unit.potentials(x, beside).phi_1
         local = np.zeros((len(x), 3, 3))
@@ -356,7 +356,7 @@ class StraightFrontField(ExactSolution):
         return turned
 
     def _local(self, points: Array) -> Array:
-        """Places (n, 2) ahead of the front and across the crack, m."""
+        """Find places (n, 2) ahead of the front and across the crack, m."""
         return (np.asarray(points, dtype=float) - self._origin) @ self._axes[:2].T
 
 

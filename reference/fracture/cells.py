@@ -92,7 +92,7 @@ def cell_gradients(
 
 
 def _rule(dimension: int, order: int) -> tuple[Array, Array]:
-    """Gauss points of the square or cube collapsed onto the unit simplex."""
+    """Compute Gauss points of the square or cube collapsed onto the unit simplex."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     s, w = 0.5 * (nodes + 1), 0.5 * weights
     grids = np.meshgrid(*[s] * dimension, indexing="ij")
@@ -114,7 +114,7 @@ def _linear(xi: Array) -> tuple[Array, Array]:
 
 
 def _quadratic(xi: Array) -> tuple[Array, Array]:
-    """VTK's order: corners, then the mid-nodes of the edges."""
+    """Compute VTK's order: corners, then the mid-nodes of the edges."""
     corner, slope = _linear(xi)
     d = xi.shape[1]
     ends = _EDGES[: len(list(combinations(range(d + 1), 2)))]
@@ -167,7 +167,7 @@ class NodalPressure:
             raise RuntimeError("the pressure of a mixed solution was not found: are cells flat?")
 
     def stress(self, law: Hooke, cells: NDArray[np.int64], at: CellGradients) -> Array:
-        """Stress (m, q, d, d) at the quadrature points of some cells, Pa."""
+        """Compute the stress (m, q, d, d) at the quadrature points of some cells, Pa."""
         deviatoric = Hooke(0.0, law.shear, law.dimension).stress(at.gradient)
         pressure = self._values[self._place[cells]] @ at.corner_shares.T
         return deviatoric + pressure[..., None, None] * np.eye(law.dimension)

@@ -142,14 +142,17 @@ def stress_intensity(
     arc: ArcCut | None = None,
     stresses: Stresses | None = None,
 ) -> StressIntensity:
-    """K_I and K_II of a crack that is straight, or an arc, from a plane field.
+    """Compute K_I and K_II of a crack that is straight, or an arc, from a plane field.
 
-    The interaction integral with fields of each mode (Yau, Wang & Corten, J. Appl. Mech. 47, 1980),
-    M = ∫ (σ_ij δû_i + σ̂_ij δu_i − σ_ij ε̂_ij t_j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δû_i q dA,
-    and K = E' M / 2 with E' = E/(1−ν²) in plane strain, E in plane stress. At a straight crack t is
-    its direction and δu = u_,t. At an arc t = ω (x − c) is the turn about its centre that moves the
-    tip by one, and δu = u_,t − ω u. It leaves the faces of the arc and an isotropic law unchanged,
-    so the integral has no terms of the curvature (J. K. Knowles & E. Sternberg, Arch. Ration. Mech.
+    The interaction integral with fields of each mode (Yau, Wang & Corten, J. Appl. Mech. 47, 1980):
+
+        M = ∫ (σ_ij δû_i + σ̂_ij δu_i − σ_ij ε̂_ij t_j) q_,j dA
+            − ∫ (f_i − ρ (ü_i + α u̇_i)) δû_i q dA.
+
+    K = E' M / 2 with E' = E/(1−ν²) in plane strain, E in plane stress. At a straight crack t is its
+    direction and δu = u_,t. At an arc t = ω (x − c) is the turn about its centre that moves the tip
+    by one. There δu = u_,t − ω u. It leaves the faces of the arc and an isotropic law unchanged, so
+    the integral has no terms of the curvature (J. K. Knowles & E. Sternberg, Arch. Ration. Mech.
     Anal. 44, 1972). The fields of both modes are in equilibrium and free of traction on the crack;
     a tip that stands still has them in a motion too. G is the domain form of Rice's J of the field
     alone (C. F. Shih, B. Moran & T. Nakamura, Int. J. Fract. 30, 1986), ∫ (σ_ij δu_i − ½ σ:ε t_j)
@@ -204,7 +207,7 @@ def stress_intensity(
 
 
 def _mean(domains: Array) -> tuple[Array, Array]:
-    """Mean over domains, and the largest deviation of one from it."""
+    """Compute the mean over domains, and the largest deviation of one from it."""
     mean = domains.mean(axis=0)
     return mean, np.abs(domains - mean).max(axis=0)
 
@@ -218,7 +221,7 @@ def _of_ring(
     modes: list[list[tuple[float, ExactSolution]]],
     forces: Array | None,
 ) -> tuple[list[float], float]:
-    """K_I and K_II, and G, from one ring, of which stress and displacement are given."""
+    """Compute K_I and K_II, and G, from one ring, of which stress and displacement are given."""
     way, turn = ways
     change = np.einsum("mqij,mqj->mqi", around.at.gradient, way) - moved @ turn.T
     each = [_interaction(around, law, stress, change, way, turn, mode, forces) for mode in modes]
@@ -238,7 +241,7 @@ def _interaction(
     mode: list[tuple[float, ExactSolution]],
     forces: Array | None,
 ) -> float:
-    """M of a field, of which stress and δu are given, with one of unit intensity."""
+    """Compute M of a field, of which stress and δu are given, with one of unit intensity."""
     at = around.at
     points, near = at.points.reshape(-1, 2), around.near.reshape(-1, 2)
     gradient = sum(share * field.gradient(points, near) for share, field in mode)
@@ -299,16 +302,19 @@ def front_intensity(
     fitted: bool = True,
     stresses: Stresses | None = None,
 ) -> FrontIntensity:
-    """K_I, K_II and K_III along the front of a plane crack.
+    """Compute K_I, K_II and K_III along the front of a plane crack.
 
     The interaction integral with the plane tip fields in the coordinates of the front, with the
     terms of its curvature (M. Gosz & B. Moran, Eng. Fract. Mech. 69, 2002):
-    M = ∫ (σ_ij û_i,k + σ̂_ij u_i,k − σ:ε̂ δ_kj) q_k,j
-    + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − (f_i − ρ (ü_i + α u̇_i)) û_i,k) q_k dV. The virtual
-    extension q points ahead of the front, falls off linearly from half the radius to the radius,
-    and along the front by a hat per station: K is a mean with that weight.
-    Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds. G is, of the field alone,
-    ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds.
+
+        M = ∫ (σ_ij û_i,k + σ̂_ij u_i,k − σ:ε̂ δ_kj) q_k,j
+            + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − (f_i − ρ (ü_i + α u̇_i)) û_i,k) q_k dV.
+
+    The virtual extension q points ahead of the front and falls off linearly from half the radius to
+    the radius. Along the front it is a hat per station: K is a mean with that weight. Then K_I = E'
+    M/(2∫w ds), K_III = μ M/∫w ds. For G the field alone counts:
+
+        ∫ (σ_ij u_i,k − ½ σ:ε δ_kj) q_k,j − (f_i − ρ (ü_i + α u̇_i)) u_i,k q_k dV over ∫w ds.
 
     Parameters
     ----------
@@ -360,7 +366,7 @@ def front_intensity(
 
 
 def _stations(front: Front, count: int) -> tuple[Array, float | None]:
-    """Arc lengths of the stations, and the half width of the hat of each (None: the whole)."""
+    """Return arc lengths of stations, and the half width of the hat of each (None: the whole)."""
     if count < 1:
         raise InputError(f"{count} stations along a front; expected at least one")
     if front.closed:
@@ -371,7 +377,7 @@ def _stations(front: Front, count: int) -> tuple[Array, float | None]:
 
 
 def _hat(front: Front, along: Array, centre: float, width: float | None) -> Array:
-    """Weights of a station at places along the front."""
+    """Compute weights of a station at places along the front."""
     if width is None:
         return np.ones(len(along))
     apart = along - centre
@@ -474,7 +480,7 @@ def _front_interaction(
     ahead: Array,
     forces: Array | None,
 ) -> Array:
-    """M of the modes and G (m, 4, 4) in some cells, if a corner alone moves by one ahead."""
+    """Compute M of modes and G (m, 4, 4) in some cells, if a corner alone moves by one ahead."""
     local = front.coordinates(at.points.reshape(-1, 3))
     axes = local.axes
     # a corner's direction and slopes in the axes of each point: (points, 4, 3)

@@ -77,12 +77,12 @@ class Tip:
     arc: ArcCut | None = None
 
     def radii(self, count: int = 3) -> Array:
-        """Radii (count,) of domains that stay clear of tip and next feature, m."""
+        """Compute the radii (count,) of domains that stay clear of tip and next feature, m."""
         return np.asarray(self.reach * np.linspace(0.4, 0.8, count))
 
 
 def tips(scene: Scene) -> list[Tip]:
-    """Tips of the cuts of a plane scene: ends inside the body at which nothing else is met."""
+    """Return tips of cuts of a plane scene: ends inside the body at which nothing else is met."""
     return [
         tip_at(scene, cut.name, end)
         for cut in scene.final_cuts
@@ -92,7 +92,7 @@ def tips(scene: Scene) -> list[Tip]:
 
 
 def no_tip(scene: Scene, name: str, end: End) -> str | None:
-    """Why an end of a cut of a plane scene is no tip, or None if it is one."""
+    """Say why an end of a cut of a plane scene is no tip, or None if it is one."""
     assert isinstance(scene.geometry, Rectangle | Polygon)
     cut = next(cut for cut in scene.final_cuts if cut.name == name)
     assert isinstance(cut, ArcCut | PolylineCut)
@@ -116,7 +116,7 @@ def no_tip(scene: Scene, name: str, end: End) -> str | None:
 
 
 def _ends(cut: ArcCut | PolylineCut) -> Array:
-    """Both ends (2, 2) of an open cut, m."""
+    """Return both ends (2, 2) of an open cut, m."""
     if isinstance(cut, PolylineCut):
         return cut.vertices()[[0, -1]]
     turned = np.deg2rad(cut.start + cut.sweep * np.array([0.0, 1.0]))
@@ -169,7 +169,7 @@ def tip_fields(
     """Give the fields of mode I and mode II, each as a sum of exact ones with their factors.
 
     At a straight crack Williams' fields. At an arc, fields of the arc in an infinite plate under
-    three remote stresses, combined so that only one mode is left at this end.
+    three remote stresses, so combined that this end has one mode.
     """
     if arc is None:
         angle = float(np.rad2deg(np.arctan2(direction[1], direction[0])))
@@ -238,8 +238,8 @@ def mode_field(
 ) -> ModeField:
     """Evaluate mode 1, 2 or 3 at places (n,) ahead of and across a front.
 
-    In the coordinates of a plane curve of curvature κ, h = 1 + κ x1, the axes turn by
-    ∂_3 e_1 = κ e_3/h and ∂_3 e_3 = −κ e_1/h.
+    The coordinates are of a plane curve of curvature κ, with h = 1 + κ x1. Their axes turn by ∂_3
+    e_1 = κ e_3/h and ∂_3 e_3 = −κ e_1/h.
     """
     n = len(ahead)
     by_h = curvature / (1 + curvature * ahead)
@@ -447,7 +447,7 @@ def station_spacing(front: Front) -> float:
 
 
 def front_reach(scene: Scene, asked: FractureQuantity) -> float:
-    """Distance (m) from a front to what a domain must not meet; 0 if it meets it.
+    """Compute the distance (m) from a front to what a domain must not meet; 0 if it meets it.
 
     Of a round front all of it counts; of a straight one what of it the hats at a point lie on.
     """
@@ -463,7 +463,7 @@ def front_reach(scene: Scene, asked: FractureQuantity) -> float:
     front = np.asarray(cut.centre) + (cut.radius or 0.0) * spokes
     walls = np.concatenate([front - lower, upper - front], axis=1)
     away = distance_to_cuts(others, front).min(initial=np.inf)
-    # between two of these places the front may meet what is nearer than half their distance
+    # between two of these places the front may meet a feature nearer than half their distance
     met = float(np.pi * (cut.radius or 0.0) / _AROUND)
     reach = min(float(cut.radius or 0.0), float(walls.min()), float(away))
     return reach if reach > met else 0.0
@@ -509,7 +509,7 @@ def _straight_reach(cut: PolygonCut, point: Array, box: Array, others: list[Any]
     away = np.linalg.norm(off - at[:, None] * along, axis=1)
     beside_it = (at >= 0.0) & (at <= length) & (away > slack)  # the others than its own
     reach = min(reach, float(away[beside_it].min(initial=np.inf)))
-    # between two of these places the front may meet what is nearer than half their distance
+    # between two of these places the front may meet a feature nearer than half their distance
     return reach if reach > 0.5 * length / (_AROUND - 1) else 0.0
 
 

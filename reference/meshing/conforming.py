@@ -162,7 +162,7 @@ def _fragment(gmsh: ModuleType, surface: int, curves: list[int], met: list[int])
 
 
 def _ways(scene: Scene) -> list[str]:
-    """Names of the features that a blade cuts on its way."""
+    """Find names of the features that a blade cuts on its way."""
     return [f"cut '{cut.name}'" for cut in scene.cuts if cut.on_the_way]
 
 

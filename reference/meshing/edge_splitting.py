@@ -27,7 +27,7 @@ _ROUNDS = 8  # flat triangles that lie on flat ones are flipped from the outside
 
 
 def barycentric(corners: Array, x: Array) -> Array:
-    """Barycentric coordinates (m, 3) of a point in plane triangles (m, 3, 2)."""
+    """Compute barycentric coordinates (m, 3) of a point in plane triangles (m, 3, 2)."""
     a, b, c = corners.swapaxes(0, 1)
     u, v, w = b - a, c - a, x - a
     det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
@@ -120,7 +120,7 @@ def _first_edge(simplices: Cells, keys: Cells, count: int) -> Cells:
 
 
 def _edge_numbers(simplices: Cells, keys: Cells, count: int) -> list[Cells]:
-    """For each pair of corners: the index into `keys` of each simplex' edge, or −1."""
+    """Find for each pair of corners the index into `keys` of each simplex' edge, or −1."""
     known = np.flatnonzero(keys >= 0)
     values = keys[known]
     numbers = []
@@ -133,7 +133,7 @@ def _edge_numbers(simplices: Cells, keys: Cells, count: int) -> list[Cells]:
 
 
 def _first_everywhere(cells: Cells, first: Cells, keys: Cells, count: int) -> NDArray[np.bool_]:
-    """Which of the edges come first in all cells that have them."""
+    """Tell which of the edges come first in all cells that have them."""
     ready = np.ones(len(keys), dtype=bool)
     for at in _edge_numbers(cells, keys, count):
         ready[at[(at >= 0) & (at != first)]] = False
@@ -228,7 +228,7 @@ def graded_to(
 def _longest_to_split(
     points: Array, cells: Cells, large: NDArray[np.bool_], away: Array
 ) -> tuple[Cells, NDArray[np.bool_]]:
-    """Edges (e, 2) that are the longest of all cells around them, on the way to large cells.
+    """Find edges (e, 2) that are the longest of all cells around them, on the way to large cells.
 
     And which cells (m,) were looked at: they hold all that have one of the edges. Nodes are `away`
     (n,) from the singularity, m: the large cells and all cells to be split are near it.
@@ -316,7 +316,7 @@ def flip_flat_cells(points: Array, cells: Cells, facets: Cells) -> Cells:
 
 
 def _shape(corners: Array) -> Array:
-    """Signed area (m,) of triangles (m, 3, 2) over the square of their longest edge."""
+    """Compute the signed area (m,) of triangles (m, 3, 2) over the square of their longest edge."""
     edges = np.roll(corners, -1, axis=1) - corners
     double = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     return 0.5 * double / np.square(edges).sum(axis=2).max(axis=1)

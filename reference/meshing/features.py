@@ -20,7 +20,7 @@ _SAMPLES = 721  # of an arc, where its distance to another feature is measured
 
 
 def divided_outline(scene: Scene) -> Array:
-    """Corners (k, 2) of the body, and the points of its edges where such a part ends."""
+    """Find corners (k, 2) of the body, and the points of its edges where such a part ends."""
     outline = _outline(scene)
     size = float(np.ptp(outline, axis=0).max())
     where = {s.where for s in scene.supports}
@@ -40,7 +40,7 @@ def divided_outline(scene: Scene) -> Array:
 
 
 def supported_edges(scene: Scene, corners: Array) -> NDArray[np.bool_]:
-    """Whether each edge of the divided outline is held by a support, in any component."""
+    """Tell whether each edge of the divided outline is held by a support, in any component."""
     held = np.zeros(len(corners), dtype=bool)
     for support in scene.supports:
         held |= _on_edges(scene, support.where, corners)
@@ -48,7 +48,7 @@ def supported_edges(scene: Scene, corners: Array) -> NDArray[np.bool_]:
 
 
 def load_jumps(scene: Scene, corners: Array) -> NDArray[np.bool_]:
-    """Corners of the divided outline where the tractions of both edges fit no bounded stress.
+    """Find corners of the divided outline where the tractions of both edges fit no bounded stress.
 
     A symmetric stress wants t₁·n₂ = t₂·n₁ at a corner, and t₁ = t₂ on a straight edge. Else the
     strain grows like the logarithm of the distance.
@@ -82,7 +82,7 @@ def _on_edges(scene: Scene, where: str, corners: Array) -> NDArray[np.bool_]:
 
 
 def _ends(scene: Scene, where: str, edges: Array) -> list[tuple[int, float]]:
-    """Edges (e, 2, 2) in which a part begins or ends, and at which share of each."""
+    """Find edges (e, 2, 2) in which a part begins or ends, and at which share of each."""
     pieces = pieces_on_part(scene.geometry, where, edges)
     spans = np.sort(pieces.barycentric[:, :, 1], axis=1)
     found = []
@@ -119,7 +119,7 @@ class Feature:
     sweep: float = 0.0
 
     def distance(self, points: Array) -> Array:
-        """Distance (n,) of each of `points` (n, 2) to this feature, m."""
+        """Compute the distance (n,) of each of `points` (n, 2) to this feature, m."""
         if self.centre is None:
             along = self.end - self.start
             share = np.clip((points - self.start) @ along / (along @ along), 0.0, 1.0)
@@ -134,7 +134,7 @@ class Feature:
         return np.where(angle <= self.sweep, to_circle, nearest)
 
     def samples(self, count: int = _SAMPLES) -> Array:
-        """Points (n, 2) along the feature, both ends included."""
+        """Find points (n, 2) along the feature, both ends included."""
         t = np.linspace(0.0, 1.0, count)
         if self.centre is None:
             return np.asarray(self.start + t[:, None] * (self.end - self.start))
@@ -150,7 +150,7 @@ class Feature:
         return self.radius * self.sweep
 
     def gap(self, other: "Feature") -> float:
-        """Smallest distance to another feature, m; 0 where they cross."""
+        """Compute the smallest distance to another feature, m; 0 where they cross."""
         if len(crossing_points([self, other])):
             return 0.0
         mine, others = (f.samples(2 if f.centre is None else _SAMPLES) for f in (self, other))
@@ -158,7 +158,7 @@ class Feature:
 
 
 def plane_features(scene: Scene) -> list[Feature]:
-    """Edges of the body, divided where the part a condition acts on ends, and parts of cuts."""
+    """Find edges of body, divided where the part a condition acts on ends, and parts of cuts."""
     assert isinstance(scene.geometry, Rectangle | Polygon)
     corners = divided_outline(scene)
     found = [
@@ -181,7 +181,7 @@ def plane_features(scene: Scene) -> list[Feature]:
 
 
 def crossing_points(features: list[Feature]) -> Array:
-    """Points (k, 2) where two of the features cross or touch, to round-off, m."""
+    """Find points (k, 2) where two of the features cross or touch, to round-off, m."""
     found = [np.zeros((0, 2))]
     for one, other in combinations(features, 2):
         if one.centre is None and other.centre is None:
@@ -193,7 +193,7 @@ def crossing_points(features: list[Feature]) -> Array:
 
 
 def close_pairs(features: list[Feature], touching: float, below: float) -> list[tuple[int, int]]:
-    """Pairs of features, one of them a cut, that come closer than `below` but do not touch.
+    """Find pairs of features, one of them a cut, that come closer than `below` but do not touch.
 
     Two parts of one cut count only where it turns back on itself; else each vertex of a smooth
     curve given as a polyline would make a pair.
@@ -210,7 +210,7 @@ def close_pairs(features: list[Feature], touching: float, below: float) -> list[
 
 
 def _turns_back(one: Feature, other: Feature, between: float) -> bool:
-    """Whether an end of one part of a cut is half as far from a later part as the way there."""
+    """Tell whether an end of one part of a cut is half as far from a later part as way there."""
     ways = [
         (one.start, other, one.length + between),
         (one.end, other, between),
@@ -315,7 +315,7 @@ def _check_no_cusp(features: list[Feature], size: float, where: str) -> None:
 def _off_ends(
     feature: Feature, points: NDArray[np.float64], features: list[Feature], size: float
 ) -> NDArray[np.bool_]:
-    """Whether points lie off the ends of a feature; those at which an arc is halved are none."""
+    """Tell whether points lie off ends of a feature; those at which an arc is halved are none."""
     halves = []
     if feature.centre is not None:
         halves = [f for f in features if f is not feature and f.name == feature.name]
@@ -348,7 +348,7 @@ def _check_no_overlap(features: list[Feature], size: float, where: str) -> None:
 
 
 def _bulges(features: list[Feature]) -> NDArray[np.float64]:
-    """Points (k, 2) of arcs that come nearest to another line or circle."""
+    """Find points (k, 2) of arcs that come nearest to another line or circle."""
     found = [np.zeros((0, 2))]
     arcs = [feature for feature in features if feature.centre is not None]
     for arc in arcs:

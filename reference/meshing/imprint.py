@@ -39,7 +39,7 @@ _FLAT = 1e-9  # of the size of a triangle: what lies this close to its plane is 
 def structured_triangles(
     lower: tuple[float, float], upper: tuple[float, float], counts: tuple[int, int]
 ) -> tuple[Array, Cells]:
-    """Rectangles split along their rising diagonals."""
+    """Split rectangles along their rising diagonals."""
     n, m = counts
     x, y = np.meshgrid(
         np.linspace(lower[0], upper[0], n + 1), np.linspace(lower[1], upper[1], m + 1)
@@ -141,7 +141,7 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
 
 
 def _parts(points: Array, cell: Cells, new: Cells) -> list[list[int]]:
-    """Sub-triangles of a cell with nodes on one or two of its edges."""
+    """Return sub-triangles of a cell with nodes on one or two of its edges."""
     if np.count_nonzero(new >= 0) == 1:
         k = int(np.argmax(new >= 0))
         a, b, c = (int(cell[(k + i) % 3]) for i in range(3))
@@ -165,14 +165,14 @@ def _replace(cells: Cells, old: Cells, parts: list[list[list[int]]]) -> Cells:
 
 
 def _edges(cells: Cells, count: int) -> tuple[Cells, Cells]:
-    """Edges (e, 2), and the edge opposite each corner of each cell (m, 3)."""
+    """Find edges (e, 2), and the edge opposite each corner of each cell (m, 3)."""
     pairs = np.sort(cells[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
     keys, owner = np.unique(pairs[:, 0] * count + pairs[:, 1], return_inverse=True)
     return np.column_stack(np.divmod(keys, count)), owner.reshape(-1, 3)
 
 
 def _facets_on(points: Array, cells: Cells, a: Array, b: Array) -> Cells:
-    """Edges whose both ends lie on the segment ab."""
+    """Find edges whose both ends lie on the segment ab."""
     edges = mesh_edges(cells)
     along = b - a
     length = float(np.hypot(*along))
@@ -188,7 +188,7 @@ def _facets_on(points: Array, cells: Cells, a: Array, b: Array) -> Cells:
 def structured_tetrahedra(
     lower: tuple[float, ...], upper: tuple[float, ...], counts: tuple[int, ...]
 ) -> tuple[Array, Cells]:
-    """Boxes split into six tetrahedra each that share the rising diagonal (Kuhn)."""
+    """Split boxes into six tetrahedra each that share the rising diagonal (Kuhn)."""
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(lower, upper, counts, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     number = np.arange(grid[..., 0].size).reshape(grid.shape[:3])
@@ -264,7 +264,7 @@ def trace_polygon(mesh: Mesh, corners: Array, insert: bool) -> Mesh:
 
 
 def plane_frame(corners: Array) -> tuple[Array, Array]:
-    """Middle (3,) of a plane polygon, and its two axes and normal as rows (3, 3)."""
+    """Compute the middle (3,) of a plane polygon, and its two axes and normal as rows (3, 3)."""
     origin = corners.mean(axis=0)
     axes = np.linalg.svd(corners - origin)[2]
     return origin, axes
@@ -355,7 +355,7 @@ def _star(simplices: Cells, facet: Cells, new: int) -> Cells:
 
 
 def plane_facets(cells: Cells, on_plane: NDArray[np.bool_]) -> Cells:
-    """Facets all of whose nodes are in the plane, each once."""
+    """Find the facets all of whose nodes are in the plane, each once."""
     touching = cells[on_plane[cells].sum(axis=1) >= cells.shape[1] - 1]
     facets = cell_facets(touching)
     return np.unique(facets[on_plane[facets].all(axis=1)], axis=0)
@@ -419,7 +419,7 @@ def imprint_facets(points: Array, cells: Cells, facets: Array) -> Realised:
 
 
 def _within_cells(points: Array, cells: Cells, facets: Array) -> bool:
-    """Whether every triangle lies within one cell."""
+    """Tell whether every triangle lies within one cell."""
     for triangle in facets:
         rows = _near(points[cells], triangle.mean(axis=0))
         shares = np.stack([_shares(points[cells[rows]], x) for x in triangle])
@@ -429,7 +429,7 @@ def _within_cells(points: Array, cells: Cells, facets: Array) -> bool:
 
 
 def _merged(corners: Array) -> tuple[Array, Cells]:
-    """Corners that are not the same place, and the number of each among them."""
+    """Find corners that are not the same place, and the number of each among them."""
     size = float(np.ptp(corners, axis=0).max())
     pairs = cKDTree(corners).query_pairs(_SAME * size, output_type="ndarray")
     link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(corners),) * 2)
@@ -464,7 +464,7 @@ def _inserted(mesh: Mesh, corners: Array) -> tuple[Mesh, Cells]:
 
 
 def _place(points: Array, cells: Cells, x: Array) -> tuple[int, ...]:
-    """Nodes (ascending) of the node, edge, facet or cell of the mesh in which a point lies."""
+    """Find nodes (ascending) of the node, edge, facet or cell of the mesh in which a point lies."""
     rows = _near(points[cells], x)
     shares = _shares(points[cells[rows]], x)
     if not len(rows) or shares.min(axis=1).max() < -ON:
@@ -477,21 +477,21 @@ def _place(points: Array, cells: Cells, x: Array) -> tuple[int, ...]:
 
 
 def _near(corners: Array, x: Array) -> NDArray[np.int64]:
-    """Cells (m, 4, 3) whose bounding box holds a point, but for round-off."""
+    """Find cells (m, 4, 3) whose bounding box holds a point, but for round-off."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     slack = ON * (high - low).max(axis=1, keepdims=True)
     return np.flatnonzero(((low - slack <= x) & (x <= high + slack)).all(axis=1))
 
 
 def _shares(corners: Array, x: Array) -> Array:
-    """Barycentric coordinates (m, 4) of a point in tetrahedra (m, 4, 3)."""
+    """Compute barycentric coordinates (m, 4) of a point in tetrahedra (m, 4, 3)."""
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     shares = np.linalg.solve(edges, (x - corners[:, 0])[:, :, None])[:, :, 0]
     return np.column_stack([1 - shares.sum(axis=1), shares])
 
 
 def _as_facets(mesh: Mesh, wanted: Cells) -> tuple[Cells, Cells]:
-    """Facets of the mesh that are triangles, or fill flat groups of them; and the other ones."""
+    """Find facets of mesh that are triangles, or fill flat groups of them; and the other ones."""
     points, cells, _ = mesh
     touched = np.zeros(len(points), dtype=bool)
     touched[wanted] = True
@@ -513,7 +513,7 @@ def _as_facets(mesh: Mesh, wanted: Cells) -> tuple[Cells, Cells]:
 
 
 def _without(rows: Cells, some: Cells) -> Cells:
-    """Rows that are not among some others; both without repetition."""
+    """Find rows that are not among some others; both without repetition."""
     every, times = np.unique(np.concatenate([rows, some, some]), axis=0, return_counts=True)
     return every[times == 1]
 

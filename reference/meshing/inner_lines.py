@@ -102,7 +102,7 @@ def solid_interfaces(scene: Scene) -> list[Array]:
 def _level_sets(
     scene: Scene, centre: Array, reach: float
 ) -> list[tuple[Array, float, Array | None]]:
-    """Lines or planes (unit normal, offset, None), and circles (zeros, radius, centre)."""
+    """Find lines or planes (unit normal, offset, None), and circles (zeros, radius, centre)."""
     found: list[tuple[Array, float, Array | None]] = []
     for region in scene.material.regions:
         for left, right in comparisons(region.where, scene.dimension):
@@ -171,7 +171,7 @@ def _circle(centre: Array, radius: float) -> Callable[[Array], Array]:
 def _changes(
     scene: Scene, curve: Callable[[Array], Array], outline: Array, reach: float
 ) -> list[tuple[float, float]]:
-    """Parameters between which a curve lies inside the body and separates two materials."""
+    """Compute parameters between which a curve lies inside the body and separates two materials."""
 
     def separates(t: Array) -> NDArray[np.bool_]:
         points = curve(t)
@@ -197,14 +197,14 @@ def _changes(
 
 
 def _differs(scene: Scene, points: Array, normal: Array, reach: float) -> NDArray[np.bool_]:
-    """Whether the material differs on either side of points (n, d) of an interface."""
+    """Tell whether the material differs on either side of points (n, d) of an interface."""
     aside = _ASIDE * reach * normal
     number = scene.material.number_at
     return np.asarray(number(points + aside) != number(points - aside))
 
 
 def part_lines(scene: Scene) -> Array:
-    """Segments (s, 2, 3) across faces of the box along which an inequality changes, m.
+    """Find segments (s, 2, 3) across faces of the box along which an inequality changes, m.
 
     A traction that ends along another line ends inside facets.
 
@@ -275,7 +275,7 @@ def clamped_edges(
 
 
 def _held(scene: Scene, points: Array, size: float) -> NDArray[np.bool_]:
-    """Whether some support holds points of the surface."""
+    """Tell whether some support holds points of the surface."""
     held = np.zeros(len(points), dtype=bool)
     for support in scene.supports:
         held |= on_part(scene.geometry, support.where, points, size)
@@ -288,7 +288,7 @@ def _corners(scene: Scene) -> tuple[Array, Array]:
 
 
 def _ends(region: Region, lower: Array, upper: Array, axis: int, side: int, across: int) -> Array:
-    """Places along `across` at which the region begins or ends on a face, each once, m."""
+    """Find places along `across` at which the region begins or ends on a face, each once, m."""
     along = 3 - axis - across
     size = upper - lower
     share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
@@ -346,7 +346,7 @@ def split_at_part_ends(
 
 
 def singular_lines(scene: Scene, points: Array, cells: Cells, facets: Cells) -> Array:
-    """Segments (s, 2, d) at which the field of a given mesh is singular, in the plane points, m.
+    """Find segments (s, 2, d) at which field of a given mesh is singular, in the plane points, m.
 
     There a cut ends inside the body, a support ends on its boundary, or that turns into the body;
     of the last two none where an exact field is prescribed, which is smooth there.
@@ -377,7 +377,7 @@ def singular_lines(scene: Scene, points: Array, cells: Cells, facets: Cells) -> 
 
 
 def _turned_in(points: Array, cells: Cells) -> Cells:
-    """Edges (r, 2) of the boundary, in the plane nodes (r, 1), at which it turns into the body."""
+    """Find edges (r, 2) of boundary, in the plane nodes (r, 1), at which it turns into the body."""
     d = points.shape[1]
     facets, first, count = np.unique(
         cell_facets(cells), axis=0, return_index=True, return_counts=True
@@ -395,13 +395,13 @@ def _turned_in(points: Array, cells: Cells) -> Cells:
 
 
 def _rims(facets: Cells) -> Cells:
-    """Edges of triangles, or ends of segments (f, k), of all facets in turn."""
+    """Find edges of triangles, or ends of segments (f, k), of all facets in turn."""
     k = facets.shape[1]
     return np.sort(np.concatenate([np.delete(facets, i, axis=1) for i in range(k)]), axis=1)
 
 
 def _boundary(cells: Cells) -> Cells:
-    """Nodes (b, k) of the facets of one cell only."""
+    """Find nodes (b, k) of the facets of one cell only."""
     facets, count = np.unique(cell_facets(cells), axis=0, return_counts=True)
     return np.asarray(facets[count == 1])
 
@@ -409,7 +409,7 @@ def _boundary(cells: Cells) -> Cells:
 def _ends_in_facets(
     scene: Scene, formulas: list[str], points: Array, boundary: Cells
 ) -> tuple[Cells, Array]:
-    """Edges (e, 2) of facets in which a part ends, the smaller node first, and where (e, d), m."""
+    """Find edges (e, 2) of facets in which a part ends, smaller node first, and where (e, d), m."""
     corners = points[boundary]
     edges, places = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, points.shape[1]))]
     for where in formulas:

@@ -88,7 +88,7 @@ class ConformingMesh:
 
 
 def cell_facets(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Nodes (m · (d + 1), d), ascending, of the facets; a facet lies opposite its corner."""
+    """Find nodes (m · (d + 1), d), ascending, of the facets; a facet lies opposite its corner."""
     corners = [[c for c in range(cells.shape[1]) if c != k] for k in range(cells.shape[1])]
     return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
 
@@ -210,7 +210,7 @@ def _without_tiny_parts(
 
 
 def doubled_nodes(cells: NDArray[np.int64], cut_facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Nodes that `open_cut` gives to several groups of cells, ascending."""
+    """Find nodes that `open_cut` gives to several groups of cells, ascending."""
     first, second, is_cut, _ = interior_facets(cells, cut_facets)
     _, parent = _opened(cells, first[~is_cut], second[~is_cut])
     return parent[1:][parent[1:] == parent[:-1]]
@@ -256,7 +256,7 @@ def _facet_keys(
 def _facing_slots(
     cells: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of slots (cell · (d + 1) + corner) of one node in two cells that share a facet."""
+    """Find pairs of slots (cell · (d + 1) + corner) of one node in two cells that share a facet."""
     k = cells.shape[1]
     pairs_a, pairs_b = [], []
     for step in range(1, k):
@@ -269,7 +269,7 @@ def _facing_slots(
 
 
 def _links_of_corners(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of nodes that some cell holds together: its first corner with each other."""
+    """Find pairs of nodes that some cell holds together: its first corner with each other."""
     others = cells[:, 1:]
     return np.repeat(cells[:, 0], others.shape[1]), others.ravel()
 

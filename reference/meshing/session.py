@@ -106,7 +106,7 @@ class Grading:
         return replace(self, size=size, strip=strip, share=share, way=way)
 
     def close_points(self) -> list[tuple[Array, float]]:
-        """Points that are graded to anew, each with the distance r₀ from which on, m.
+        """Find points that are graded to anew, each with the distance r₀ from which on, m.
 
         There h(r) = share · r₀ · max((r/r₀)^exponent, r/r₀): outside r₀ elements grow in
         proportion to the distance, so that their number grows with its logarithm only.
@@ -127,7 +127,7 @@ class Grading:
 
 
 def singular_points(scene: Scene) -> Array:
-    """Points (k, 2) where the gradient of the solution may be unbounded.
+    """Find points (k, 2) where the gradient of the solution may be unbounded.
 
     Tips, kinks of more than 15°, junctions and crossings of cuts; points of the outline at which
     a support ends or a traction jumps, mouths in a support, and re-entrant corners; and where
@@ -200,13 +200,13 @@ def _tips_and_kinks(cut: Cut, outline: Array) -> Array:
 
 
 def _junctions(features: list[Feature]) -> Array:
-    """Points where different cuts meet."""
+    """Find points where different cuts meet."""
     pairs = [(a, b) for a, b in combinations(features, 2) if a.name != b.name]
     return np.concatenate([np.zeros((0, 2)), *(crossing_points([a, b]) for a, b in pairs)])
 
 
 def _corners(scene: Scene) -> Array:
-    """Where a support ends or a traction jumps, and re-entrant corners."""
+    """Find where a support ends or a traction jumps, and re-entrant corners."""
     corners = divided_outline(scene)
     held = supported_edges(scene, corners)
     following = np.roll(corners, -1, axis=0) - corners
@@ -219,7 +219,7 @@ def _corners(scene: Scene) -> Array:
 
 
 def _held_mouths(scene: Scene, cuts: list[Feature]) -> Array:
-    """Points where a cut meets an edge that is held: a clamped corner on either side."""
+    """Find points where a cut meets an edge that is held: a clamped corner on either side."""
     corners = divided_outline(scene)
     held = supported_edges(scene, corners)
     edges = [
@@ -270,7 +270,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 def simplices(
     gmsh: ModuleType, dimension: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """All triangles (in the plane) or tetrahedra (in space) of the model.
+    """Return all triangles (in the plane) or tetrahedra (in space) of the model.
 
     Returns
     -------
@@ -297,7 +297,7 @@ def simplices(
 def entity_facets(
     gmsh: ModuleType, entities: list[int], dimension: int, number: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Nodes (f, k) of the segments or triangles on curves or faces; `number` as of `simplices`."""
+    """Find nodes (f, k) of segments or triangles on curves or faces; `number` as of `simplices`."""
     found = [np.zeros((0, dimension + 1), dtype=np.int64)]
     for entity in entities:
         _, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
@@ -333,7 +333,7 @@ def set_sizes(gmsh: ModuleType, fields: list[int], smallest: float, largest: flo
 def background_mesh(
     outline: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Uniform unstructured triangles of a polygon, ignorant of any cut.
+    """Compute uniform unstructured triangles of a polygon, ignorant of any cut.
 
     Parameters
     ----------

@@ -136,14 +136,14 @@ def _check_not_merged(images: dict[int, list[tuple[int, int]]], names: dict[int,
 
 
 def _on_surface(gmsh: ModuleType, face: int) -> bool:
-    """Whether the centre of a face lies on the surface of the box, to what gmsh merges."""
+    """Tell whether the centre of a face lies on the surface of the box, to what gmsh merges."""
     box = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     centre = np.array(gmsh.model.occ.getCenterOfMass(2, face))
     return bool(np.abs(box - centre).min() < _MERGED * np.ptp(box, axis=0).max())
 
 
 def _arcs(occ: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:
-    """Arcs of less than half a turn, so that each extrudes to a simple patch."""
+    """Return arcs of less than half a turn, so that each extrudes to a simple patch."""
     count = 1 + int(cut.sweep // 120.0) if cut.sweep < 360.0 else 3
     first, second, _ = cut.axes()
     base, radius = (np.array(cut.base) - origin) / scale, cut.radius / scale
@@ -177,7 +177,7 @@ def _swept(occ: ModuleType, curves: list[int], along: Array) -> list[int]:
 
 
 def _rims(gmsh: ModuleType, faces: list[int]) -> tuple[list[int], list[int]]:
-    """Curves off the surface of the body with a kink or other than two faces, and mouths."""
+    """Return curves off the surface of the body with a kink or other than two faces, and mouths."""
     mine = set(faces)
     curves = {
         abs(tag) for face in faces for _, tag in gmsh.model.getBoundary([(2, face)], oriented=False)
@@ -320,7 +320,7 @@ def _add_lines(gmsh: ModuleType, segments: Array) -> list[int]:
 def _clamped(
     gmsh: ModuleType, scene: Scene, cut: CutFaces, origin: Array, scale: float
 ) -> list[int]:
-    """Curves on the surface of the body at which a support makes the strain unbounded."""
+    """Return curves on the surface of the body at which a support makes the strain unbounded."""
     inner = {curve for face in cut.faces for curve in gmsh.model.getAdjacencies(2, face)[1]}
     curves, middles, tangents = [], [], []
     for _, curve in gmsh.model.getEntities(1):

@@ -2,10 +2,10 @@
 
 A multifrontal method (Duff & Reid 1983), ordered by minimum degree on nodes. Everything that
 depends on the sparsity only (order, fronts, where each block goes) is found once per topology;
-`Cholesky.factorize` then runs over values alone. No pivoting: the stiffness of a supported body
-is positive definite, and the error of a Cholesky factorisation does not depend on diagonal
-scaling, so slivers do not hurt it (Higham 2002, section 10.1). `NearlySymmetric` factorises the
-symmetric part and refines, and takes LU where that does not converge.
+`Cholesky.factorize` then runs over values alone. No pivoting: the stiffness of a supported body is
+positive definite. The error of a Cholesky factorisation does not depend on diagonal scaling, so
+slivers do not hurt it (Higham 2002, section 10.1). `NearlySymmetric` factorises the symmetric part
+and refines, and takes LU where that does not converge.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """Compiled loops of the multifrontal Cholesky factorisation.
 
 A front has the columns of its supernode and, below them, the rows that these columns reach. Its
-factor columns are stored one after the other: a panel (width, height) of which row j is column j
-of the factor, from its diagonal on. What is before the diagonal is never read. The update matrix of
-a front waits on a stack until the parent front adds it. Products of many columns are those of BLAS.
+factor columns are stored one after the other: a panel (width, height) of which row j is column j of
+the factor, from its diagonal on. Entries before the diagonal are never read. The update matrix of a
+front waits on a stack until the parent front adds it. BLAS multiplies where there are many columns.
 `plan` is a `verify.accelerated.fronts.FrontPlan`.
 """
 
@@ -90,7 +90,7 @@ def _eliminate_band(panel, begin, end, diagonal):
 
 @njit(inline="always")
 def _numbers(panel, begin, end, first, room):
-    """Columns `begin` to `end` of a panel, rows from `first` on, without gaps."""
+    """Find the columns `begin` to `end` of a panel, rows from `first` on, without gaps."""
     depth, rows = end - begin, panel.shape[1] - first
     numbers = room[: depth * rows].reshape(depth, rows)
     for k in range(depth):
@@ -138,10 +138,10 @@ def factorise_fronts(
 ):
     """Factorise; return the scalar column (in the order) whose pivot failed, or -1.
 
-    What a front leaves of its rows, to be taken from its parent, is the product of its own columns
-    plus what its children leave of them. It waits on one of two stacks, by the parity of the level:
-    fronts are in postorder, so what the children leave is last on the other. Both are in `stack`,
-    from the two `tops` on; `waiting_front` (F,) has room for the fronts on them.
+    The update vector of a front, to be subtracted in its parent, is the product of its own columns
+    plus the updates of its children. It waits on one of two stacks, by the parity of the level:
+    fronts are in postorder, so the updates of the children are last on the other. Both are in
+    `stack`, from the two `tops` on; `waiting_front` (F,) has room for the fronts on them.
     """
     bounds, row_start, parent = plan.bounds, plan.row_start, plan.parent
     size, waiting = blocks.shape[1], 0
@@ -202,7 +202,7 @@ def _solve_front(panel, x, own, rows, size, gathered):
 
 @njit(inline="always")
 def _solve_front_back(panel, x, own, rows, size, gathered):
-    """Find a front's values, backwards and in place, from those of its rows."""
+    """Find a front's values, backwards and in place, from the values of its rows."""
     width, height = panel.shape
     for k in range(len(rows)):
         for a in range(size):

@@ -57,7 +57,7 @@ class ConjugateGradients(LinearSolver):
         self._pattern, self.tolerance, self.limit = pattern, tolerance, limit
         sparsity = pattern.starts, pattern.columns, pattern.diagonal
         self._rows, self._columns, self._above = upper_pattern(*sparsity)
-        # blocks of three, whatever those of the matrix are
+        # blocks of three, whatever the blocks of the matrix
         self._upper = np.zeros((len(self._columns), 3, 3))
         self._diagonal = np.tile(np.eye(3), (pattern.node_count, 1, 1))
         self._inverse = np.empty_like(self._diagonal)
@@ -123,7 +123,7 @@ _FUSED = {"contract"}  # multiply and add in one, rounded once
 
 
 def upper_pattern(starts, columns, diagonal):
-    """First block and columns of each row above the diagonal, and the places of these blocks.
+    """Find first block and columns of each row above the diagonal, and the places of these blocks.
 
     Columns are unsigned: no index is negative.
     """
@@ -220,7 +220,7 @@ _SUMS = {"reassoc", "contract", "nsz"}
 
 @njit(cache=True, error_model="numpy")
 def invert_blocks(blocks, out):
-    """Inverses of blocks (N, 3, 3); the first one that is not positive definite, or -1.
+    """Compute inverses of blocks (N, 3, 3); the first one that is not positive definite, or -1.
 
     Factorised as L D Lᵀ, so that a sliver's tiny block keeps all its digits.
     """
@@ -253,17 +253,17 @@ def conjugate_gradients(
 ):
     """Improve x (N, 3), the first of `work`, until ‖b − Kx‖² ≤ target; b is the second.
 
-    With K = L + D + Lᵀ, of the system (D + L)⁻¹ K (D + Lᵀ)⁻¹ x̂ = (D + L)⁻¹ b, preconditioned by D,
-    which is K preconditioned by (D + L) D⁻¹ (D + Lᵀ), block Gauß–Seidel there and back. Its
-    product needs no K: K = (D + L) + (D + Lᵀ) − D, so with t = (D + Lᵀ)⁻¹ p it is
-    t + (D + L)⁻¹ (p − D t) (Eisenstat, SIAM J. Sci. Stat. Comput. 2, 1981): an iteration reads the
-    matrix as often as one without preconditioning. The residual is known in the norm of the
-    preconditioner; in the 2-norm it is taken where that promises the end.
+    Let K = L + D + Lᵀ. The system is (D + L)⁻¹ K (D + Lᵀ)⁻¹ x̂ = (D + L)⁻¹ b, preconditioned by D.
+    It is K preconditioned by (D + L) D⁻¹ (D + Lᵀ): symmetric block Gauß–Seidel. Its product needs
+    no K, as K = (D + L) + (D + Lᵀ) − D. With t = (D + Lᵀ)⁻¹ p it is t + (D + L)⁻¹ (p − D t)
+    (Eisenstat, SIAM J. Sci. Stat. Comput. 2, 1981). So an iteration reads the matrix as often as
+    one without preconditioning. The residual is known in the norm of the preconditioner; in the
+    2-norm it is taken where that promises the end.
 
     Parameters
     ----------
     starts, columns, upper
-        What is above the diagonal, as the sweeps take it.
+        Blocks above the diagonal, as the sweeps take them.
     diagonal, inverse : (N, 3, 3) float array
         Blocks, and their inverses.
     is_zero : bool

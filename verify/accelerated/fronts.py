@@ -1,11 +1,11 @@
 """Analysis before a factorisation sees a value: elimination order, fronts, their tree and places.
 
-The order keeps the factor sparse: approximate minimum degree, the quotient-graph method of
-Amestoy, Davis & Duff (1996), on nodes instead of scalar unknowns. Eliminated sets become
-*elements*; a node's degree is bounded from the elements and nodes that it still sees. Nodes that
-see nothing but the newest element go with it, so the order comes with its fundamental supernodes,
-and the nodes of an element are the rows of its front. Small fronts are then merged into their
-parents, and the tree is put in postorder.
+The order keeps the factor sparse: approximate minimum degree, the quotient-graph method of Amestoy,
+Davis & Duff (1996), on nodes instead of scalar unknowns. Eliminated sets become *elements*; a
+node's degree is bounded from the elements and nodes that it still sees. Nodes that see nothing but
+the newest element go with it. So the order comes with its fundamental supernodes, and the nodes of
+an element are the rows of its front. Small fronts are then merged into their parents, and the tree
+is put in postorder.
 """
 
 from typing import NamedTuple
@@ -78,7 +78,7 @@ def _see_neighbours(starts, columns, sees, variables):
 
 @njit(inline="always")
 def _gather(pivot, start, elements, variables, sees, begin, size, members, dead, mark, found):
-    """Nodes of the new element: what the pivot sees, directly or through its elements."""
+    """Find nodes of the new element: what the pivot sees, directly or through its elements."""
     count = 0
     mark[pivot] = pivot
     for at in range(start[pivot], start[pivot] + elements[pivot] + variables[pivot]):
@@ -99,7 +99,7 @@ def _gather(pivot, start, elements, variables, sees, begin, size, members, dead,
 
 @njit(inline="always")
 def _count_outside(pivot, found, number, start, elements, sees, dead, size, seen_by, outside):
-    """Nodes of each older element that the new one does not have."""
+    """Find nodes of each older element that the new one does not have."""
     for index in range(number):
         node = found[index]
         for at in range(start[node], start[node] + elements[node]):
@@ -225,7 +225,7 @@ def merge_and_order(
     order, bounds : int arrays
         The same for the merged fronts; update matrices can then wait on a stack.
     tops : (F,) int array
-        The front into which those of a merged one went: its rows are those of this one.
+        The front that a merged one joined; both share their rows.
     level : (F,) int array
         0 at a root.
     """
@@ -267,7 +267,7 @@ def _merge(columns, parent, below, group, zeros):
 
 @njit(cache=True)
 def _postorder(width, parent, group, linked, stack, position, tops, level, ends):
-    """Write the first place of each front's columns, and of merged fronts what is returned."""
+    """Write the first place of each front's columns; of merged fronts, the values returned."""
     # children of merged fronts, last: roots; and fronts merged into one, ascending
     head, following, member, next_member = linked[0], linked[1], linked[2], linked[3]
     count = len(parent)
@@ -363,7 +363,7 @@ def plan_fronts(
     parent = _parents(bounds, row_start, rows)
 
     def places(front: Ints, row: Ints) -> Ints:
-        """Places of rows among the columns and rows of fronts."""
+        """Find places of rows among the columns and rows of fronts."""
         found = row - bounds[front]
         outside = np.flatnonzero(row >= bounds[front + 1])
         front = front[outside]
@@ -384,9 +384,9 @@ def plan_fronts(
 
 
 def stack_depths(parent: Ints, level: Ints, entries: Ints) -> tuple[int, int]:
-    """Depths of two stacks of update matrices, of fronts of even levels and of odd ones.
+    """Compute depths of two stacks of update matrices, of fronts of even levels and of odd ones.
 
-    A front writes its update matrix (of that many entries) on one while those of its children,
+    A front writes its update matrix (of that many entries) on one. The matrices of its children,
     which it then takes, are last on the other.
     """
     freed = np.bincount(parent[parent >= 0], entries[parent >= 0], len(parent)).astype(np.int64)
@@ -408,12 +408,12 @@ def _starts(counts: Ints) -> Ints:
 
 
 def _ranges(first: Ints, counts: Ints) -> Ints:
-    """Ranges of that many numbers from the first ones on, one after the other."""
+    """Return ranges of that many numbers from the first ones on, one after the other."""
     return np.arange(counts.sum()) + np.repeat(first - _starts(counts)[:-1], counts)
 
 
 def _parents(bounds: Ints, row_start: Ints, rows: Ints) -> Ints:
-    """Front (S,) in whose columns the first row of each is; -1 without rows."""
+    """Compute the front (S,) in whose columns the first row of each is; -1 without rows."""
     parent = np.full(len(bounds) - 1, -1)
     some = np.flatnonzero(np.diff(row_start))
     if len(some):

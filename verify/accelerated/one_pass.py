@@ -1,8 +1,8 @@
 """Force and tangent of corotational tetrahedra in one pass over them: what an implicit step needs.
 
-The corners of each cell are sorted by node, so that the blocks of its pairs are above the diagonal
-of the matrix, where they are added up. The rest of a symmetric matrix without force in translation
-follows, row by row: what is below the diagonal, and the diagonal as Σ_j K_ij = 0.
+The corners of each cell are sorted by node, so that the blocks of its pairs are above the diagonal.
+There they are added up. The rest of a symmetric matrix without force in translation follows, row by
+row: blocks below the diagonal, and the diagonal as Σ_j K_ij = 0.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ from verify.xfem.element import deform as deform_cells
 from verify.xfem.energy_momentum import StepEnds, averaged_stress
 from verify.xfem.polar import rotation_matrix
 
-_WINDOW = 8 * BATCH  # cells among which those of a batch are not neighbours
+_WINDOW = 8 * BATCH  # cells among which the cells of a batch are no neighbours
 _FIRST, _SECOND = np.triu_indices(4, 1)
 
 
@@ -43,7 +43,7 @@ class OnePassTetrahedra:
     elements : Elements
         Tetrahedra.
     pattern : BlockPattern
-        Its first cells must be those of the body.
+        Its first cells must be the cells of the body.
     corotational : bool
         Whether cells have rotations of their own.
     """
@@ -230,7 +230,7 @@ def _linearise(
 
 @njit(inline="always")
 def _begin(row, last, starts, diagonal, blocks):
-    """Empty rows up to the last one from the diagonal on; return the one after it."""
+    """Zero rows up to `last` from the diagonal on; return the row after it."""
     while row <= last:
         for place in range(diagonal[row] + 1, starts[row + 1]):
             for k in range(3):
@@ -242,7 +242,7 @@ def _begin(row, last, starts, diagonal, blocks):
 
 @njit(inline="always")
 def _complete(row, starts, diagonal, mirror, whole, d, blocks):
-    """Write the diagonal of a row and, if wanted, what is below it, from what is above it."""
+    """Write the diagonal of a row and, if wanted, blocks below it, from the blocks above."""
     middle = diagonal[row]
     d[:] = 0.0
     for place in range(starts[row], middle):
@@ -264,13 +264,13 @@ def _complete(row, starts, diagonal, mirror, whole, d, blocks):
 
 
 def _by_batch(values: Floats) -> Floats:
-    """Entries (cells, k) of cells as (batches, k · BATCH), those of a batch beside each other."""
+    """Reshape entries (cells, k) to (batches, k · BATCH), cells of a batch side by side."""
     entries = values.reshape(-1, BATCH, values.shape[1]).transpose(0, 2, 1)
     return np.ascontiguousarray(entries).reshape(len(entries), -1)
 
 
 def _by_cell(entries: Floats) -> Floats:
-    """Entries (batches, k · BATCH) as (cells, k)."""
+    """Find entries (batches, k · BATCH) as (cells, k)."""
     return (
         entries.reshape(len(entries), -1, BATCH)
         .transpose(0, 2, 1)

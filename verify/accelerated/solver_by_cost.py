@@ -38,7 +38,7 @@ class SolverByCost(LinearSolver):
     held : (N,) bool array
         As of `Cholesky`.
     solid : bool
-        Whether the nodes are those of a solid, which fills a factor quickly.
+        Whether the nodes belong to a solid, which fills a factor quickly.
     tolerance : float
         As of `ConjugateGradients`.
 
@@ -102,7 +102,7 @@ class SolverByCost(LinearSolver):
         self._iterative.limit = max(1, int(cost / (_ITERATION * self._pattern.node_count)))
 
     def factorize(self, blocks: Floats) -> None:
-        """Take the matrix; see `LinearSolver`. Whoever has only one is spared the analysis."""
+        """Take the matrix; see `LinearSolver`. A single matrix is spared the analysis."""
         self._blocks, self._matrices = blocks, self._matrices + 1
         if self._matrices == 2 and not (self._is_analysed or self._waits):
             self._analyse()

@@ -1,10 +1,10 @@
 """Rotation, force and tangent of corotational tetrahedra, eight at a time.
 
-With b_i the material gradients of a cell (i = 1, 2, 3; b_0 = −Σ b_i), R its rotation and
-g_i = R b_i, the force is f_i = τ g_i, τ = w (2μ ε + λ tr(ε) I), ε the symmetric part of F Rᵀ − I.
-The rotation-fixed tangent is K_ij = w (λ g_i g_jᵀ + μ g_j g_iᵀ + μ g_i·g_j I); the consistent one
-has [g_i]ₓᵀ H [g_j]ₓ besides, H = w (μ I + (λ tr E − 2μ)(tr(V) I − V)⁻¹), V = R Uᵀ Rᵀ. As
-Σ_j K_ij = 0 (a translation is free of force), only the six blocks above the diagonal are formed.
+Let b_i be the material gradients of a cell (i = 1, 2, 3; b_0 = −Σ b_i), R its rotation and g_i = R
+b_i. The force is f_i = τ g_i with τ = w (2μ ε + λ tr(ε) I). Here ε is the symmetric part of F Rᵀ −
+I. The rotation-fixed tangent is K_ij = w (λ g_i g_jᵀ + μ g_j g_iᵀ + μ g_i·g_j I). The consistent
+one has [g_i]ₓᵀ H [g_j]ₓ besides. There H = w (μ I + (λ tr E − 2μ)(tr(V) I − V)⁻¹) with V = R Uᵀ Rᵀ.
+As Σ_j K_ij = 0 (a translation is free of force), only the six blocks above the diagonal are formed.
 
 Everything about a batch is in one flat array v: entry k of cell l is at k `BATCH` + l. The loops of
 a kernel go over the cells, and the compiler makes vector instructions of them; it does not where a
@@ -20,14 +20,14 @@ BATCH = 8  #: cells that are computed with at once
 
 # entries: the deformation gradient by rows is at 0
 QUATERNION = 9
-IRREGULAR = 13  # not zero: what is sought has no plain form
+IRREGULAR = 13  # not zero: the stress has no plain form
 _LEAST = 14  # smallest admissible pivot of the Hessian
-_MOVED = 15  # deformation gradient of what is moved, or of the start of a step
+_MOVED = 15  # deformation gradient of the moved points, or of the start of a step
 GRADIENTS = 24  # b_1, b_2, b_3, then w λ and w μ
 _MODULI = 33
 FORCE = 35
 BLOCKS = 47  # of the pairs of corners 01, 02, 03, 12, 13, 23
-CORNERS = 101  # displacement and what is moved, of four corners
+CORNERS = 101  # displacement and moved points, of four corners
 FIRST = 125  # quaternion at the start of a step
 ENTRIES = 129
 
@@ -41,7 +41,7 @@ _REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 
 @njit(cache=True, fastmath=_FUSED)
 def _matrix(v, at):
-    """Nine numbers of a cell, by rows."""
+    """Return nine numbers of a cell, by rows."""
     return (
         v[at], v[at + BATCH], v[at + 2 * BATCH],
         v[at + 3 * BATCH], v[at + 4 * BATCH], v[at + 5 * BATCH],
@@ -51,7 +51,7 @@ def _matrix(v, at):
 
 @njit(cache=True, fastmath=_FUSED)
 def _rotation(v, at):
-    """Matrix of a quaternion of a cell, by rows."""
+    """Make the matrix of a quaternion of a cell, by rows."""
     w, x, y, z = v[at], v[at + BATCH], v[at + 2 * BATCH], v[at + 3 * BATCH]
     return (
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
@@ -71,7 +71,7 @@ def _times(M, x, y, z):
 
 @njit(cache=True, fastmath=_FUSED)
 def _turned_gradients(v, R, l):
-    """g_0, g_1, g_2, g_3."""
+    """Compute g_0, g_1, g_2, g_3."""
     b = _matrix(v, GRADIENTS * BATCH + l)
     g1, g2, g3 = (
         _times(R, b[0], b[1], b[2]),
@@ -184,7 +184,7 @@ def _newton_step(v):
         nx = x + w * t0 + y * t2 - z * t1
         ny = y + w * t1 + z * t0 - x * t2
         nz = z + w * t2 + x * t1 - y * t0
-        # the new one is longer by that of (1, t): known before it is, and so is its root
+        # the new one is longer by the length of (1, t): known before it is, and so is its root
         scale = 1.0 / np.sqrt((w * w + x * x + y * y + z * z) * (1.0 + 0.25 * turn))
         v[at] = nw * scale if good else w
         v[at + BATCH] = nx * scale if good else x
@@ -209,7 +209,7 @@ def _block(v, at, a, b, wl, wm):
 
 @njit(cache=True, fastmath=_FUSED)
 def resist(v, scale):
-    """Write the forces of what is moved, and `scale` times the rotation-fixed tangent."""
+    """Write the forces of the moved points, and `scale` times the rotation-fixed tangent."""
     for l in range(BATCH):
         R, F = _rotation(v, QUATERNION * BATCH + l), _matrix(v, _MOVED * BATCH + l)
         wl, wm = v[_MODULI * BATCH + l], v[(_MODULI + 1) * BATCH + l]
@@ -247,7 +247,7 @@ def resist(v, scale):
 
 @njit(cache=True, fastmath=_FUSED)
 def _resisted(H, g):
-    """H [g]ₓ, H symmetric: its entries 00, 11, 22, 01, 02, 12."""
+    """Compute H [g]ₓ, H symmetric: its entries 00, 11, 22, 01, 02, 12."""
     x, y, z = g
     return (
         H[3] * z - H[4] * y, H[4] * x - H[0] * z, H[0] * y - H[3] * x,
@@ -310,7 +310,7 @@ def resist_rotation(v, scale):
 
 @njit(cache=True, fastmath=_FUSED)
 def _stretch(R, F):
-    """Rᵀ F, symmetric: its entries 00, 11, 22, 01, 02, 12."""
+    """Compute Rᵀ F, symmetric: its entries 00, 11, 22, 01, 02, 12."""
     return (
         R[0] * F[0] + R[3] * F[3] + R[6] * F[6],
         R[1] * F[1] + R[4] * F[4] + R[7] * F[7],
@@ -323,10 +323,10 @@ def _stretch(R, F):
 
 @njit(cache=True, error_model="numpy", fastmath=_FUSED)
 def average(v):
-    """Overwrite the forces by those of the stress averaged over a step, in its plain form.
+    """Overwrite the forces by the stress averaged over a step, in its plain form.
 
-    `verify.xfem.energy_momentum` has the equations. What is moved is the start of the step. Where
-    there is no plain form, as `IRREGULAR` says afterwards, the force is zero.
+    `verify.xfem.energy_momentum` has the equations. The start of the step is moved. Where there is
+    no plain form, as `IRREGULAR` says afterwards, the force is zero.
     """
     for l in range(BATCH):
         F0, F1 = _matrix(v, _MOVED * BATCH + l), _matrix(v, l)

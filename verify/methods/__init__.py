@@ -1,8 +1,8 @@
 """The other ways to cut a finite element mesh, and others' parts of the method of `verify.xfem`.
 
 A method takes an uncut mesh and cuts and gives a `CutBody`: what to solve on, what to show, how
-many unknowns it cost and what it moved, merged or lost. Statics and dynamics are those of
-`verify.xfem` for all of them, so that only the cut differs. Read it in this order:
+many unknowns it cost and what it moved, merged or lost. All of them use statics and dynamics of
+`verify.xfem`, so that only the cut differs. Read it in this order:
 
 what every method gives
     `cut_body`; here all of them by name

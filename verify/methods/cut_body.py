@@ -61,7 +61,7 @@ class CutBody:
     phantom : PhantomMesh
         The material: loads, supports and masses go here.
     resisting : PhantomMesh
-        What resists deformation: the same unknowns and cells as `phantom`, and its weights too,
+        The elastic body: the same unknowns and cells as `phantom`. The weights are the same too,
         except where a method lets copies of cells resist as if they were whole.
     conforming : Subdivision
         The body as a mesh that conforms to the realised cut, for output and comparison.
@@ -70,7 +70,7 @@ class CutBody:
         was moved).
     counts : Counts
     smallest_fraction : float
-        Smallest volume of a cell, or piece of a cell, over that of the cell as given.
+        Smallest volume of a cell, or piece of a cell, over the volume of the cell as given.
     changes : tuple of Change
     seconds : dict of str to float
         Wall time of the phases of the cut.
@@ -89,7 +89,7 @@ class CutBody:
     cell_number: Ints | None = None
 
     def material(self, given: Material) -> Material:
-        """Material of the cells of ``phantom.mesh``, from that of the cells as given."""
+        """Map the material of the cells as given to the cells of ``phantom.mesh``."""
         count = len(self.cell_origin)
         lam, mu = (
             value if np.ndim(value) == 0 else value[self.cell_origin]

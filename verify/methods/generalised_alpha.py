@@ -35,15 +35,15 @@ class _End(NamedTuple):
 class GeneralisedAlpha(NewtonIntegrator):
     """M a_α + f_visc + f_int = f_ext with a_α = (1 − α_m) a₁ + α_m a₀, forces alike with α_f.
 
-    Displacement and velocity are Newmark's. With ρ, the spectral radius at infinite frequency,
-    α_m = (2ρ − 1)/(ρ + 1), α_f = ρ/(ρ + 1), β = ¼ (1 − α_m + α_f)², γ = ½ − α_m + α_f.
+    Displacement and velocity are Newmark's. Let ρ be the spectral radius at infinite frequency.
+    Then α_m = (2ρ − 1)/(ρ + 1) and α_f = ρ/(ρ + 1); β = ¼ (1 − α_m + α_f)² and γ = ½ − α_m + α_f.
 
-    The acceleration is of the scheme, and not that which balances the forces of an instant. It is
-    kept from step to step. It is that of balance at the start, after a jump of the load, and where
-    state, load, damping or step have been changed in between; with damping of the stiffness, that
-    of balance as far as the step resolves it.
+    The scheme keeps its acceleration from step to step; it does not balance the forces of an
+    instant. It does so at the start, after a jump of the load, and where state, load, damping or
+    step have been changed in between. With damping of the stiffness, balance is limited to modes
+    that the step resolves.
 
-    Parameters are those of `NewtonIntegrator`, and
+    Parameters as for `NewtonIntegrator`, and
 
     spectral_radius : float
         ρ from 0 (three steps extinguish what they do not resolve) to 1 (dissipates nothing of
@@ -98,7 +98,7 @@ class GeneralisedAlpha(NewtonIntegrator):
             self.acceleration = self._balanced(before)
 
     def _goes_on(self, external: Floats) -> bool:
-        """Whether the step begins where the last one ended, under the same conditions."""
+        """Tell whether the step begins where the last one ended, under the same conditions."""
         end, start = self._last, self._start
         if (
             end is None
@@ -113,11 +113,11 @@ class GeneralisedAlpha(NewtonIntegrator):
         return bool(np.abs(external - end.external).max() <= _JUMP * largest)
 
     def _balanced(self, resistance: Resistance) -> Floats:
-        """Acceleration that balances the forces of the start; supports say their own.
+        """Compute the acceleration that balances the forces of the start; supports say their own.
 
-        With damping c of the stiffness a mode out of balance would start with c/m v, and
-        c Δt ≫ m throws it by Δt² c/m v. The matrix of the step stands for the mass then: the same
-        to O(Δt) where a mode is resolved, bounded by v/Δt where it is not.
+        With damping c of the stiffness a mode out of balance would start with c/m v. If c Δt ≫ m,
+        that throws it by Δt² c/m v. The matrix of the step then replaces the mass. In a resolved
+        mode both agree to O(Δt); in others the acceleration is bounded by v/Δt.
         """
         body, start, before = self.body, self._start, self._before
         held = np.zeros(body.shape)

@@ -1,23 +1,23 @@
 """Masses of others: lumpings of the thesis, and masses stabilised against slivers.
 
 **Lumpings of the thesis** (2.76–81) are diagonal in the shifted basis, where an enriched node has
-the unknowns u and a. Its own side moves with u and the other one with u ± a, so a kinetic energy
-½ m_u u̇² + ½ m_a ȧ² is, in side-wise unknowns,
+the unknowns u and a. Its own side moves with u and the other one with u ± a. The kinetic energy ½
+m_u u̇² + ½ m_a ȧ² is, in side-wise unknowns,
 
     ½ m_u v_own² + ½ m_a (v_other − v_own)²,
 
 a 2×2 block that couples the two sides of the cut. M_ua is taken as zero, as the thesis does,
 although its exact lumped value is not: that is why a separated piece gets a wrong inertia.
 
-**Stabilised masses** raise eigenvalues of the consistent mass of a cut cell.
-EVS (Eisenträger, Radtke, Garhuom, Löhnert, Düster, Juhre, Schillinger 2023, arXiv 2310.11935) adds
-a share of φφᵀ for each mode φ of a part's mass whose eigenvalue is nearly zero. GEVS (Bürchner,
-Radtke, Eisenträger, Düster, Rank, Kollmannsberger, Kopp 2025, arXiv 2509.07632) raises the mass in
-the modes of stiffness against mass until none is faster than the uncut cell. Both were proposed
-for finite cells of high order; here they act on the parts of linear cells, one component at a
-time, the gradient's energy in the place of the stiffness. For an isotropic material that bounds
-the step as the stiffness does, up to the same constant as in the uncut body. Pieces that share all
-dof nodes (`PhantomMesh.part`) are one part: what both papers call the element is their sum.
+**Stabilised masses** raise eigenvalues of the consistent mass of a cut cell. EVS adds a share of
+φφᵀ for each mode φ of a part's mass whose eigenvalue is nearly zero. GEVS raises the mass in the
+modes of stiffness against mass until none is faster than the uncut cell. Sources: Eisenträger,
+Radtke, Garhuom, Löhnert, Düster, Juhre, Schillinger 2023, arXiv 2310.11935; Bürchner, Radtke,
+Eisenträger, Düster, Rank, Kollmannsberger, Kopp 2025, arXiv 2509.07632. Both were proposed for
+finite cells of high order; here they act on the parts of linear cells, one component at a time, the
+gradient's energy in the place of the stiffness. For an isotropic material that bounds the step as
+the stiffness does, up to the same constant as in the uncut body. Pieces that share all dof nodes
+(`PhantomMesh.part`) are one part: their sum is the element of both papers.
 """
 
 from typing import Literal
@@ -43,7 +43,7 @@ ShiftedLumping = Literal["enrichment", "row sum", "weighted diagonal"]
 
 
 def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumping) -> Mass:
-    """Mass lumped in the shifted basis, in side-wise unknowns.
+    """Make the mass lumped in the shifted basis, in side-wise unknowns.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
     density : float or (m,) array_like
         In kg/m³.
     lumping : {"enrichment", "row sum", "weighted diagonal"}
-        (2.80–81) after Menouillard; (2.76–77); (2.78–79) with the printed Σ_j M_ij corrected to
-        Σ_j M_jj, and the mass of the second to that of the enrichment, Σ_ij M^aa_ij, so that
-        either keeps the total of the block that it lumps.
+        (2.80–81) after Menouillard; (2.76–77); (2.78–79) with the printed Σ_j M_ij corrected to Σ_j
+        M_jj, and the mass of the second to the mass of the enrichment, Σ_ij M^aa_ij. So each keeps
+        the total of the block that it lumps.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
 def _enriched_mass(
     phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumping, side_wise: Mass
 ) -> Floats:
-    """M^aa of the nodes with a second unknown, in the order of these unknowns."""
+    """Compute M^aa of the nodes with a second unknown, in the order of these unknowns."""
     nodes = len(phantom.mesh.points)
     if lumping == "enrichment":
         return side_wise.weights[nodes:]
@@ -120,11 +120,11 @@ def _enriched_mass(
 
 
 def eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
-    """Consistent mass plus ε_S m φφᵀ for the modes of each part below ε_λ m (EVS).
+    """Compute the consistent mass plus ε_S m φφᵀ for the modes of each part below ε_λ m (EVS).
 
     ε_S = ε_λ = 1e-3, as the paper recommends; m is the largest eigenvalue of the part's own mass,
-    so that both are without units. At that of the uncut cell the nodes of slivers would have mass
-    that nothing holds, and the lowest frequency of the body would go to zero. Mass is added.
+    so that both are without units. The eigenvalue of the uncut cell would give nodes of slivers
+    mass without stiffness, and the lowest frequency of the body would go to zero. Mass is added.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass
 def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     """Consistent mass plus (λ/λ_max − 1) Mφ(Mφ)ᵀ for the modes of each part with λ > λ_max (GEVS).
 
-    Kφ = λMφ with φᵀMφ = 1 and K the energy of the gradient; λ_max is that of the uncut cell. The
+    Kφ = λMφ with φᵀMφ = 1 and K the energy of the gradient; λ_max belongs to the uncut cell. The
     mass of each part stays, because a constant is orthogonal to these modes.
 
     Raises
@@ -169,7 +169,7 @@ def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayL
 
 
 def _split_parts(phantom: PhantomMesh) -> tuple[Ints, Floats]:
-    """First piece (q,) and moments (q, d + 1, d + 1) of each part of a split cell."""
+    """Find the first piece (q,) and moments (q, d + 1, d + 1) of each part of a split cell."""
     if phantom.aggregation is not None:
         raise XfemError("a stabilised mass of aggregated cells: they have no slivers left")
     split = np.flatnonzero(phantom.split)
@@ -188,9 +188,9 @@ def _raised(phantom: PhantomMesh, density: ArrayLike, first: Ints, added: Floats
 
 
 def _pencil(energy: Floats, moments: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues λ (p, k), ascending, and Mφ (p, i, k) of Kφ = λMφ.
+    """Compute the eigenvalues λ (p, k), ascending, and Mφ (p, i, k) of Kφ = λMφ.
 
-    Scaled to a unit diagonal, the moments of a sliver are as regular as those of a cell.
+    Scaled to a unit diagonal, the moments of a sliver are as regular as of a whole cell.
     """
     scale = np.sqrt(np.einsum("pii->pi", moments))
     try:

@@ -98,7 +98,7 @@ def bisect_cells(mesh: SimplexMesh, marked: NDArray[np.bool_]) -> tuple[SimplexM
 
 
 def _keys(cells: Ints, first: NDArray, second: NDArray) -> Ints:
-    """(q, e) each edge of the cells as one number."""
+    """Return each edge of the cells as one number, (q, e)."""
     low = np.minimum(cells[:, first], cells[:, second])
     high = np.maximum(cells[:, first], cells[:, second])
     return low << 32 | high
@@ -233,7 +233,7 @@ def _remove(
 
 
 def _touched(cut: PhantomMesh) -> Bools:
-    """(m,) cells of which no piece has all the volume."""
+    """Return the (m,) cells of which no piece has all the volume."""
     largest = np.zeros(len(cut.mesh.cells))
     np.maximum.at(largest, cut.parent, cut.fraction)
     return largest < 1.0 - _TOUCHED
@@ -265,7 +265,7 @@ def _debris(phantom: PhantomMesh, bodies: Ints, touched: Bools) -> Bools:
 
 
 def _without_hinges(phantom: PhantomMesh) -> tuple[Ints, Ints]:
-    """Cells (p, d + 1) joined across faces only, and the mesh node of each of their nodes."""
+    """Find cells (p, d + 1) joined across faces only, and the mesh node of each of their nodes."""
     corners = phantom.cells.shape[1]
     first, second = face_contacts(phantom)
     pair, a, b = np.nonzero(phantom.cells[first][:, :, None] == phantom.cells[second][:, None, :])

@@ -1,18 +1,18 @@
 """Meshes that conform to the cut: nodes move onto it, cells are split along it, or both.
 
 Snapping: Nienhuys & van der Stappen, *A surgery simulation supporting cuts and finite element
-deformation*, MICCAI 2001: faces of the mesh are chosen that follow the cut, their nodes are
-repositioned onto it, and the mesh is opened along them. Nodes move to their feet on the cut, inside
-the body or along its boundary. No cell shrinks below a given share of its volume, so none turns
-inside out; nodes leave neither the boundary of the body nor a cut onto which they were moved
-before. `NodalCut` then goes exactly through the chosen nodes.
+deformation*, MICCAI 2001. Faces of the mesh that follow the cut are chosen, their nodes are moved
+onto it, and the mesh is opened along them. Nodes move to their feet on the cut, inside the body or
+along its boundary. No cell shrinks below a given share of its volume, so none turns inside out;
+nodes leave neither the boundary of the body nor a cut onto which they were moved before. `NodalCut`
+then goes exactly through the chosen nodes.
 
-Subdivision, slivers and all: the template that splits a simplex by a plane, with the same diagonals
-on both sides of every quadrilateral face, is that of `verify.xfem.clip` (by ascending node number;
-nodes are numbered by their coordinates first, so that their numbers as given do not matter).
+Subdivision, slivers included: `verify.xfem.clip` has the template that splits a simplex by a plane,
+with the same diagonals on both sides of every quadrilateral face. It goes by ascending node number.
+Nodes are numbered by their coordinates first, so that their numbers as given do not matter.
 Bielser, Glardon, Teschner & Gross, *A state machine for real-time cutting of tetrahedral meshes*,
-Graphical Models 66 (2004); with snapping of near nodes before it: Nienhuys & van der Stappen 2001,
-Steinemann, Harders, Gross & Szekely, *Hybrid cutting of deformable solids*, IEEE VR 2006, and in
+Graphical Models 66 (2004). With snapping of near nodes before it: Nienhuys & van der Stappen 2001;
+Steinemann, Harders, Gross & Szekely, *Hybrid cutting of deformable solids*, IEEE VR 2006; and in
 the plane SOFA's incision of triangles.
 """
 
@@ -77,7 +77,7 @@ class NodalCut:
         return values
 
     def depth(self, points: Floats) -> Floats:
-        """Depth of the cut itself."""
+        """Compute the depth of the cut itself."""
         return self.cut.depth(points)
 
     def through(self, nodes: NDArray) -> "NodalCut":
@@ -93,7 +93,7 @@ class NodalCut:
 
 
 def _rows(points: Floats) -> NDArray:
-    """Each row as one item to compare, bit by bit."""
+    """Return each row as one item to compare, bit by bit."""
     rows = np.ascontiguousarray(points + 0.0)  # no negative zeros
     return rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
 
@@ -115,14 +115,14 @@ class CrossedEdges:
     share: Floats
 
     def nearest_ends(self, threshold: float) -> Ints:
-        """Nodes nearer to a crossing than `threshold` of its edge; half: one for each edge."""
+        """Find nodes nearer to a crossing than `threshold` of its edge; half: one for each edge."""
         near_plus = self.share <= threshold
         near_minus = (1.0 - self.share <= threshold) & ~near_plus
         return np.unique(np.concatenate([self.plus[near_plus], self.minus[near_minus]]))
 
 
 def crossed_edges(mesh: SimplexMesh, cut: NodalCut) -> CrossedEdges:
-    """Edges with ends strictly on both sides that the cut crosses."""
+    """Find edges with ends strictly on both sides that the cut crosses."""
     first, second = np.triu_indices(mesh.dim + 1, 1)
     sign = np.sign(cut.values)
     a, b = mesh.cells[:, first].ravel(), mesh.cells[:, second].ravel()
@@ -171,7 +171,7 @@ def free_directions(mesh: SimplexMesh, nodes: Ints) -> Floats:
 def feet_on_cut(
     cut: Cut, points: Floats, size: Floats, directions: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Nearest points of a cut, in the directions allowed, and whether there is one.
+    """Find nearest points of a cut, in the directions allowed, and whether there is one.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def feet_on_cut(
 
 
 def _gradient(cut: Cut, points: Floats, step: Floats) -> Floats:
-    """Central differences (k, d) of the level set: of length one, or nearly."""
+    """Compute central differences (k, d) of the level set: of length one, or nearly."""
     columns = []
     for axis in range(points.shape[1]):
         ahead, behind = points.copy(), points.copy()
@@ -307,7 +307,7 @@ def take_near_nodes(snapped: SnappedMesh, threshold: float) -> SnappedMesh:
 def _bearable_shares(
     mesh: SimplexMesh, points: Floats, goal: Floats, quality: float, all_or_none: bool
 ) -> Floats:
-    """(n,) share of the way that each node can go, so that all cells keep their quality."""
+    """Return (n,) share of the way that each node can go, so that all cells keep their quality."""
     before = _signed(mesh, mesh.points)
     share = np.ones(len(points))
     floor = 1.0 if all_or_none else 0.5**_HALVINGS
@@ -328,7 +328,7 @@ def _signed(mesh: SimplexMesh, points: Floats) -> Floats:
 
 
 def _node_sizes(mesh: SimplexMesh) -> Floats:
-    """(n,) longest edge at each node, in metres."""
+    """Return the (n,) longest edge at each node, in metres."""
     first, second = np.triu_indices(mesh.dim + 1, 1)
     ends = mesh.cells[:, first], mesh.cells[:, second]
     length = np.linalg.norm(mesh.points[ends[0]] - mesh.points[ends[1]], axis=2)
@@ -359,8 +359,9 @@ def snapping(mesh: SimplexMesh, cuts: Sequence[Cut], quality: float = 0.2) -> Cu
     cuts : sequence of Cut
         An end inside an element goes back to the edges that are crossed before it.
     quality : float
-        A node goes only as far as every cell keeps this share of its volume. Where it cannot reach
-        the cut, the cut goes through the node: reported as "taken as on it", with the distance.
+        A node moves until a cell around it would keep less than this share of its volume. Where it
+        cannot reach the cut, the cut goes through the node: reported as "taken as on it", with the
+        distance.
     """
     start = perf_counter()
     snapped = take_near_nodes(snap_nodes(mesh, cuts, 0.5, quality), 0.5)
@@ -460,7 +461,7 @@ def _split(
 
 
 def _by_place(snapped: SnappedMesh) -> tuple[SimplexMesh, list[NodalCut]]:
-    """Nodes numbered by their coordinates: the template's diagonals follow node numbers."""
+    """Find nodes numbered by their coordinates: the template's diagonals follow node numbers."""
     order = np.lexsort(snapped.mesh.points.T)
     number = np.empty_like(order)
     number[order] = np.arange(len(order))

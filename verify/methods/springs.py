@@ -3,10 +3,10 @@
 The stiffness comes from Young's modulus and Poisson's ratio:
 
 "fitted"
-    The springs of each cell are chosen so that their linear stiffness is nearest to that of the
-    finite element, in the Frobenius norm (Lloyd, Székely & Harders, *Identification of spring
-    parameters for deformable object simulation*, IEEE TVCG 13 (2007)). For equilateral triangles
-    it gives their E√3/4 (plane stress, ν = 1/3), for regular tetrahedra their 2√2/25·E l (ν = 1/4).
+    The linear stiffness of the springs of each cell is nearest to the finite element's in the
+    Frobenius norm. Source: Lloyd, Székely & Harders, *Identification of spring parameters for
+    deformable object simulation*, IEEE TVCG 13 (2007). For equilateral triangles it gives their
+    E√3/4 (plane stress, ν = 1/3), for regular tetrahedra their 2√2/25·E l (ν = 1/4).
 "van_gelder"
     k = Σ over cells of E V / l² (Van Gelder, *Approximate simulation of elastic membranes by
     triangulated spring meshes*, J. Graphics Tools 3 (1998)), V the area or volume of the cell.
@@ -34,14 +34,14 @@ Fit = Literal["fitted", "van_gelder"]
 
 
 def cell_edges(dim: int) -> NDArray[np.int64]:
-    """(e, 2) local nodes of the edges of a simplex."""
+    """Return the (e, 2) local nodes of the edges of a simplex."""
     return np.stack(np.triu_indices(dim + 1, 1), axis=1)
 
 
 def spring_stiffness(
     mesh: SimplexMesh, material: Material, fit: Fit = "fitted"
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Stiffness of the springs of each cell alone, in N/m (per metre of thickness in 2D).
+    """Make the stiffness of the springs of each cell alone, in N/m (per metre of thickness in 2D).
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def spring_stiffness(
 
 
 def _non_negative(gram: Floats, target: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Least squares with the worst negative unknown left out, until none is negative."""
+    """Compute least squares with the worst negative unknown left out, until none is negative."""
     count, size = target.shape
     clamped = np.zeros((count, size), dtype=bool)
     eye = np.eye(size, dtype=bool)
@@ -207,18 +207,18 @@ class Stretched(NamedTuple):
 
 
 class SpringForce(InternalForce):
-    """Internal force of springs, in the place of that of finite elements.
+    """Internal force of springs, in the place of finite elements.
 
-    It serves the statics at large rotations and the time integrators of `verify.xfem`, but not
-    those that integrate the stress along a step (`EnergyMomentum`) or keep kernels of their own
-    (`RealTimeEuler`). Masses are the side-wise lumped ones.
+    It serves the statics at large rotations and the time integrators of `verify.xfem`. Exceptions
+    are integrators of the stress along a step (`EnergyMomentum`) or with kernels of their own
+    (`RealTimeEuler`). Masses are lumped side-wise.
 
     Parameters
     ----------
     phantom : PhantomMesh
         Pieces of cells have springs on all edges of their cell, weaker by their share of it.
     material : Material
-        Fitted by the springs as far as springs can; see `verify.methods.springs`.
+        Approximated by the springs; see `verify.methods.springs`.
     kinematics : {"corotational", "linear"}
         Springs that turn (½k(l − l0)², any rotation), or that keep their directions.
     fit : {"fitted", "van_gelder"}
@@ -265,7 +265,7 @@ class SpringForce(InternalForce):
         return False
 
     def configuration(self, displacement: Floats) -> Any:
-        """Springs at a displacement (N, d), with their force and energy."""
+        """Return springs at a displacement (N, d), with their force and energy."""
         if displacement.shape != self._shape:
             raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
         directions, excess = self._directions.copy(), np.zeros(self.springs.shape)

@@ -1,11 +1,12 @@
 """Ends of cuts inside elements of the plane: each becomes a node of the mesh.
 
-Left to the rule of the thesis an element in which a cut ends stays whole, and the cut is as much
-shorter. Here the element is divided into three at the end of the cut, or into two together with
-its neighbour if the end is near an edge; if it is near a node, the cut ends there. Behind its end
-the cut goes through one of these parts and stops at their common node. So the jump falls linearly
-from the nodes of the edge by which the cut comes in to zero at its end: the partially cut element
-of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a node.
+By the rule of the thesis an element in which a cut ends stays whole, and the cut is as much
+shorter. Here the element is divided into three at the end of the cut. If the end is near an edge,
+it is divided into two together with its neighbour; if near a node, the cut ends there. Behind its
+end the cut goes through one of these parts and stops at their common node. So the jump falls
+linearly from the nodes of the edge by which the cut comes in to zero at its end: the partially cut
+element of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a
+node.
 
 `verify.methods.snapping` needs the first of these divisions alone: `add_tip_points`.
 """
@@ -54,14 +55,14 @@ class EndingCut:
     levels: Floats
 
     def level_set(self, points: Floats) -> Floats:
-        """Level set of the cut, as stated at the new nodes."""
+        """Compute the level set of the cut, as stated at the new nodes."""
         found = np.array(self.cut.level_set(points), dtype=float)
         for place, level in zip(self.others, self.levels, strict=True):
             found[(points == place).all(axis=1)] = level
         return self._zero_at_ends(found, points)
 
     def depth(self, points: Floats) -> Floats:
-        """Depth of the cut, zero at its ends."""
+        """Compute the depth of the cut, zero at its ends."""
         return self._zero_at_ends(np.array(self.cut.depth(points), dtype=float), points)
 
     def _zero_at_ends(self, values: Floats, points: Floats) -> Floats:
@@ -108,9 +109,9 @@ class _Chord(NamedTuple):
 def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     """Make the ends of cuts inside elements nodes of the mesh.
 
-    The node is at the end if that leaves each part at least 0.15 of its element, else at a place
-    beside it that does, and rather ahead of the end than behind it. Ends on other cuts, and those
-    for which only the outline of the body has a place, stay as they are.
+    The node is at the end if that leaves each part at least 0.15 of its element. Else it is at a
+    place beside it that does, and rather ahead of the end than behind it. Ends on other cuts stay
+    as they are, and so do ends for which only the outline of the body has a place.
 
     Parameters
     ----------
@@ -206,7 +207,7 @@ class _Division:
         return SimplexMesh(points, np.concatenate([self._cells, *self._more]))
 
     def interpolated(self, values: Floats) -> Floats:
-        """Values (n, c) at the nodes as (k, c) at the new ones, linear in the divided cells."""
+        """Return values (n, c) at nodes as (k, c) at the new ones, linear in the divided cells."""
         found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
         return np.array(found).reshape(len(found), values.shape[1])
 
@@ -249,7 +250,7 @@ class _Division:
         return self._places[-1]
 
     def _joins(self, chord: _Chord, cells: list[int], met: Bools) -> bool:
-        """Whether the cut is in some of the cells otherwise than on its way to its end."""
+        """Tell whether the cut is in some of the cells otherwise than on its way to its end."""
         before = int(self._mesh.neighbours[chord.cell, chord.entry.argmin()])
         others = {cell for cell in cells if met[cell]} - {chord.cell}
         waiting = [before] if before in others else []
@@ -259,7 +260,7 @@ class _Division:
         return bool(others)
 
     def _around(self, cell: int, at: Floats) -> list[int] | None:
-        """Cells around a place in a cell; None on the outline of the body."""
+        """Find cells around a place in a cell; None on the outline of the body."""
         mesh = self._mesh
         match int((at > 0.0).sum()):
             case 1:
@@ -275,12 +276,12 @@ class _Division:
 
 
 def _parts(cell: Ints, replaced: Ints, node: int) -> Ints:
-    """Parts (k, 3) of a triangle, in each of which a new node takes the place of a corner (k,)."""
+    """Find parts (k, 3) of a triangle, in each of which a new node takes place of a corner (k,)."""
     return np.where(cell == replaced[:, None], node, cell)
 
 
 def _places(chord: _Chord, corners: Floats) -> Iterator[Floats]:
-    """Barycentric coordinates of places in an element at which a cut may end."""
+    """Compute barycentric coordinates of places in an element at which a cut may end."""
     way = chord.exit - chord.entry
     # of the way through the element, where all parts are large enough
     low, high = 0.0, 1.0

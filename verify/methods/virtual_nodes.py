@@ -5,8 +5,8 @@ SIGGRAPH 2004: a cut cell is copied once for each of its parts that contains a n
 copy outside its part are virtual. Sifakis, Der & Fedkiw, *Arbitrary cutting of deformable
 tetrahedralized objects*, SCA 2007: a copy for every part, whether it contains a node or not.
 
-With copies that resist by their share of the material, the second is the space of XFEM in
-side-wise unknowns (Hansbo & Hansbo 2004), and so is the first as long as every part has a node.
+Copies may resist by their share of the material. Then the second is the space of XFEM in side-wise
+unknowns (Hansbo & Hansbo 2004). So is the first if every part has a node.
 """
 
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ def virtual_node_arbitrary(
 ) -> CutBody:
     """Copy a cell once for each of its parts.
 
-    Parameters are those of `virtual_node`.
+    Parameters as for `virtual_node`.
     """
     start = perf_counter()
     return _body(mesh, cut_so_far(mesh, cuts, tip, opened), weights, [], start)

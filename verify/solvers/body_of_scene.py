@@ -117,7 +117,7 @@ def volumetric_mass(scene: Scene, points: NDArray[np.float64]) -> Any:
 
 
 def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
-    """Young's modulus, Poisson's ratio and density: numbers, or arrays (n,) at points."""
+    """Compute Young's modulus, Poisson's ratio and density: numbers, or arrays (n,) at points."""
     material = scene.material
     if material.is_uniform:
         return material.young, material.poisson, material.density
@@ -126,7 +126,7 @@ def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
 
 @contextmanager
 def errors_of_scene(scene: Scene) -> Iterator[None]:
-    """Turn errors of the library into those of a scene: `InputError`."""
+    """Turn errors of the library into `InputError` of a scene."""
     try:
         yield
     except XfemError as error:
@@ -236,7 +236,7 @@ class Opened:
 class Openings:
     """The cuts of a moving scene in the order in which they open.
 
-    What is cut further keeps what is cut already: those that open first come first.
+    A body that is cut further keeps its cuts: cuts that open first come first.
 
     Attributes
     ----------
@@ -340,7 +340,7 @@ def openings_of(scene: Scene, size: float, rule: str) -> Openings:
 
 
 def sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
-    """Sections of cells by the zero level of a cut, with the shape functions of their nodes."""
+    """Compute sections of cells by zero level of a cut, with the shape functions of their nodes."""
     nodes = phantom.mesh.cells[cells]
     value = phantom.level_sets[nodes, k]
     corners = nodes.shape[1]

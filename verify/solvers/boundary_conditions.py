@@ -79,7 +79,7 @@ class Boundary:
         return places
 
     def loaded(self, scene: Scene, where: str, key: str) -> Pieces:
-        """Pieces of the facets that lie on the part `where` of a scene, on which a load acts.
+        """Find pieces of the facets that lie on the part `where` of a scene, on which a load acts.
 
         Raises
         ------
@@ -92,7 +92,7 @@ class Boundary:
         return pieces
 
     def held(self, scene: Scene, where: str, key: str) -> tuple[_Ints, HeldFacets]:
-        """Nodes (h,) that a support on the part `where` holds, ascending, and by which facets.
+        """Find nodes (h,) that a support on the part `where` holds, ascending, and by which facets.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class Boundary:
 
 
 def no_facet(scene: Scene, where: str, key: str) -> InputError:
-    """Error of a load on a part of no area."""
+    """Compute the error of a load on a part of no area."""
     return InputError(f"{key}: no boundary facet lies in '{where}'", str(scene.file or ""))
 
 
@@ -150,7 +150,7 @@ class ForceDensity:
     time: float = 0.0
 
     def uniform(self, centroids: _Floats) -> _Floats | None:
-        """Value (d,) that holds everywhere, or values (m, d) by cell; None if neither does.
+        """Compute value (d,) that holds everywhere, or values (m, d) by cell; None if neither does.
 
         Only the weight differs by cell, where materials do: by that at the centroids (m, d).
         """
@@ -163,7 +163,7 @@ class ForceDensity:
     def at(
         self, points: _Floats, near: _Floats | None = None, normals: _Floats | None = None
     ) -> _Floats:
-        """Values (q, d) at points (q, d).
+        """Return values (q, d) at points (q, d).
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ def loads_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> _Floats:
 
 
 def is_moving(load: Load, exact: Any) -> bool:
-    """Whether a load is another field at every time, apart from the factor of its history."""
+    """Tell whether a load is another field at every time, apart from the factor of its history."""
     if isinstance(load, Gravity):
         return False
     return bool(load.timed or (load.exact and exact.moves))
@@ -202,8 +202,7 @@ def is_moving(load: Load, exact: Any) -> bool:
 def forces_of(scene: Scene, i: int, phantom: PhantomMesh, exact: Any, time: float = 0.0) -> _Floats:
     """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N.
 
-    Those of a membrane are times its thickness: forces per volume and per area stay what they
-    are.
+    Forces of a membrane are times its thickness: per volume and per area they stay the same.
     """
     entry = scene.loads[i]
     if isinstance(entry, CutFaces):
@@ -221,7 +220,7 @@ def forces_of(scene: Scene, i: int, phantom: PhantomMesh, exact: Any, time: floa
 
 
 def _traction(phantom: PhantomMesh, density: ForceDensity, key: str) -> _Floats:
-    """Nodal forces (N, d); those of an exact field by facets of one direction after the other."""
+    """Sum nodal forces (N, d); an exact field acts on facets of one direction at a time."""
     load, mesh = density.load, phantom.mesh
     assert isinstance(load, Traction)
     boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
@@ -259,7 +258,7 @@ def _of_points(density: ForceDensity, normal: _Floats | None = None) -> Any:
 
 
 def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Floats:
-    """Nodal forces (N, d) of load i, on the faces of a cut as realised, N (per metre in 2D).
+    """Compute nodal forces (N, d) of load i, on faces of a cut as realised, N (per metre in 2D).
 
     The faces are facets of the conforming sub-division on which the field is linear, so that the
     forces are the exact work of the load. A cut that is still closed in a motion bears none.
@@ -296,7 +295,7 @@ def _face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Fl
 
 
 def _faces(body: Subdivision) -> Boundary:
-    """Facets that lie on another one."""
+    """Find facets that lie on another one."""
     facets = np.indices(body.cells.shape).reshape(2, -1).T
     alone = facets[_times(Boundary(body.points, body.cells, facets).corners) == 1]
     _, place = np.unique(body.points, axis=0, return_inverse=True)
@@ -305,7 +304,7 @@ def _faces(body: Subdivision) -> Boundary:
 
 
 def _times(rows: _Ints) -> _Ints:
-    """How often (n,) each row of (n, k) numbers occurs, in whatever order its numbers are."""
+    """Tell how often (n,) each row of (n, k) numbers occurs, in whatever order its numbers are."""
     rows = np.sort(rows, axis=1)
     _, which, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
     return np.asarray(count[which.ravel()])
@@ -333,7 +332,7 @@ def supports_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> Supports:
 
 
 def path_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable[[float], Supports]:
-    """Supports at a share of the path to equilibrium: of displacements and angles.
+    """Return supports at a share of the path to equilibrium: of displacements and angles.
 
     At its end they have the first factor of their history, which is 1 in a static scene.
     """
@@ -348,7 +347,7 @@ def path_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable
 
 
 def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Supports | MovingSupports:
-    """Supports of a dynamic scene: moving ones if one changes in time."""
+    """Return supports of a dynamic scene: moving ones if one changes in time."""
     held = _held(scene, phantom, exact)
     fixed, values = _filled(phantom, held, [one.values(1.0) for one in held])
     if not any(one.moves for one in held):
@@ -374,7 +373,7 @@ def _filled(
 
 
 def support_ends(scene: Scene, phantom: PhantomMesh, size: float) -> list[Regularisation]:
-    """Report where supports hold more than their parts; `size` is that of the elements, m."""
+    """Report where supports hold more than their parts; `size` is the element size, m."""
     parts = _boundary_parts(phantom)
     ended = [s.where for s in scene.supports if not scene.geometry.holds_inside(s.where)]
     return shifted_ends([_held_parts(scene, where, parts) for where in ended], size)
@@ -384,8 +383,8 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     """Find what each support holds.
 
     A facet that a cut crosses is held on each side for itself, by the unknowns that move that side.
-    So a part may end at a cut, and a cut close to a support frees what is behind it. Where a part
-    is a mere point or line, it holds the unknowns whose material reaches there.
+    So a part may end at a cut, and a cut close to a support frees the material behind it. Where a
+    part is a mere point or line, it holds the unknowns whose material reaches there.
     """
     mesh, parts, corners = phantom.mesh, _boundary_parts(phantom), _own_corners(phantom)
     own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.boundary.nodes))
@@ -469,7 +468,7 @@ def _boundary_parts(phantom: PhantomMesh) -> _BoundaryParts:
 
 
 def _own_corners(phantom: PhantomMesh) -> NDArray[np.bool_]:
-    """(N,) whether the node of an unknown lies in the material that the unknown moves.
+    """Tell whether the node of an unknown (N,) lies in the material that the unknown moves.
 
     Behind a cut it does not: the unknown belongs to a node that is beyond.
     """

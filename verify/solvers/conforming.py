@@ -27,9 +27,9 @@ from verify.system import System
 # Spectral radii of the reference in linear motion: what jumps excites waves that no mesh resolves.
 # The trapezoidal rule keeps them, turned about with every step. ½ leaves a thousandth in ten steps.
 _RADIUS = 0.5
-# Behind a blade every facet jumps, and what is left to the mesh is damped at once. Factors weigh
-# short waves most: ½ leaves 5, 0.7 and 0.02 % of K at 4, 8 and 16 steps from a jump, no power of
-# the step; 0 leaves 1.8, 0.34 and 0.07 %, the second order.
+# Behind a blade every facet jumps, and waves of the mesh are damped at once. Factors weigh short
+# waves most: ½ leaves 5, 0.7 and 0.02 % of K at 4, 8 and 16 steps from a jump, no power of the
+# step; 0 leaves 1.8, 0.34 and 0.07 %, the second order.
 _RADIUS_OF_JUMPS = 0.0
 
 import_dolfinx()  # fail here, by name, and not in the middle of a solve
@@ -135,13 +135,13 @@ class ConformingSolver:
 class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
 
-    Quadratic elements of linear kinematics, and in the plane those of statics at finite rotation,
-    have a pressure of their own from Poisson's ratio 0.45 on, so that they do not lock.
+    Quadratic elements have a pressure of their own from Poisson's ratio 0.45 on, so that they do
+    not lock. This holds in linear kinematics, and in the plane for statics at finite rotation.
 
-    A motion is integrated by generalised-α, at finite rotation by the energy–momentum scheme, with
-    the time step of the scene's reference or analysis on level 0, or what outputs, openings and
-    jumps leave of it; every level halves each step with the elements, so that what the levels say
-    of their error is said of both.
+    A motion is integrated by generalised-α, at finite rotation by the energy–momentum scheme. Level
+    0 has the time step of the scene's reference or analysis; outputs, openings and jumps may divide
+    it. Every level halves each step with the elements, so that the difference of levels shows both
+    errors.
 
     A reference is timed once, whatever `repetitions` says: it judges and does not compete.
     """

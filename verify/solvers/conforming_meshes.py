@@ -58,7 +58,7 @@ def structure(scene: Scene, level: int) -> tuple[Counts, float]:
 
 
 def not_imprinted(scene: Scene) -> str | None:
-    """Why the cuts cannot be imprinted on a given mesh, or None if they can."""
+    """Say why the cuts cannot be imprinted on a given mesh, or None if they can."""
     for cut in scene.final_cuts:
         if not cut.faceted:
             return f"a {cut.kind} cut is not plane in parts: it is not imprinted on a given mesh"
@@ -82,7 +82,7 @@ def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
 
 
 def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
-    """Make a level of the reference and give its size far from what is singular, m.
+    """Make a level of the reference and give its size far from singular places, m.
 
     A given mesh is refined uniformly after the cuts are imprinted, and edges split where supports
     and tractions end; so is the scene's own where the cut is what another solver realised on it.
@@ -126,10 +126,10 @@ def _solid_grading(scene: Scene) -> Grading:
 
 
 def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
-    """Fronts at which the scene asks for factors, each with the radius that elements must fit.
+    """Find fronts at which the scene asks for factors, each with the radius that elements must fit.
 
-    That of the smallest domain, unless a hat along the front would lie between their nodes: it is
-    two spacings wide, of which a quarter is left for nodes that are not evenly spaced.
+    The spacing of the smallest domain, unless a hat along the front would lie between their nodes.
+    A hat is two spacings wide, of which a quarter is left for nodes that are not evenly spaced.
     """
     asked = [q for q in scene.quantities if isinstance(q, FractureQuantity) and q.point is not None]
     found = [front_at(scene, one) for one in asked]
@@ -141,7 +141,7 @@ def _asked_fronts(scene: Scene) -> list[tuple[Front, float]]:
 
 
 def _way(scene: Scene, size: float) -> float | None:
-    """Size of elements along what a blade cuts on its way, m; None if none does."""
+    """Compute the size of elements along what a blade cuts on its way, m; None if none does."""
     on_its_way = any(cut.on_the_way for cut in scene.cuts)
     return size * _WAY[scene.dimension] if on_its_way else None
 
@@ -195,7 +195,7 @@ def _imprinted(scene: Scene, level: int) -> tuple[Array, Cells, Cells]:
 
 
 def _polygons(cut: Cut) -> list[Array]:
-    """Plane parts of a cut in space."""
+    """Return plane parts of a cut in space."""
     if isinstance(cut, PolygonCut):
         return [np.array(cut.points, dtype=float)]
     assert isinstance(cut, SweptCut)

@@ -212,7 +212,7 @@ class TiedMotion:
         with self.record.timed("loading"):
             taken = np.zeros_like(state.velocity)
             taken[body.held] = body.prescribed(state.time)[1] - state.velocity[body.held]
-            if taken.any():  # without an impulse on what is free
+            if taken.any():  # without an impulse on free nodes
                 taken += body.accelerations(-(body.mass @ taken))
                 state.velocity = state.velocity + taken
             self.ledger.started(body, state)
@@ -222,8 +222,8 @@ class TiedMotion:
     def put_out(self) -> None:
         """Keep the state, with the acceleration that balances its forces.
 
-        Where accelerations and forces are those of the same share of a step, it has it already:
-        what is in balance at the start of a step is at its end.
+        Where a scheme takes accelerations and forces at the same share of a step, it has it
+        already: balance at the start of a step gives balance at its end.
         """
         found = self.state.copy()
         linear = self.scene.analysis.kinematics == "linear"
@@ -286,7 +286,7 @@ class TiedMotion:
         return True
 
     def _release(self, due: NDArray[np.bool_], time: float) -> None:
-        """Untie what is due, and hold what is let go as it was held until now."""
+        """Untie the nodes that are due, and hold them by their tie forces of before."""
         body, shares = self.body, self.opening.shares
         assert shares is not None
         before, acceleration = body.ties.leader, body.accelerations(self._unbalanced(self._later))
@@ -324,7 +324,7 @@ class TiedMotion:
         return State(u, v, np.zeros_like(u), 0.0)
 
     def _equilibrium(self) -> Array:
-        """Displacement at which the body is at rest with what is closed, which must hold it."""
+        """Find the equilibrium of the body with the closed part of its cuts, which must hold it."""
         before = self.space
         if self.closed.any():
             mesh = partly_opened(self.space.mesh, ~self.closed.any(axis=1))

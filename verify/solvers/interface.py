@@ -1,7 +1,7 @@
 """The interface that every solver implements, and how a solver is found by its name.
 
 A name may bring parameters, ``xfem tip=partial mass=consistent``: a solver of its own, with rows
-and verdicts beside those of ``xfem``.
+and verdicts beside ``xfem``.
 """
 
 import json
@@ -63,7 +63,7 @@ class Solver(Protocol):
     name: str
 
     def refuses(self, scene: Scene) -> str | None:
-        """Why this solver cannot do `scene`, in one sentence, or None if it can."""
+        """Say why this solver cannot do `scene`, in one sentence, or None if it can."""
         ...
 
     def levels(self, scene: Scene) -> int:
@@ -131,12 +131,12 @@ def checked_levels(answer: Any) -> int:
 
 
 def is_built_in(name: str) -> bool:
-    """Whether the solver called `name`, with parameters or without, comes with the project."""
+    """Tell whether the solver called `name`, with parameters or without, comes with the project."""
     return solver_in(name) in _BUILT_IN
 
 
 def is_installed(name: str) -> bool:
-    """Whether what a solver of the project needs is there; of another solver nothing is known."""
+    """Tell whether what a solver of project needs is there; of another solver nothing is known."""
     solver = solver_in(name)
     needed = _WITHOUT.get(solver, "numba" if solver in _BUILT_IN else "sys")
     return find_spec(needed) is not None
@@ -230,7 +230,7 @@ def _loading(name: str) -> Iterator[None]:
 
 
 def _place(error: BaseException) -> str:
-    """File and line at which something raised, of what lies outside this file."""
+    """Find the file and line, outside this file, at which something raised."""
     if isinstance(error, SyntaxError):
         return f" ({error.filename}:{error.lineno})"
     frames = extract_tb(error.__traceback__)
@@ -266,8 +266,7 @@ def check_choices(
             raise InputError(f"{name}.{word} = '{given[word]}'; {expected}")
 
 
-#
-# Such a name is a solver of its own, with rows and verdicts beside those of ``xfem``.
+# Such a name is a solver of its own, with rows and verdicts beside ``xfem``.
 
 
 def one_name(asked: str) -> str:
@@ -306,7 +305,7 @@ def name_with(solver: str, parameters: Mapping[str, Any]) -> str:
 
 
 def parameters_of(name: str, given: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Return those in a name, over what is `given` to its solver under the solver's own name."""
+    """Return the parameters in a name, over those `given` under the solver's own name."""
     return {**given.get(solver_in(name), {}), **parameters_in(name)}
 
 

@@ -118,7 +118,7 @@ class MethodOpening:
         return self._opened.events()
 
     def at(self, time: float, passed: bool = False) -> PhantomMesh:
-        """Return the body as far as it is open at a time, or as far as blades have passed it."""
+        """Return the body with the cuts that are open at a time, or that blades have passed."""
         if self._seams is not None:
             closed = ~self._opened.until(time, passed)
             if not closed.any():
@@ -142,7 +142,7 @@ class MethodOpening:
         return MotionState(state.displacement[source], state.velocity[source], state.time)
 
     def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
-        """Dof node (N,) of an old body from which each of a new one comes, cell by cell."""
+        """Find dof node (N,) of an old body from which each of a new one comes, cell by cell."""
         if old is new:
             return np.arange(new.node_count)
         if self._seams is None and self._bodies[id(new)].cell_number is None:
@@ -183,11 +183,11 @@ class MethodOpening:
         return cut[parent]
 
     def regularisations(self) -> list[Regularisation]:
-        """Return nothing: what a method changed is said by its body."""
+        """Return nothing: the body of a method lists its changes."""
         return []
 
     def _made(self, time: float, passed: bool = False) -> CutBody:
-        """Make the body that the method cuts as far as the cuts have come at a time."""
+        """Make the body that the method cuts by the cuts as they are at a time."""
         given = (self.mesh, self.openings.cuts)
         if self._method in (*_WELDED, "uncut"):
             return METHODS[self._method](*given, **self._parameters)
@@ -221,7 +221,7 @@ class MethodSolver:
     opening : {"late", "swept"}
         Dynamics: as of the solver ``xfem``; cells that are removed are so late.
     further parameters
-        Those of the method, in `verify.methods`.
+        Parameters of the method, in `verify.methods`.
     """
 
     choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES, "opening": OPENINGS}
@@ -233,7 +233,7 @@ class MethodSolver:
 
     @property
     def parameters(self) -> Collection[str]:
-        """Names of those of the method, beside those that `solve` names."""
+        """List the parameters of the method, beside the ones that `solve` names."""
         return _parameters_of(self._method)
 
     @property
@@ -403,7 +403,7 @@ class MassSpringSolver(MethodSolver):
 
     @property
     def parameters(self) -> Collection[str]:
-        """Names of those of `MethodSolver` and of all methods, of which one cuts."""
+        """List the parameters of `MethodSolver` and of all methods, of which one cuts."""
         common = list(signature(MethodSolver.solve).parameters)[4:-1]
         return {*common, *(name for method in METHODS for name in _parameters_of(method))}
 
@@ -438,6 +438,6 @@ class MassSpringSolver(MethodSolver):
 
 
 def _parameters_of(method: str) -> list[str]:
-    """Names of the parameters of a method after mesh and cuts."""
+    """Find names of the parameters of a method after mesh and cuts."""
     _, _, *offered = signature(METHODS[method]).parameters.values()
     return [one.name for one in offered if one.kind is not one.KEYWORD_ONLY]

@@ -104,9 +104,9 @@ class StagedLedger(LedgerRows):
     ) -> None:
         """Enter the energy that is lost where a body that is cut further takes over a state.
 
-        Nothing without a sliver policy and with masses of one part each. What a policy loses by
-        its projection has an entry of its own, and what EVS and GEVS gain or lose with it.
-        What is removed takes its energy and its mass with it.
+        Nothing without a sliver policy and with masses of one part each. Energy that a policy loses
+        by its projection has an entry of its own, with the gain or loss of EVS and GEVS. Removed
+        material takes its energy and its mass with it.
         """
         before, after = (
             float(BalanceRecorder(*of).close().mechanical[0])
@@ -121,7 +121,7 @@ class StagedLedger(LedgerRows):
             self._projection += before - after
 
     def columns(self) -> dict[str, _Floats]:
-        """All entries (t,) by name; with the share of a ghost penalty in the strain energy."""
+        """Return all entries (t,) by name; with share of a ghost penalty in the strain energy."""
         penalty = {"penalty": np.array(self._penalty)} if any(self._penalty) else {}
         return super().columns() | penalty
 
@@ -157,7 +157,7 @@ class OpeningBody(Protocol):
         """Return the times at which something opens, s; asked for once, before all else."""
 
     def at(self, time: float, passed: bool = False) -> PhantomMesh:
-        """Cut the body as far as it is open at a time, in s, or as far as blades have passed it."""
+        """Cut the body by the cuts that are open at a time, in s, or that blades have passed."""
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a body that `at` has returned."""
@@ -166,7 +166,7 @@ class OpeningBody(Protocol):
         """Hand a state on to the body that is cut further."""
 
     def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
-        """Corner of an old body from which each corner of one that is cut further comes."""
+        """Find corner of an old body from which each corner of one that is cut further comes."""
 
     def fading(self, new: PhantomMesh) -> Fade | None:
         """Factors of the forces that hold released nodes of a body; None: all is let go at once."""
@@ -285,7 +285,7 @@ class CutMotion:
         return self._largest
 
     def open(self, time: float) -> bool:
-        """Cut the body as far as the cuts have come at a time, and hand the state on."""
+        """Cut the body by the cuts as they are at a time, and carry the state over."""
         before, self._entered = self._entered, time + self.timeline.close
         if not np.any((self._events > before) & (self._events <= self._entered)):
             return False
@@ -424,7 +424,7 @@ class CutMotion:
         }
 
     def _mass(self, phantom: PhantomMesh) -> str | csr_array:
-        """Mass of the corners of the body with all its cuts."""
+        """Make the mass of the corners of the body with all its cuts."""
         if self.opening.mass == CONSISTENT:
             return CONSISTENT
         _, mass = self.opening.inertia(phantom)

@@ -33,7 +33,7 @@ class Record:
         Wall seconds of each phase.
     iterations : dict of str to int
     regularisations : list of Regularisation
-        Those of nothing (a count of 0) are left out.
+        Entries with a count of 0 are left out.
     notes : dict of str to str
     """
 
@@ -44,7 +44,7 @@ class Record:
 
     @contextmanager
     def timed(self, phase: str) -> Iterator[None]:
-        """Add the time of what is done in a ``with`` to that of a phase."""
+        """Add the time of a ``with`` block to a phase."""
         start = perf_counter()
         try:
             yield
@@ -296,7 +296,7 @@ _TAKEN = ("damping", "algorithmic", "cut_work", "projection", "removed_energy")
 
 
 def work_of_blades(cuts: Sequence[Any], by_cut: _Floats | float) -> dict[str, float]:
-    """Name what each of several blades has taken, J, of that of all cuts (cuts,)."""
+    """Name the energy that each of several blades has taken, J, from all cuts' (cuts,)."""
     blades = [cut.on_the_way for cut in cuts]
     taken = zip(cuts, blades, np.zeros(len(cuts)) + by_cut, strict=True)
     found = {f"cut_work_{cut.name}": float(work) for cut, blade, work in taken if blade}
@@ -348,14 +348,14 @@ class LedgerRows:
         self._rows.append(row)
 
     def columns(self) -> dict[str, _Floats]:
-        """All entries (t,) by name."""
+        """Return all entries (t,) by name."""
         names = self._rows[0] if self._rows else {}
         columns = {name: np.array([row[name] for row in self._rows]) for name in names}
         return {n: one for n, one in columns.items() if one.any() or not n.startswith(_OF_SOME)}
 
 
 def grid_of(scene: Scene, level: int) -> tuple[list[int] | None, float]:
-    """Cells along each axis, None if unstructured, and element size h in m, of a level.
+    """Find cells along each axis, None if unstructured, and element size h in m, of a level.
 
     Of a mesh that the scene does not give itself, but its pattern and sizes or numbers of cells.
     """

@@ -88,7 +88,7 @@ class _Parameters:
         return self if self.tip else replace(self, tip=default)
 
     def integration(self) -> Integration:
-        """Return those of the time integration."""
+        """Return the options of the time integration."""
         return Integration(self.scheme, self.step_factor, self.spectral_radius)
 
     def notes(self) -> dict[str, str]:
@@ -169,7 +169,7 @@ class XfemOpening:
             ) from None
 
     def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
-        """Corner of an old body from which each corner of one that is cut further comes."""
+        """Find corner of an old body from which each corner of one that is cut further comes."""
         return ancestors(old, new)
 
     def fading(self, new: PhantomMesh) -> Fade | None:
@@ -209,7 +209,7 @@ class XfemSolver:
         Dynamics: time integration, "newmark", "implicit_euler", "energy_momentum",
         "generalised_alpha", "central_differences", "symplectic_euler" or "forward_euler".
     spectral_radius : float
-        Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
+        Dynamics: spectral radius of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}
         Dynamics: the last three are the lumpings of the thesis; EVS and GEVS raise eigenvalues of
         the consistent mass of cut cells, see `verify.methods.mass_variants`.

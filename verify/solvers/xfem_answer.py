@@ -41,12 +41,12 @@ def solution_on(
     ----------
     scene : Scene
     record : Record
-        Of the run; what concerns the body and its supports is added.
+        Of the run; entries on the body and its supports are added.
     phantom : PhantomMesh
         The cut body.
     fields : dict
         Of `Solution`: displacement and rates (t, N, d) of the unknowns, mass as a word or (N, N)
-        matrix, and what is no field.
+        matrix, and entries that are no fields.
     size : float
         Of its elements, m.
     shown : Subdivision, optional
@@ -128,7 +128,7 @@ def springs_left_out(force: InternalForce) -> Regularisation:
 
 
 def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
-    """One number per combination of sides; 0 away from all cuts."""
+    """Return one number per combination of sides; 0 away from all cuts."""
     if not label.shape[1]:
         return np.zeros(len(label), dtype=np.int64)
     distinct, number = np.unique(label, axis=0, return_inverse=True)
@@ -177,7 +177,7 @@ def solve_equilibrium(
     resisting : PhantomMesh, optional
         What resists, with the same unknowns; default: the same.
     law : callable
-        Makes the internal force; other than that of elements it is solved by Newton's method.
+        Makes the internal force; Newton's method solves all but elements.
     load_steps : int
         As of the solver ``xfem``.
     penalise : bool

@@ -180,10 +180,9 @@ def largest_step(
     """Return the largest time step, s, and where it comes from.
 
     An explicit scheme takes `factor` times its critical step, or the step asked for if that is
-    smaller. Where pieces turn, the critical step is that of strains up to 1, and `RESONANCE_FREE`
-    of it, so that the time grid makes no modes resonate (docs/theory/dynamics.md). An implicit one
-    takes the step asked for, or else `factor` times the critical step of the uncut elements: what
-    an explicit scheme could follow.
+    smaller. Where pieces turn, the critical step allows strains up to 1, and `RESONANCE_FREE` of
+    it, so that the time grid makes no modes resonate (docs/theory/dynamics.md). An implicit one
+    takes the step asked for, or else `factor` times the critical step of the uncut elements.
 
     Parameters
     ----------
@@ -213,7 +212,7 @@ def largest_step(
 def _critical(body: DynamicBody, material: Material, density: ArrayLike, explicit: bool) -> float:
     phantom = body.force.phantom
     if not explicit or body.mass.keeps_element_steps:
-        # side-wise mass: no cut makes it smaller than that of the smallest uncut element
+        # side-wise mass: the step of the smallest uncut element is stable, whatever the cuts
         strain = _REACH if body.force.is_corotational else 0.0
         step = float(element_critical_steps(phantom.mesh, material, density, strain).min())
     else:
@@ -282,7 +281,7 @@ def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
 
 
 def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
-    """Displacement at rest under the loads and supports as their histories begin."""
+    """Compute the displacement at rest under the loads and supports as their histories begin."""
     phantom = body.force.phantom
     assert body.weight is not None
     load = body.weight.copy()
