@@ -11,35 +11,22 @@ import numpy as np
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-from verify.errors import InputError, UnsupportedSceneError
-from verify.printable import one_line, words_of
+from verify.errors import InputError
 from verify.result import Verdict
-from verify.scene import Box, Rectangle, Scene, restore_scene
-from verify.solvers import Solver
+from verify.scene import Scene
 from verify.study.measured_scenes import (
     MeasuredStudy,
     Measurement,
     Variant,
     account_findings,
     measured_families,
-    measurements,
     missing_solutions,
 )
-from verify.study.step_by_running import step_by_running
+from verify.study.sliver_systems import UNKNOWNS, measured_row
 from verify.study.study import Finding, Making, held
-from verify.system import (
-    CONDITION,
-    FREQUENCY,
-    SCALED,
-    STEP,
-    condition_numbers,
-    critical_step,
-    lowest_frequency,
-    with_uncut_twin,
-)
+from verify.system import CONDITION, FREQUENCY, SCALED, STEP
 
 _FITTED = (CONDITION, SCALED, STEP)
-Row = tuple[str, str, float | None, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,80 +77,18 @@ def sliver_study(
     return SliverStudy(findings=found, quick=quick, measurements=every, growths=growths)
 
 
-def measured_row(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
-    """Measure a scene as `measured_scene` does, and the system of its solver."""
-    return measurements(Variant(**variant), restore_scene(content), _further)
-
-
-def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
-    """Measure condition, critical step and lowest frequency, from the system or by running."""
-    if scene.analysis.kinematics != "linear" or scene.analysis.kind != "static":
-        return
-    system: Any = getattr(solver, "system", None)
-    if system is None and getattr(solver, "implicit", False):
-        yield STEP, "s", None, "its time integration is implicit: no step is critical"
-        return
-    if system is None:
-        yield _by_running(solver, variant, scene, level)
-        return
-    try:
-        own, whole = with_uncut_twin(system, scene, level, variant.parameters)
-    except Exception as problem:  # a guest may raise anything
-        refused = isinstance(problem, UnsupportedSceneError | InputError)
-        why = str(problem) if refused else f"{type(problem).__name__}: {problem}"
-        yield STEP, "s", None, one_line(why)
-        return
-    try:
-        raw, scaled = condition_numbers(own)
-        yield CONDITION, "", raw, ""
-        yield SCALED, "", scaled, ""
-    except InputError as problem:
-        yield SCALED, "", None, str(problem)
-    for name, unit, measure, one in (
-        (STEP, "s", critical_step, own),
-        (f"{STEP}, uncut", "s", critical_step, whole),
-        (FREQUENCY, "1/s", lowest_frequency, own),
-    ):
-        try:
-            yield name, unit, measure(one), ""
-        except InputError as problem:
-            yield name, unit, None, str(problem)
-
-
-def _by_running(solver: Solver, variant: Variant, scene: Scene, level: int) -> Row:
-    try:
-        low, high = step_by_running(solver, scene, level, _guess(scene, level), variant.parameters)
-    except InputError as problem:
-        return STEP, "s", None, one_line(str(problem))
-    except Exception as problem:  # a guest may raise anything
-        return STEP, "s", None, words_of(problem)
-    return STEP, "s", float((low * high) ** 0.5), f"by running: {low:.4g} to {high:.4g} s"
-
-
-def _guess(scene: Scene, level: int) -> float:
-    """Time in which a pressure wave crosses about a third of an element, s."""
-    cells, box = scene.mesh.cells, scene.geometry
-    material = scene.material
-    assert material.density is not None
-    speed = (material.young / material.density) ** 0.5
-    if cells is None:
-        assert scene.mesh.sizes is not None
-        return scene.mesh.sizes[level] / speed / 3.0
-    assert isinstance(box, Rectangle | Box)
-    sides = np.subtract(box.upper, box.lower) / cells[level]
-    return float(sides.min() / speed / 3.0)
-
-
 def _growths(found: Sequence[Measurement]) -> list[dict[str, Any]]:
     series: dict[tuple[str, str, str], list[Measurement]] = {}
+    unknowns = {(m.family, m.solver, m.size): m.value for m in found if m.quantity == UNKNOWNS}
     for one in found:
         if one.quantity in _FITTED and one.size is not None:
             series.setdefault((one.family, one.solver, one.quantity), []).append(one)
     return [
         {"family": family, "solver": solver, "quantity": quantity}
-        | asdict(growth([m.size or 0.0 for m in own], [m.value for m in own]))
+        | asdict(growth([m.size or 0.0 for m in own], [m.value for m in own],
+                        [unknowns.get((family, solver, m.size)) for m in own]))
         for (family, solver, quantity), own in series.items()
-    ]
+    ]  # fmt: skip
 
 
 _SMALL = 1e-3  # larger slivers are not in the asymptotic range
@@ -194,17 +119,32 @@ class Growth:
     reason: str = ""
 
 
-def growth(sizes: Sequence[float], values: Sequence[float | None], below: float = _SMALL) -> Growth:
-    """Fit the exponent of a quantity over sliver sizes in (0, `below`].
+def growth(
+    sizes: Sequence[float],
+    values: Sequence[float | None],
+    unknowns: Sequence[float | None] = (),
+) -> Growth:
+    """Fit the exponent of a quantity over sliver sizes in (0, 1e-3].
 
-    Sizes without a value are left out of the fit and counted in the reason.
+    Sizes without a value are left out of the fit and named in the reason. So are those below the
+    size at which the number of `unknowns` changes: the cut moves onto nodes, and the law ends.
     """
-    pairs = [(s, v) for s, v in zip(sizes, values, strict=True) if 0.0 < s <= below * (1 + 1e-9)]
-    bad = [s for s, v in pairs if v is None or not np.isfinite(v) or v <= 0.0]
-    good = sorted((s, v) for s, v in pairs if v is not None and np.isfinite(v) and v > 0.0)
+    counts = unknowns or [None] * len(sizes)
+    rows = [
+        row
+        for row in zip(sizes, values, counts, strict=True)
+        if 0.0 < row[0] <= _SMALL * (1 + 1e-9)
+    ]
+    first = max(rows, key=lambda row: row[0], default=(0.0, None, None))[2]
+    ends = max((s for s, _, n in rows if None not in (n, first) and n != first), default=0.0)
+    bad = [s for s, v, _ in rows if s > ends and (v is None or not np.isfinite(v) or v <= 0.0)]
+    good = sorted((s, v) for s, v, _ in rows if s > ends and s not in bad and v is not None)
+    note = f"without a value at ε = {', '.join(f'{s:g}' for s in bad)}" if bad else ""
+    if ends:
+        note += f"{'; ' if note else ''}other unknowns from ε = {ends:g} on"
     if len(good) < 3:
-        text = f"{len(good)} positive values at ε ≤ {below:g}; a fit with its uncertainty needs 3"
-        return Growth(None, 0.0, len(good), text)
+        text = f"{len(good)} positive values at ε ≤ {_SMALL:g}; a fit with its uncertainty needs 3"
+        return Growth(None, 0.0, len(good), "; ".join([text, *filter(None, [note])]))
     x, y = np.log(np.array(good)).T
     line = linregress(x, y)
     width = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, len(x) - 2) * line.stderr)
@@ -213,7 +153,6 @@ def growth(sizes: Sequence[float], values: Sequence[float | None], below: float 
     if spread > _WANDERING:
         text = f"no single exponent: local slopes from {local.min():.2f} to {local.max():.2f}"
         return Growth(None, spread, len(good), text)
-    note = f"without a value at ε = {', '.join(f'{s:g}' for s in bad)}" if bad else ""
     return Growth(float(line.slope), max(width, spread), len(good), note)
 
 

@@ -58,6 +58,16 @@ def test_sizes_without_a_value_are_named_and_too_few_give_no_exponent():
     assert law.reason.startswith("2 positive values")
 
 
+def test_a_law_ends_where_the_number_of_unknowns_changes():
+    """A mesh that splits cut cells loses its step with ε until the cut moves onto nodes."""
+    steps = [s if s > 1e-9 else 1.0 for s in SIZES]
+    assert growth(SIZES, steps).exponent is None
+    law = growth(SIZES, steps, [60.0 if s > 1e-9 else 50.0 for s in SIZES])
+    assert law.exponent == pytest.approx(1.0, abs=1e-12)
+    assert law.points == 6
+    assert "other unknowns from ε = 1e-09 on" in law.reason
+
+
 def chain(n, masses=1.0, stiffness=1.0):
     """Return n springs in a row, the first end held: ω = 2 sin((2k − 1) π / (4n + 2))."""
     main = np.full(n + 1, 2.0)
