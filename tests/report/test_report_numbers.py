@@ -17,7 +17,8 @@ from verify.report.notation import error_text, number, scientific, with_interval
 from verify.report.plots import Palette
 from verify.report.rendering import render
 from verify.report.run_directory import load_run
-from verify.report.study_page import graded, render_study
+from verify.report.sliver_page import graded
+from verify.report.study_page import render_study
 from verify.report.tables import check_row
 from verify.result import Status, Verdict, VerdictRecord
 

@@ -9,6 +9,7 @@ from contextlib import redirect_stdout
 import pytest
 
 from verify.cli import main
+from verify.scene import load_scene
 from verify.study.study import Making
 
 # nodes of the field u = t (1 + 2^-iterations + 0.01 / substeps) x; solved: without the middle part
@@ -34,27 +35,31 @@ class Halving:
 """
 
 
+CASES = ("dynamics/block_falls_apart", "dynamics/freed_half")
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """The rows of its table, its output, and its folder."""
     folder, said = tmp_path_factory.mktemp("halving"), io.StringIO()
     (folder / "halving.py").write_text(textwrap.dedent(SOLVER))
-    words = ["study", "iterations", "dynamics/block_falls_apart", "--solver", "halving:Halving"]
+    words = ["study", "iterations", *CASES, "--solver", "halving:Halving"]
     words += ["--substeps", "1", "2", "--most", "14", "--tolerance", "0.02", "--out", "studies"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(folder)
         with redirect_stdout(said):
-            assert main([*words, "--iterations", "2", "7", "8"]) == 0
+            assert main([*words, "--iterations", "2", "4", "7", "8"]) == 0
     sys.modules.pop("halving")
     with open(folder / "studies" / "iterations.csv", newline="") as file:
         return list(csv.DictReader(file)), said.getvalue(), folder / "studies"
 
 
 def test_both_errors_are_those_of_the_solver(found):
-    rows = {(row["iterations"], row["substeps"]): row for row in found[0]}
-    assert ("8", "2") not in rows  # sixteen in a step
-    for (count, parts), row in rows.items():
+    rows = {(row["case"], row["iterations"], row["substeps"]): row for row in found[0]}
+    assert len(rows) == 18
+    assert not any(key[1:] == ("8", "2") for key in rows)  # sixteen in a step
+    for (case, count, parts), row in rows.items():
         if count == "7":
             assert "seven" in row["reason"]
             continue
@@ -62,21 +67,31 @@ def test_both_errors_are_those_of_the_solver(found):
         assert float(row["iteration_error"]) == pytest.approx(late / 1.005, abs=1e-12)
         whole = abs(late + 0.01 / int(parts) - 0.005) / 1.005
         assert float(row["whole_error"]) == pytest.approx(whole, abs=1e-12)
-        assert float(row["time_step"]) == pytest.approx(0.005 / int(parts))
+        step = load_scene(case).analysis.time_step
+        assert float(row["time_step"]) == pytest.approx(step / int(parts))
 
 
 def test_the_findings_say_from_which_setting_on(found):
     out = found[1]
     assert "From 8 iterations on" in out
-    assert "No number of iterations up to 2" in out
-    assert out.count("Without an answer: 7.") == 2
-    assert "has 8 iterations and substeps 1: 8 s" in out
+    assert "No number of iterations up to 4" in out
+    assert out.count("Without an answer: 7.") == 4
+    assert out.count("is 8 iterations in a step of the case: 8 in each of 1") == 2
+
+
+def test_the_page_answers_in_work_and_not_in_time(found):
+    """At 8 iterations in a step: 2⁻⁸ + 0.005 without substeps, 2⁻⁴ with two, over 1.005."""
+    text = " ".join((found[2] / "iterations.html").read_text().split())
+    met = ", ".join(f"8 ({case})" for case in CASES)
+    assert f"takes so many iterations in a step: {met}." in text
+    assert "Substeps do not pay at equal work on any of 2 cases" in text
+    assert f"{CASES[0]}, 8 iterations: 0.062 with 2 substeps, 0.0089 with 1" in text
 
 
 def test_every_setting_is_a_solve_that_is_kept_until_another_question_is_asked(found):
     (run,) = found[2].glob("iterations-*/run.json")
     solves = [path.parent.name for path in run.parent.glob("cases/*/*/record.json")]
-    assert len(solves) == 7  # 2, 7, 8 with one substep, 2, 7 with two, and both solved
+    assert len(solves) == 18  # of each case 2, 4, 7, 8 with one substep, 2, 4, 7, and both solved
     place = Making(found[2]).place_of("iterations", "another question")
     assert not run.exists()
     assert place.startswith("iterations-")

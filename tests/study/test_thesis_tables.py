@@ -147,6 +147,13 @@ def test_lumped_to_the_sides_no_sliver_shortens_the_step_and_subdivided_each_doe
     assert steps("snapping")[-1].ratio > 0.99
 
 
+def test_an_exponent_is_no_slope_from_split_cells_to_a_cut_on_nodes(slivers) -> None:
+    split = [step for step in slivers if step.method == "subdivision"]
+    snapped = replace(split[-1], size=1e-9, ratio=1.0, unknowns=split[-1].unknowns - 4)
+    assert exponent([*split, snapped]) == exponent(split)
+    assert np.isnan(exponent([split[0], snapped]))
+
+
 def test_small_pieces_are_badly_scaled_and_nothing_worse(slivers) -> None:
     first, _, last = (row for row in slivers if row.method == "xfem")
     assert last.condition > 1e4 * first.condition
@@ -200,6 +207,11 @@ def test_a_verdict_falls_with_its_evidence(measured) -> None:
     assert verdict(replace(measured, frames=late), "Table 4.6: delay and") is Verdict.FAIL
     short = replace(measured.face[-1], step={**measured.face[-1].step, "xfem": 0.5})
     assert verdict(replace(measured, face=[short]), "stable: no slivers") is Verdict.FAIL
+    shares = dict.fromkeys(LIMITS, 0.9)
+    slow = replace(measured, hand=replace(measured.hand, within=shares, slowest=1.0))
+    assert verdict(slow, "real time: every step within 1 ms") is Verdict.FAIL
+    busy = replace(slow, contended="the machine was busy")
+    assert verdict(busy, "real time: every step within 1 ms") is Verdict.UNDECIDED
     loose = replace(measured, hand=replace(measured.hand, loose_edges=1))
     assert verdict(loose, "stable: the hand") is Verdict.FAIL
     worse = [method("xfem", 0, 0.12), *measured.methods[1:]]

@@ -224,7 +224,9 @@ def budget(
 
 
 def iterations(
-    case: Case,
+    cases: Annotated[
+        Sequence[str], Arg("names, patterns or files of cases that move or come to rest", "CASE")
+    ],
     *,
     solver: Annotated[str, Arg("solver, with parameters of its solves", _SOLVER)] = "vbd",
     truth: Annotated[
@@ -252,16 +254,16 @@ def iterations(
     tolerance: Tolerance = 0.01,
     answer: Answer,
 ) -> int:
-    """A solver of motion that stops by a count: its error, energy and cost."""
-    from verify.scene import load_scene
+    """A solver in steps that stop by a count: its error over iterations and substeps."""
+    from verify.runner.selection import select_cases
     from verify.study.iterations import Grid, iterations_study
     from verify.study.measured_scenes import variant_of
 
     def study(making: "Making") -> "Study":
-        scene, own = load_scene(case), variant_of(solver)
+        scenes, own = select_cases(cases, None, "heavy"), variant_of(solver)
         steps = variant_of(truth or f"{solver} step=solved")
         grid = Grid(iterations, substeps, (names[0], names[1]), most)
-        return iterations_study(scene, own, steps, grid, tolerance, making)
+        return iterations_study(scenes, own, steps, grid, tolerance, making)
 
     return _written("iterations", answer, study)
 

@@ -82,6 +82,19 @@ class Figure:
     caption: str = ""
 
 
+@dataclass(frozen=True)
+class Lead:
+    """What a page says first: its question, the answer in sentences, and one figure.
+
+    Numbers and verdicts of the sentences come from the record; `caption` explains the figure.
+    """
+
+    question: str
+    sentences: Sequence[str]
+    panels: Sequence[Drawing | None] = ()
+    caption: str = ""
+
+
 def _cells(row: Sequence[Any]) -> list[Cell]:
     return [cell if isinstance(cell, Cell) else Cell(number(cell)) for cell in row]
 

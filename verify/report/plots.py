@@ -159,6 +159,70 @@ def legend(axes: Axes) -> None:
         _place(axes)
 
 
+_FEW = 6  # curves that are named at their ends
+_NAMES = 2.3  # as `_ASIDE`, for 23 letters without the samples of a legend
+_LINE, _GAP = 9.8, 3.6  # points that a line of a name takes, and a name beyond its lines
+
+
+def _named(axes: Axes) -> None:
+    """Name the curves at their ends, or in a legend if they are many or an area is among them."""
+    handles, labels = axes.get_legend_handles_labels()
+    curves = [(handle, label) for handle, label in zip(handles, labels, strict=True)
+              if hasattr(handle, "get_xydata")]  # fmt: skip
+    if len(curves) < len(handles) or len(curves) > _FEW:
+        legend(axes)
+        return
+    names = [
+        [s for line in printable(label).split("\n") for s in wrap(line, 23) or [""]]
+        for _, label in curves
+    ]
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    needed = sum(_LINE * len(lines) + _GAP for lines in names) / 72 + 0.78  # inches
+    figure.set_figheight(max(needed, figure.get_figheight()))
+    _place(axes, _NAMES)
+    height = 72.0 * axes.get_position().height * figure.get_figheight()  # points
+    within = axes.transData + axes.transAxes.inverted()
+    ends = []
+    for (handle, _), lines in zip(curves, names, strict=True):
+        end = _end_of(handle.get_xydata())
+        ends.append((within.transform(end)[1] * height, end, lines, handle.get_color()))
+    ends.sort(key=lambda one: one[0])
+    sizes = [_LINE * len(lines) + _GAP for _, _, lines, _ in ends]
+    places = _spread([at for at, *_ in ends], sizes, height)
+    for place, (_, end, lines, colour) in zip(places, ends, strict=True):
+        axes.annotate("\n".join(lines), end, (1.05, place / height), textcoords="axes fraction",
+                      fontsize=8, va="center", color=colour, annotation_clip=False,
+                      arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5,
+                                  "shrinkA": 0, "shrinkB": 4, "relpos": (0.0, 0.5)})  # fmt: skip
+
+
+def _end_of(places: Any) -> tuple[float, float]:
+    """Return the last place of the longest stretch without a gap; of equal ones, of the last."""
+    longest, stretch = 0, 0
+    end = (math.nan, math.nan)
+    for x, y in places:
+        stretch = stretch + 1 if math.isfinite(x) and math.isfinite(y) else 0
+        if stretch and stretch >= longest:
+            longest, end = stretch, (float(x), float(y))
+    return end
+
+
+def _spread(wanted: Sequence[float], sizes: Sequence[float], height: float) -> list[float]:
+    """Return places near those that are `wanted`, ascending, whose sizes do not overlap.
+
+    They lie in (0, `height`) if there is room.
+    """
+    places = list(wanted)
+    for k in range(1, len(places)):  # upwards, then down from the top
+        places[k] = max(places[k], places[k - 1] + (sizes[k - 1] + sizes[k]) / 2.0)
+    most = height
+    for k in range(len(places) - 1, -1, -1):
+        places[k] = min(places[k], most - sizes[k] / 2.0)
+        most = places[k] - sizes[k] / 2.0
+    return places
+
+
 def log_range(values: Sequence[float], room: float = 0.08) -> tuple[float, float]:
     """Return a range around positive `values`, at least a factor of two wide."""
     low, high = math.log10(min(values)), math.log10(max(values))
@@ -248,14 +312,21 @@ class Bar:
     total: bool = False
 
 
-def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette) -> Drawing | None:
-    """Return curves on logarithmic axes, or None if there is nothing positive."""
+def loglog(
+    title: str, x_title: str, series: Sequence[Series], palette: Palette, falling: bool = False
+) -> Drawing | None:
+    """Return curves on logarithmic axes, or None if there is nothing positive.
+
+    Up to six are named at their ends, more in a legend. The abscissa falls to the right if asked.
+    """
     drawn = [(s, [place for place in s.places if _can_be_drawn(place)]) for s in series]
     drawn = [(s, places) for s, places in drawn if places]
     if not drawn:
         return None
     with panel(title) as (figure, axes):
         _logarithmic(axes, x_title, [place for _, places in drawn for place in places])
+        if falling:
+            axes.invert_xaxis()
         said = [f"{title} against {x_title}."]
         for s, places in drawn:
             style = palette[s.name]
@@ -266,7 +337,7 @@ def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette)
                 axes.plot(*zip(*s.ringed, strict=True), color=style.colour, marker="o",
                           markersize=11, markerfacecolor="none", linestyle="none")  # fmt: skip
             said.append(f"{s.name}: " + ", ".join(f"{y:.3g} at {x:.3g}" for x, y in places) + ".")
-        legend(axes)
+        _named(axes)
         return drawing(figure, " ".join(said))
 
 
@@ -422,7 +493,7 @@ def profile_panel(
             few = style.marked if len(along) <= _MARKED and palette is not None else {}
             axes.plot(along, _gaps(curve), label=name, linestyle=style.dashes,
                       **{"color": style.colour, **few})  # fmt: skip
-        legend(axes)
+        _named(axes)
         ends = "; ".join(f"{name}: {curve[0]:.4g} to {curve[-1]:.4g}" for name, curve in curves)
         cuts = f" A cut opens at {', '.join(f'{m:.3g} s' for m in marks)}." if marks else ""
         return drawing(figure, f"{title} over {x_title}, {length:.3g}. {ends}.{cuts}", "profile")

@@ -1,11 +1,12 @@
-"""Iterations against error: solvers of motion that stop by a count, over iterations and substeps.
+"""Iterations against error: solvers in steps that stop by a count, over iterations and substeps.
 
 Two errors are told apart. The iteration error is the distance from the same steps, solved; the
 whole error is the distance from the smallest steps, solved. A solver solves them too, by default
-the same one with ``step=solved``. Both answer on one mesh, and nodes are compared.
+the same one with ``step=solved``. Both answer on one mesh, and nodes are compared. The work of a
+setting is the number of iterations in a step of the case: it does not depend on the machine.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -62,6 +63,7 @@ class Setting:
 
     Attributes
     ----------
+    case : str
     iterations : int or None
         None of the steps that are solved.
     substeps : int
@@ -73,13 +75,14 @@ class Setting:
     energy_drift : float or None
         Of the energy in play, by the energies of the scene's law.
     quantities : dict of str to float
-        Of the scene.
+        Of the scene, with their units.
     seconds : float or None
         As the solver measures itself, first call apart.
     reason : str
         Why there is no answer.
     """
 
+    case: str
     iterations: int | None
     substeps: int
     time_step: float | None
@@ -90,12 +93,16 @@ class Setting:
     seconds: float | None = None
     reason: str = ""
 
+    @property
+    def work(self) -> int:
+        """Iterations in a step of the case; none where steps are solved."""
+        return (self.iterations or 0) * self.substeps
+
 
 @dataclass(frozen=True, kw_only=True)
 class IterationsStudy(Study):
     """What the study found."""
 
-    case: str
     solver: str
     truth: str
     tolerance: float
@@ -103,24 +110,25 @@ class IterationsStudy(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the lines of its table."""
+        names = dict.fromkeys(name for one in self.settings for name in one.quantities)
         lines = [asdict(one) for one in self.settings]
-        return [{**line.pop("quantities"), **line} for line in lines]
+        return [{**line, **names, **line.pop("quantities")} for line in lines]
 
 
 def iterations_study(
-    scene: Scene,
+    scenes: Sequence[Scene],
     variant: Variant,
     truth: Variant,
     grid: Grid,
     tolerance: float,
     making: Making,
 ) -> IterationsStudy:
-    """Solve the scene's coarsest level by every setting, one after the other.
+    """Solve the coarsest level of each scene by every setting, one after the other.
 
     Parameters
     ----------
-    scene : Scene
-        Dynamic.
+    scenes : sequence of Scene
+        In motion, or at rest where the solver comes to rest by steps.
     variant, truth : Variant
         The solver, and who solves the same steps.
     grid : Grid
@@ -131,10 +139,8 @@ def iterations_study(
     Raises
     ------
     InputError
-        If the scene does not move, or the truth has no answer on the nodes of the solver.
+        If the truth has no answer, or not on the nodes of the solver.
     """
-    if scene.analysis.kind != "dynamic":
-        raise InputError(f"{scene.name} does not move; a dynamic analysis is needed")
     truths = {count: grid.set(truth, None, count) for count in sorted(grid.substeps)}
     counted = {
         (count, iterations): grid.set(variant, iterations, count)
@@ -142,29 +148,36 @@ def iterations_study(
         for iterations in grid.counts(count)
     }
     names = tuple(dict.fromkeys([*truths.values(), *counted.values()]))
-    place = making.place_of("iterations", [scene_content(scene), names])
-    making.announce(f"{len(names)} settings of {scene.name}, into {place}")
-    (found,) = making.solved([coarsest(scene, 1)], place, names)
+    place = making.place_of("iterations", [[scene_content(scene) for scene in scenes], names])
+    making.announce(f"{len(names)} settings of {len(scenes)} cases, into {place}")
+    settings = [
+        setting
+        for found in making.solved([coarsest(scene, 1) for scene in scenes], place, names)
+        for setting in _settings(found, truths, counted)
+    ]
+    return IterationsStudy(
+        solver=variant.label, truth=truth.label, tolerance=tolerance, settings=settings,
+        findings=_findings(variant.label, settings, tolerance, grid.names),
+    )  # fmt: skip
+
+
+def _settings(
+    found: Solved, truths: Mapping[int, str], counted: Mapping[tuple[int, int], str]
+) -> Iterator[Setting]:
+    """Measure every setting of one scene; last of each number of substeps, the steps solved."""
     solved = {count: _truth(found, name) for count, name in truths.items()}
-    finest = solved[max(solved)]
+    finest, step = solved[max(solved)], found.scene.analysis.time_step
     scale = max(_rms(frame) for frame in finest.displacement)
-    settings = []
     for count, own in solved.items():
-        step = scene.analysis.time_step
-        for iterations in [*grid.counts(count), None]:
-            name = truths[count] if iterations is None else counted[count, iterations]
-            one = Setting(iterations, count, None if step is None else step / count)
+        named = {made: name for (parts, made), name in counted.items() if parts == count}
+        for iterations, name in [*named.items(), (None, truths[count])]:
+            one = Setting(found.scene.name, iterations, count, step and step / count)
             if answer := found.solutions.get(name, {}).get(0):
                 errors = [_distance(answer, other) / scale for other in (own, finest)]
                 one = replace(one, iteration_error=errors[0], whole_error=errors[1])
-                one = _measured(scene, answer, one)
+                yield _measured(found.scene, answer, one)
             else:
-                one = replace(one, reason=found.reason(name))
-            settings.append(one)
-    return IterationsStudy(
-        case=scene.name, solver=variant.label, truth=truth.label, tolerance=tolerance,
-        settings=settings, findings=_findings(variant.label, settings, tolerance, grid.names),
-    )  # fmt: skip
+                yield replace(one, reason=found.reason(name))
 
 
 def _truth(found: Solved, name: str) -> Solution:
@@ -186,8 +199,10 @@ def _distance(answer: Solution, other: Solution) -> float:
 def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
     record = SolveRecord(scene.name, "solver", 0, Status.SOLVED, size=answer.size)
     (measured,) = assess_accuracy(scene, [record], {"solver": {0: answer}}, None).solves
-    names = [asked.name for asked in scene.quantities]
-    found = {name: m.value for name in names if (m := measured.metric(name)) is not None}
+    asked = [measured.metric(quantity.name) for quantity in scene.quantities]
+    found = {
+        m.name if m.unit == "1" else f"{m.name}, {m.unit}": m.value for m in asked if m is not None
+    }
     drift = measured.metric("energy_drift")
     return replace(
         one,
@@ -200,40 +215,50 @@ def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
 def _findings(
     label: str, settings: Sequence[Setting], tolerance: float, names: tuple[str, str]
 ) -> list[Finding]:
-    counted = [one for one in settings if one.iterations is not None]
-    found = []
-    for substeps in dict.fromkeys(one.substeps for one in counted):
-        own = [one for one in counted if one.substeps == substeps and not one.reason]
-        if not own:
-            continue
-        late = [one for one in own if not _inside(one.iteration_error, tolerance)]
-        rest = own[own.index(late[-1]) + 1 :] if late else own
-        step = "" if own[0].time_step is None else f" of {own[0].time_step:.4g} s"
-        text = f"No number of {names[0]} up to {own[-1].iterations} is"
-        if rest:
-            text = f"From {rest[0].iterations} {names[0]} on the answer is"
-        text += f" within {tolerance:.2g} of the same steps{step}, solved"
-        text += f"; {own[0].iterations} are off by {_percent(own[0].iteration_error)}"
-        text += f", {own[-1].iterations} by {_percent(own[-1].iteration_error)}."
-        missing = [o.iterations for o in counted if o.substeps == substeps and o.reason]
-        if missing:
-            text += f" Without an answer: {', '.join(map(str, missing))}."
-        about = f"{label}, {names[1]} {substeps}"
-        found.append(Finding(about, text, f"{tolerance:.2g}; shown, not judged", None))
-    good = [one for one in counted if one.seconds and _inside(one.whole_error, tolerance)]
-    text = f"No setting is within {tolerance:.2g} of the smallest steps, solved."
-    if good:
-        best = min(good, key=lambda one: one.seconds or 0.0)
-        text = (
-            f"The cheapest setting within {tolerance:.2g} of the smallest steps, solved, has "
-            f"{best.iterations} {names[0]} and {names[1]} {best.substeps}: {best.seconds:.3g} s."
-        )
-    return [*found, Finding(f"{label}, all in all", text, "shown, not judged", None)]
+    counted, found = [one for one in settings if one.iterations is not None], []
+    limit = f"{tolerance:.2g} of the largest displacement; shown, not judged"
+    for case in dict.fromkeys(one.case for one in counted):
+        mine = [one for one in counted if one.case == case]
+        for substeps in dict.fromkeys(one.substeps for one in mine):
+            series = [one for one in mine if one.substeps == substeps]
+            if text := _said(series, tolerance, names[0]):
+                found.append(Finding(f"{case}, {label}, {names[1]} {substeps}", text, limit, None))
+        good = [one for one in mine if _inside(one.whole_error, tolerance)]
+        text = f"No setting is within {tolerance:.2g} of the smallest steps, solved."
+        if good:
+            best = min(good, key=lambda one: one.work)
+            text = (
+                f"The least work within {tolerance:.2g} of the smallest steps, solved, is "
+                f"{best.work} iterations in a step of the case: {best.iterations} in each of "
+                f"{best.substeps}."
+            )
+        found.append(Finding(f"{case}, {label}, all in all", text, limit, None))
+    return found
+
+
+def _said(series: Sequence[Setting], tolerance: float, name: str) -> str:
+    """Say from which number of iterations on the same steps are met; empty without an answer."""
+    own = [one for one in series if not one.reason]
+    if not own:
+        return ""
+    late = [one for one in own if not _inside(one.iteration_error, tolerance)]
+    rest = own[own.index(late[-1]) + 1 :] if late else own
+    step = "" if own[0].time_step is None else f" of {own[0].time_step:.4g} s"
+    text = f"No number of {name} up to {own[-1].iterations} is"
+    if rest:
+        text = f"From {rest[0].iterations} {name} on the answer is"
+    text += f" within {tolerance:.2g} of the same steps{step}, solved"
+    text += f"; {own[0].iterations} are off by {_share(own[0].iteration_error)}"
+    text += f", {own[-1].iterations} by {_share(own[-1].iteration_error)}."
+    missing = [str(one.iterations) for one in series if one.reason]
+    return text + (f" Without an answer: {', '.join(missing)}." if missing else "")
 
 
 def _inside(error: float | None, tolerance: float) -> bool:
     return error is not None and error <= tolerance
 
 
-def _percent(error: float | None) -> str:
-    return "an unknown part" if error is None else f"{100 * error:.3g} %"
+def _share(error: float | None) -> str:
+    if error is None:
+        return "an unknown part"
+    return f"{100 * error:.3g} %" if error < 1.0 else f"{error:.3g} times the largest displacement"

@@ -41,12 +41,15 @@ class Finding:
     verdict : Verdict or None
         PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell or there
         are none; None for a finding without a limit.
+    whose : str
+        Whose claim `expected` is, if it is not simply the limit of the study.
     """
 
     topic: str
     sentence: str
     expected: str
     verdict: Verdict | None
+    whose: str = ""
 
 
 def held(kept: bool | None) -> Verdict:

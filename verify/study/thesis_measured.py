@@ -41,6 +41,8 @@ class SliverSystem:
         Critical explicit step over the step of the uncut body.
     condition, scaled : float
         Condition number of the stiffness, and of the stiffness scaled by its diagonal.
+    unknowns : int
+        Of the system; others where the method has moved nodes onto the cut, or the cut onto nodes.
     """
 
     dimension: int
@@ -49,6 +51,7 @@ class SliverSystem:
     ratio: float
     condition: float
     scaled: float
+    unknowns: int
 
 
 def sliver_systems(family: str, method: str) -> list[SliverSystem]:
@@ -65,13 +68,21 @@ def sliver_systems(family: str, method: str) -> list[SliverSystem]:
             continue
         ratio = critical_step(own) / critical_step(whole)
         raw, scaled = condition_numbers(own)
-        found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
+        count, size = own.stiffness.shape[0], scene.row.value
+        found.append(SliverSystem(scene.dimension, method, size, ratio, raw, scaled, count))
     return found
 
 
 def exponent(steps: Sequence[SliverSystem]) -> float:
-    """Slope of log(critical step) over log(size) between the two smallest sizes."""
-    two = sorted(steps, key=lambda step: step.size)[:2]
+    """Slope of log(critical step) over log(size) between two sizes, the step the least at one.
+
+    They are the smallest with as many unknowns as where the step is least: a slope from one mesh
+    to another is none.
+    """
+    least = min(steps, key=lambda step: step.ratio)
+    two = sorted((s for s in steps if s.unknowns == least.unknowns), key=lambda s: s.size)[:2]
+    if len(two) < 2:
+        return float("nan")
     return float(np.log(two[1].ratio / two[0].ratio) / np.log(two[1].size / two[0].size))
 
 

@@ -1,0 +1,389 @@
+"""The page of a sliver study: what its numbers answer, its figure, then maps and curves.
+
+If one solver takes part with many values of one number, the question is what that number does.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from verify.report.notation import (
+    Cell,
+    Drawing,
+    Lead,
+    Table,
+    error_title,
+    is_error,
+    number,
+    solver_title,
+)
+from verify.report.plots import Palette, Series, loglog
+
+Records = Sequence[Mapping[str, Any]]
+
+_GRADES = {"good": "●", "fair": "◐", "poor": "○", "bad": "✕"}
+_NOTHING = Cell("–", grade="none")
+_STEP, _UNCUT = "critical explicit step", "critical explicit step, uncut"
+_SCALED = "condition number scaled by the diagonal"
+_FREQUENCY, _MEASURE = "lowest natural frequency", "conforming"
+_UNKNOWNS = "unknowns of the system"
+_ERRORS = {"displacement_l2": "displacement, L²", "energy_norm": "energy norm"}
+_DRAWN = ("condition number", _SCALED, _STEP)
+_LEAST = (0.9, 0.5, 0.1)  # of the step: good, fair, poor
+_MOST = (1e3, 1e4, 1e6)  # of the condition number
+_KEPT = _LEAST[0]  # as in the study's findings: a tenth is what a safety factor of the step takes
+_ALIKE = 0.05  # by which errors differ with the position of a mesh: less is no difference
+_FAR = 1.25  # as in the study's findings, times the error of the conforming mesh
+_SWEPT = 4  # values of one number that make it the question
+_SAME = 0.02  # by which curves differ that are drawn as one: less than the width of a line
+_FEW = 6  # curves in a panel
+_QUESTIONS = {"ghost": "Does a ghost penalty lock?"}
+
+
+def sliver_lead(record: Mapping[str, Any]) -> Lead:
+    """Return what the study answers: who keeps step and error, or what one number does to them."""
+    measured = record["measurements"]
+    swept = _swept(dict.fromkeys(m["solver"] for m in measured))
+    if swept and (lead := _lead_of_sweep(measured, *swept)):
+        return lead
+    families = dict.fromkeys(m["family"] for m in measured)
+    shares = {
+        solver: _least([one for family in families for one in _shares(measured, family, solver)])
+        for solver in dict.fromkeys(m["solver"] for m in measured)
+    }
+    drawn = {family: _steps(measured, family, Palette()) for family in families}
+    family = next((name for name, panels in drawn.items() if panels), "")
+    caption = f"{family}: ε falls to the right. A line ends where the cut moves onto nodes."
+    return Lead(
+        "Which way to cut keeps error and explicit step when a cut comes near a node?",
+        [_said_of_steps(shares), _said_of_errors(measured, list(families))],
+        drawn.get(family, []), caption if family else "",
+    )  # fmt: skip
+
+
+def _said_of_steps(shares: Mapping[str, tuple[float, float] | None]) -> str:
+    known = {solver_title(name): least for name, least in shares.items() if least is not None}
+    if not known:
+        return "No explicit step was measured: no solver hands over its system."
+    kept = [f"{name} ({number(v, 2)})" for name, (v, _) in known.items() if v >= _KEPT]
+    lost = sorted((v, size, name) for name, (v, size) in known.items() if v < _KEPT)
+    said = f"At least {_KEPT:g} of the uncut body's explicit step is left at every ε by "
+    said += f"{_listed(kept)}." if kept else "nobody."
+    if lost:
+        words = [f"{name} ({number(v, 2)} at ε = {size:g})" for v, size, name in lost]
+        said += f" It falls with {_listed(words)}."
+    unknown = [solver_title(name) for name, least in shares.items() if least is None]
+    return said + (f" Not measured: {_listed(unknown)}." if unknown else "")
+
+
+def _said_of_errors(measured: Records, families: Sequence[str]) -> str:
+    found = [
+        (ratio, f"{solver_title(solver)}, {_ERRORS[error]}, {family}, ε = {size:g}", solver)
+        for family in families
+        for solver in dict.fromkeys(m["solver"] for m in measured)
+        for error in _ERRORS
+        for size, ratio in _ratios(measured, family, solver, error).items()
+        if solver != _MEASURE
+    ]
+    if not found:
+        return "Errors are not compared: the conforming mesh did not take part."
+    worst, where, _ = max(found)
+    if worst <= _FAR:
+        return (
+            f"No error grows: at every ε it is at most {worst:.2f} times that of a conforming mesh "
+            f"of the same size (most: {where})."
+        )
+    bad = _listed([solver_title(s) for s in dict.fromkeys(s for r, _, s in found if r > _FAR)])
+    return (
+        f"More than {_FAR:g} times the error of a conforming mesh of the same size has {bad} "
+        f"(most: {worst:.2f} times, {where})."
+    )
+
+
+def _listed(words: Sequence[str]) -> str:
+    return ", ".join(words[:-1]) + " and " * (len(words) > 1) + words[-1]
+
+
+def _least(shares: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return the least share and its size; of equal ones the largest size."""
+    return min(shares, key=lambda one: (one[0], -one[1]), default=None)
+
+
+def _values(measured: Records, family: str, solver: str, quantity: str) -> dict[float, float]:
+    own = listed(measured, family=family, solver=solver, quantity=quantity)
+    return {m["size"]: m["value"] for m in own if m["value"] is not None}
+
+
+def _shares(measured: Records, family: str, solver: str) -> list[tuple[float, float]]:
+    """Return (share of the uncut step, ε) of each row."""
+    whole = next(iter(_values(measured, family, solver, _UNCUT).values()), None)
+    steps = _values(measured, family, solver, _STEP)
+    return [(step / whole, size) for size, step in steps.items()] if whole else []
+
+
+def _ratios(measured: Records, family: str, solver: str, quantity: str) -> dict[float, float]:
+    """Return values over the conforming ones, by ε."""
+    own, others = (_values(measured, family, s, quantity) for s in (solver, _MEASURE))
+    return {size: value / others[size] for size, value in own.items() if others.get(size)}
+
+
+def _swept(solvers: Sequence[str] | dict[str, None]) -> tuple[str, dict[str, float]] | None:
+    """Return the number that alone is varied, with its value in each label, if there is one."""
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for label in solvers:
+        if match := re.fullmatch(r"(\S+) (\w+)=([-+.\de]+)", label):
+            found.setdefault((match[1], match[2]), {})[label] = float(match[3])
+    return next(((key[1], own) for key, own in found.items() if len(own) >= _SWEPT), None)
+
+
+def _lead_of_sweep(measured: Records, name: str, values: Mapping[str, float]) -> Lead | None:
+    """Return the largest error over ε against the number over the conforming one."""
+    families = dict.fromkeys(m["family"] for m in measured)
+    worst: dict[str, dict[float, float]] = {error: {} for error in _ERRORS}
+    for label, value in sorted(values.items(), key=lambda item: item[1]):
+        for error, own in worst.items():
+            found = [r for f in families for r in _ratios(measured, f, label, error).values()]
+            if found:
+                own[value] = max(found)
+    worst = {error: own for error, own in worst.items() if len(own) >= _SWEPT}
+    if not worst:
+        return None
+    palette, title = Palette(), "largest error over ε, over that of the conforming mesh"
+    series = [Series(_ERRORS[error], list(own.items())) for error, own in worst.items()]
+    question = _QUESTIONS.get(name, f"What does {name} do to the error?")
+    return Lead(
+        question, _said_of_sweep(name, worst), [loglog(title, name, series, palette)],
+        f"{len(values)} values of {name}; each point is the largest over ε of "
+        f"{_listed(list(families))}.",
+    )  # fmt: skip
+
+
+def _said_of_sweep(name: str, worst: Mapping[str, Mapping[float, float]]) -> list[str]:
+    """Say up to which value no error grows, and what the larger ones do."""
+    values = sorted({value for own in worst.values() for value in own})
+    most = {v: max(own.get(v, 0.0) for own in worst.values()) for v in values}
+    bad = [value for value in values if most[value] > 1.0 + _ALIKE]
+    good = [value for value in values if not bad or value < bad[0]]
+    if not good:
+        return [f"No value of {name} leaves the error within {_ALIKE:.0%} of a conforming mesh's."]
+    off = max(most[value] for value in good) - 1.0
+    said = [
+        f"Up to {name} = {good[-1]:g} it costs nothing: at every ε the error is at most "
+        f"{100 * max(off, 0.0):.1f} % above that of a conforming mesh of the same size."
+    ]
+    if not bad:
+        return [*said, f"Larger values were not tried: {values[-1]:g} is the last."]
+    parts = [
+        f"{_ERRORS[error]}: {_times(own[bad[0]])} at {bad[0]:g}, {_times(own[values[-1]])} at "
+        f"{values[-1]:g}"
+        for error, own in worst.items()
+        if bad[0] in own and values[-1] in own
+    ]
+    end = [own for own in worst.values() if len(own) > 1]
+    flat = all(own[v] <= (1.0 + _ALIKE) * own[u] for own in end for u, v in [sorted(own)[-2:]])
+    return [
+        *said,
+        f"From {bad[0]:g} on it locks: {'; '.join(parts)}."
+        + (" There it no longer grows." if flat and len(bad) > 1 else ""),
+    ]
+
+
+def _times(ratio: float) -> str:
+    return f"{100 * (ratio - 1.0):+.0f} %" if ratio < 2.0 else f"{number(ratio, 2)} times"
+
+
+def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return name, maps and curves of each family of scenes."""
+    palette = Palette.of(solver_title(m["solver"]) for m in record["measurements"])
+    families = []
+    for family in dict.fromkeys(m["family"] for m in record["measurements"]):
+        measured = listed(record["measurements"], family=family)
+        growths = listed(record["growths"], family=family)
+        curves = _curves(measured, growths, palette)
+        maps = [*_worst(measured), *_maps(measured)]
+        families.append({"name": family, "maps": maps, "curves": curves})
+    return families
+
+
+def graded(
+    value: float | None, limits: Sequence[float], reason: str = "", most: bool = False
+) -> Cell:
+    """Grade a value by the first limit that it reaches (with `most`: does not exceed).
+
+    It is written with so many digits that it is not rounded to a grade that it misses.
+    """
+    if value is None:
+        return Cell("–", tip=reason, grade="none")
+
+    def grade(found: float) -> str:
+        reached = [found <= limit if most else found >= limit for limit in limits]
+        return list(_GRADES)[(*reached, True).index(True)]
+
+    own = grade(value)
+    enough = (n for n in range(2, 9) if grade(float(f"{value:.{n - 1}e}")) == own)
+    written = number(value, next(enough, 9))
+    return Cell(f"{_GRADES[own]} {written}", tip=reason, grade=own)
+
+
+def listed(records: Records, **fixed: Any) -> list[Mapping[str, Any]]:
+    """Return the records in which all of these keys have these values."""
+    return [r for r in records if all(r.get(key) == value for key, value in fixed.items())]
+
+
+def _maps(measured: Records) -> list[tuple[Table, str]]:
+    """Return the maps of one family with their legends."""
+    steps = []
+    for record in listed(measured, quantity=_STEP):
+        uncut = listed(measured, quantity=_UNCUT, solver=record["solver"])
+        whole = next((one["value"] for one in uncut if one["value"]), None)
+        share = record["value"] / whole if record["value"] and whole else None
+        reason = record["reason"] or ("" if share else "no step of the uncut body to compare with")
+        steps.append((record, graded(share, _LEAST, reason)))
+    conditions = [
+        (one, graded(one["value"], _MOST, one["reason"], most=True))
+        for one in listed(measured, quantity=_SCALED)
+    ]
+    maps = []
+    for title, found, words, limits in (
+        ("Critical explicit step over that of the uncut body", steps, "at least", _LEAST),
+        ("Condition number, scaled by the diagonal", conditions, "at most", _MOST),
+    ):
+        if found:
+            ends = [f"{words} {number(limit, 1)}" for limit in limits]
+            last = "less" if limits is _LEAST else "more"
+            legend = zip(_GRADES.values(), [*ends, last], strict=True)
+            maps.append((_map(title, found), "; ".join(f"{sign} {end}" for sign, end in legend)))
+    return maps
+
+
+def _worst(measured: Records) -> list[tuple[Table, str]]:
+    """Return the table of the worst value of each solver over ε, beside the conforming mesh."""
+    rows = []
+    family = measured[0]["family"] if measured else ""
+    solvers = list(dict.fromkeys(m["solver"] for m in measured))
+    for solver in solvers if _MEASURE in solvers else ():
+        least = _least(_shares(measured, family, solver))
+        errors = [list(_ratios(measured, family, solver, name).values()) for name in _ERRORS]
+        pitch = _ratios(measured, family, solver, _FREQUENCY).values()
+        scaled = list(_values(measured, family, solver, _SCALED).values())
+        off = max((ratio - 1.0 for ratio in pitch), key=abs, default=None)
+        rows.append([
+            solver_title(solver),
+            _written(None if least is None else least[0]),
+            *(_written(max(one, default=None)) for one in errors),
+            Cell("–") if off is None else Cell(f"{off:+.2%}"),
+            _written(max(scaled, default=None)),
+        ])  # fmt: skip
+    heads = ["method", "least step over the uncut body's", "largest L² error over conforming",
+             "largest energy-norm error over conforming", "lowest frequency off conforming",
+             "largest scaled condition number"]  # fmt: skip
+    legend = "errors are of the static field; a mass leaves them as they are and moves frequencies"
+    return [(Table("Worst over ε", heads, rows, named=True), legend)] if rows else []
+
+
+def _written(value: float | None) -> Cell:
+    return _NOTHING if value is None else Cell(number(value, 3))
+
+
+def _map(title: str, found: Sequence[tuple[Mapping[str, Any], Cell]]) -> Table:
+    """Return a row per method and a column per size; the tint repeats the sign in each cell."""
+    sizes = sorted({record["size"] for record, _ in found}, reverse=True)
+    rows = []
+    for solver in dict.fromkeys(record["solver"] for record, _ in found):
+        own = {r["size"]: cell for r, cell in found if r["solver"] == solver}
+        rows.append([solver_title(solver), *(own.get(size, _NOTHING) for size in sizes)])
+    return Table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, "map", named=True)
+
+
+def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing | None]:
+    names = dict.fromkeys(m["quantity"] for m in measured)
+    shown = [n for n in names if is_error(n) or n.startswith(("relative", "deviation"))]
+    panels = []
+    for quantity in [*shown, *(n for n in _DRAWN if n in names)]:
+        series = {}
+        for solver in dict.fromkeys(m["solver"] for m in measured):
+            law = next(iter(listed(growths, solver=solver, quantity=quantity)), {})
+            places = _places(measured, solver, quantity)
+            series[solver] = Series(solver_title(solver), places, _law_text(law))
+        title = error_title(quantity) if is_error(quantity) else quantity
+        title += ", s" if quantity == _STEP else ""
+        panels += _panels(title, series, palette)
+    return panels
+
+
+def _steps(measured: Records, family: str, palette: Palette) -> list[Drawing | None]:
+    """Return the share of the uncut step against ε."""
+    own, series = listed(measured, family=family), {}
+    for solver in dict.fromkeys(m["solver"] for m in own):
+        if whole := next(iter(_values(own, family, solver, _UNCUT).values()), None):
+            places = _places(own, solver, _STEP)
+            over = [(size, step and step / whole) for size, step in places]
+            series[solver] = Series(solver_title(solver), over)
+    return _panels("explicit step over that of the uncut body", series, palette)
+
+
+def _places(measured: Records, solver: str, quantity: str) -> list[tuple[Any, Any]]:
+    """Return a curve over falling ε, with a gap where the number of unknowns changes."""
+    own = listed(measured, solver=solver)
+    unknowns = {m["size"]: m["value"] for m in own if m["quantity"] == _UNKNOWNS}
+    found = sorted(
+        ((m["size"], m["value"]) for m in own if m["quantity"] == quantity and m["size"]),
+        key=lambda place: -place[0],
+    )
+    curve: list[tuple[Any, Any]] = []
+    for _, stretch in groupby(found, lambda place: unknowns.get(place[0])):
+        curve += [*([(None, None)] if curve else []), *stretch]
+    return curve
+
+
+def _panels(title: str, series: Mapping[str, Series], palette: Palette) -> list[Drawing | None]:
+    """Return a panel for few curves; for more, the variants of a solver apart from the others."""
+    joined = _joined(series)
+    for label, one in joined.items():
+        palette.setdefault(one.name, palette[solver_title(label)])
+    variants: dict[str, list[str]] = {}
+    for label in joined:
+        variants.setdefault(label.split()[0], []).append(label)
+    many = max(variants.values(), key=len, default=[])
+    groups = [list(joined)]
+    if len(joined) > _FEW and 1 < len(many) < len(joined):
+        groups = [many, [label for label in joined if label not in many[1:]]]
+    return [
+        loglog(title, "ε, in elements", [joined[label] for label in group[at : at + _FEW]],
+               palette, falling=True)
+        for group in groups
+        for at in range(0, len(group), _FEW)
+    ]  # fmt: skip
+
+
+def _joined(series: Mapping[str, Series]) -> dict[str, Series]:
+    """Return the curves with a name, those that nobody can tell apart as one with all names."""
+    found: dict[str, Series] = {}
+    for label, one in series.items():
+        if not any(y for _, y in one.places):
+            continue
+        for other, kept in found.items():
+            if _coincide(one, kept):
+                program, _, given = one.name.partition(" ")
+                name = given if given and program in kept.name.split(", ")[0] else one.name
+                found[other] = Series(f"{kept.name}, {name}", kept.places, kept.second)
+                break
+        else:
+            found[label] = one
+    return found
+
+
+def _coincide(one: Series, other: Series) -> bool:
+    if [x for x, _ in one.places] != [x for x, _ in other.places]:
+        return False
+    pairs = [(y, z) for (_, y), (_, z) in zip(one.places, other.places, strict=True)]
+    return all(
+        (y is None) == (z is None) and (y is None or abs(y - z) <= _SAME * abs(z)) for y, z in pairs
+    )
+
+
+def _law_text(law: Mapping[str, Any]) -> str:
+    if law.get("exponent") is None:
+        return ""
+    return f"∝ ε^{law['exponent'] + 0.0:.2f}".replace("-", "−").replace("−0.00", "0.00")
