@@ -112,7 +112,7 @@ class IterationsStudy(Study):
         """Return the lines of its table."""
         names = dict.fromkeys(name for one in self.settings for name in one.quantities)
         lines = [asdict(one) for one in self.settings]
-        return [{**line, **names, **line.pop("quantities")} for line in lines]
+        return [{**names, **line.pop("quantities"), **line} for line in lines]
 
 
 def iterations_study(
@@ -249,7 +249,9 @@ def _said(series: Sequence[Setting], tolerance: float, name: str) -> str:
         text = f"From {rest[0].iterations} {name} on the answer is"
     text += f" within {tolerance:.2g} of the same steps{step}, solved"
     text += f"; {own[0].iterations} are off by {_share(own[0].iteration_error)}"
-    text += f", {own[-1].iterations} by {_share(own[-1].iteration_error)}."
+    if len(own) > 1:
+        text += f", {own[-1].iterations} by {_share(own[-1].iteration_error)}"
+    text += "."
     missing = [str(one.iterations) for one in series if one.reason]
     return text + (f" Without an answer: {', '.join(missing)}." if missing else "")
 
