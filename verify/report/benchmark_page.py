@@ -29,7 +29,7 @@ _LEGEND = (
     "size. **Bold**: the interval overlaps that of the best. In brackets: 90 % range of the ratio "
     "over positions of the mesh, where they were studied. – refused with a reason; × asked, and "
     "not solved; blank: not asked. ≈ the reference cannot tell the error from none. Several "
-    "members of a scene (C5, C8) count by their median. Programs in one row agree to 1e-6."
+    "members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶."
 )
 
 
@@ -49,14 +49,15 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     figures = [f"![{plot.alt}]({beside.drawing(plot)})" for plot in drawn]
     lines = [
         "# Benchmark: the table of the whole", "",
-        " · ".join(["[Scenes](../../benchmark/index.md)",
-                    *(f"`{evidence.commands[name]}`" for name in ("arena", *FURTHER)
-                      if name in evidence.commands)]), "",
+        "[Scenes, to set up from one page each](../../benchmark/index.md)", "",
         *whole_table(evidence), "", _LEGEND, "",
         "## Time against error", "",
         "Wall time of what each cut costs anew, from the coarsest level to the finest; lower left "
         "is better. C5 and C8 show the middle of their members. Grey: the other discretisations.",
-        "", "\n".join(figures),
+        "", "\n".join(figures), "",
+        "<details><summary>Commands</summary>", "",
+        *(f"- `{evidence.commands[name]}`" for name in ("arena", *FURTHER)
+          if name in evidence.commands), "", "</details>",
     ]  # fmt: skip
     write_whole(folder / "index.md", "\n".join(lines) + "\n")
 

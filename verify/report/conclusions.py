@@ -308,7 +308,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("remeshing time", "times of remeshing", _weighed(
             "rest", "time", _REMESHED, "xfem", TWICE,
             ("At equal error remeshing takes only {} times XFEM's time.",
-             "At equal error it takes {} times XFEM's time, which decides nothing.",
+             "At equal error remeshing takes {} times XFEM's time, which decides nothing.",
              "At equal error remeshing takes {} times XFEM's time."))),
     ),
     "What it costs": (

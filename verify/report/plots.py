@@ -19,6 +19,7 @@ from verify.report.notation import RAISED, Drawing, printable
 
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"
+_NAMES = 2.3  # inches right of the axes for names at the ends of curves
 _LEFT, _ASIDE = 0.52, 2.0  # inches left of the axes, and with those right of them for a legend
 _RC = {
     "svg.fonttype": "none", "svg.hashsalt": "report", "text.parse_math": False, "font.size": 9,
@@ -574,6 +575,7 @@ def end_named(
     if not kept:
         return None
     with panel(title, 5.6, 3.2) as (figure, axes):
+        _place(axes, _NAMES)
         _logarithmic(axes, x_title, [p for own in (*(k for _, k in kept), *grey) for p in own])
         if descending:
             axes.invert_xaxis()
