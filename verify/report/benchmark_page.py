@@ -1,5 +1,6 @@
 """The benchmark's table of scenes and discretisations, and its plots of time against error."""
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
@@ -42,7 +43,8 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
         If it cannot be written.
     """
     place = folder / PICTURES
-    place.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(place, ignore_errors=True)  # of an earlier run
+    place.mkdir(parents=True)
     beside = Beside(place)
     scenes = benchmark_scenes(evidence.results)
     drawn = [plot for label, own in scenes.items() if (plot := time_plot(label, own))]

@@ -1,6 +1,7 @@
 """The front page of the results, and that of the ranked run: answers and figures."""
 
 import re
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -149,7 +150,8 @@ def coverage(evidence: Evidence) -> dict[str, Drawing | None]:
 
 def _pictures(folder: Path, drawn: dict[str, Drawing | None]) -> dict[str, list[str]]:
     place = folder / PICTURES
-    place.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(place, ignore_errors=True)  # of an earlier run
+    place.mkdir(parents=True)
     written = Pictures(place)
     return {
         question: [f"![{in_markdown(one.alt)}]({written.drawing(one)})", ""]
