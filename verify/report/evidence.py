@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from verify.files import read_json
-from verify.report.notation import number
+from verify.report.notation import ROUND_OFF, number
 from verify.report.run_directory import load_run
 from verify.result import CaseResult, Pair, ranked_solvers
 from verify.scene import list_cases, load_scenes
@@ -246,11 +246,16 @@ def mesh_ratios(
     """Return ratios of two solvers, one for each position of the mesh of the scenes that count."""
     values: dict[tuple[str, str], dict[str, float]] = {}
     for row in evidence.positions:
-        if row["metric"] == metric and row["value"] and counts(row["scene"]):
+        if row["metric"] == metric and counts(row["scene"]) and _is_told(row):
             place = values.setdefault((row["scene"], row["position"]), {})
             place[row["solver"]] = float(row["value"])
     return [
         both[solver] / both[rival]
         for _, both in sorted(values.items())
-        if {solver, rival} <= both.keys() and both[rival] > 0.0
+        if {solver, rival} <= both.keys()
     ]
+
+
+def _is_told(row: Row) -> bool:
+    """Whether an error is above round-off and the reference tells it from none."""
+    return bool(row["value"]) and float(row["value"]) > ROUND_OFF and float(row["low"]) > 0.0
