@@ -12,7 +12,7 @@ from typing import Any
 
 from verify.compare.errors import ERROR_NAMES
 from verify.compare.part_account import ACCOUNT
-from verify.result import SUFFICIENT, Metric, SolveRecord, Status, finest_of
+from verify.result import SUFFICIENT, CaseResult, Metric, SolveRecord, Status, finest_of
 from verify.scene import Scene
 from verify.scene.acceptance import OVERLAP
 from verify.solution import Solution
@@ -76,6 +76,19 @@ def interval_of(solve: SolveRecord, name: str) -> Interval | None:
     except NotMeasuredError:
         return None
     return found if isfinite(found.value) and isfinite(found.high) else None
+
+
+def number_on_finest(result: CaseResult, name: str, solver: str) -> Interval | str:
+    """Interval of a metric of a solver on its finest level, or why there is none."""
+    last = finest_of(result.solves).get(solver)
+    if last is None:
+        return "was not run on this case"
+    if (found := interval_of(last, name)) is not None:
+        return found
+    if last.status is not Status.SOLVED:
+        return f"level {last.level} {last.status}: {last.reason or 'no reason given'}"
+    said = last.notes.get(name) or last.notes.get("comparison") or "not measured"
+    return f"level {last.level}: {said}"
 
 
 def quotient_half_width(part: float, width: float, whole: float, whole_width: float) -> float:

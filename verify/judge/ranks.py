@@ -8,7 +8,7 @@ from typing import Any
 from verify.compare.part_account import ACCOUNT
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.cost import why_times_are_no_sample
-from verify.judge.intervals import ERROR_METRICS, Interval, interval_of
+from verify.judge.intervals import ERROR_METRICS, Interval, number_on_finest
 from verify.judge.pairs import coverage_of, groups_of, not_told, pairs_of
 from verify.result import (
     REFERENCE,
@@ -21,7 +21,6 @@ from verify.result import (
     Standing,
     Status,
     Verdict,
-    finest_of,
     ranked_solvers,
 )
 
@@ -120,13 +119,10 @@ def _by_worst(
     left_out: list[LeftOut] = []
     found: dict[str, list[tuple[Interval, str]]] = {}
     for result in cases:
-        finest = finest_of(result.solves)
         for solver in solvers:
-            last = finest.get(solver)
-            if last is None:
-                left_out.append(LeftOut(result.case, solver, "was not run on this case"))
-            elif (number := interval_of(last, metric)) is None:
-                left_out.append(LeftOut(result.case, solver, _why(last, metric)))
+            number = number_on_finest(result, metric, solver)
+            if isinstance(number, str):
+                left_out.append(LeftOut(result.case, solver, number))
             else:
                 found.setdefault(solver, []).append((number, result.case))
     if not found:
@@ -158,13 +154,6 @@ def _standings(
 def _above_round_off(found: Interval) -> Interval:
     low = found.low if found.value > ROUND_OFF else 0.0
     return Interval(found.value, low, max(found.high, ROUND_OFF))
-
-
-def _why(solve: SolveRecord, name: str) -> str:
-    if solve.status is not Status.SOLVED:
-        return f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
-    said = solve.notes.get(name) or solve.notes.get("comparison") or "not measured"
-    return f"level {solve.level}: {said}"
 
 
 def _acted_on(result: CaseResult) -> bool:

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 
 from verify.errors import InputError
 from verify.judge.convergence import ROUND_OFF
+from verify.judge.intervals import number_on_finest
 from verify.judge.models import changed, on_one_level
-from verify.judge.standing import item_on_finest
 from verify.result import CaseResult
 from verify.scene import Scene, scene_content
 from verify.study.study import Finding, Making, Study
@@ -173,15 +173,16 @@ def summary(
     lost: dict[tuple[str, str], dict[int, str]] = {}
     for (scene, number), result in found.items():
         for metric in METRICS:
-            item = item_on_finest(result, metric, solvers)
-            for solver, own in item.found.items():
+            for solver in solvers:
+                own = number_on_finest(result, metric, solver)
+                if isinstance(own, str):
+                    lost.setdefault((scene, solver), {}).setdefault(number, own)
+                    continue
                 row = {"scene": scene, "position": number, "solver": solver, "metric": metric}
                 errors.append({**row, "value": own.value, "low": own.low, "high": own.high})
                 if not _counts(errors[-1]):
                     why = f"{metric} {own.value:.1e}: exact, or not told from zero by the reference"
                     lost.setdefault((scene, solver), {})[number] = why
-            for solver, why in item.missing.items():
-                lost.setdefault((scene, solver), {}).setdefault(number, why)
     pairs = list(_pairs(errors, levels, solvers))
     measure = "conforming" if "conforming" in solvers else solvers[0]
     positions = len({number for _, number in found})
