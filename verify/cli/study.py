@@ -6,6 +6,7 @@ Examples
   verify study slivers --solver xfem --solver 'xfem slivers=merge' --out studies
   verify study energy --solver my_module:MySolver --out studies
   verify study thesis --quick --out studies
+  verify study claims --out studies
   verify study calibration --quick --out studies
   verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming --out studies
   verify study budget statics/tissue_strip --tolerance 0.05 --out studies
@@ -111,6 +112,13 @@ def thesis(*, quick: Quick = False, answer: Answer) -> int:
     from verify.study.thesis import thesis_study
 
     return _written("thesis", answer, lambda making: thesis_study(making, quick))
+
+
+def claims(*, answer: Answer) -> int:
+    """Claims from the literature, measured where that can be done, and judged."""
+    from verify.study.claims import claims_study
+
+    return _written("claims", answer, claims_study)
 
 
 def calibration(
@@ -361,5 +369,6 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
 
 
 ACTIONS = Actions(
-    (slivers, energy, thesis, calibration, cost, budget, iterations, positions), metavar="STUDY"
+    (slivers, energy, thesis, claims, calibration, cost, budget, iterations, positions),
+    metavar="STUDY",
 )

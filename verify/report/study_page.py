@@ -35,7 +35,7 @@ from verify.report.sliver_page import listed, sliver_families, sliver_lead
 from verify.report.thesis_page import thesis_view
 
 _STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations",
-            "positions")  # fmt: skip
+            "positions", "claims")  # fmt: skip
 _SCHEMA = 1
 _ALL = "all"  # scenes, of a study of positions
 
@@ -72,12 +72,13 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         "answer": record.get("answer", []),
         **study_view(kind, record),
     }
+    template = "claims.j2" if kind == "claims" else "study.j2"
     if form == "markdown":
         target = directory / f"{kind}.md"
-        write_whole(target, as_markdown("study.j2", directory, f"{kind}-pictures", **view))
+        write_whole(target, as_markdown(template, directory, f"{kind}-pictures", **view))
         return target
     page = directory / f"{kind}.html"
-    write_whole(page, as_html("study.j2", **view))
+    write_whole(page, as_html(template, **view))
     return print_page(page) if form == "pdf" else page
 
 
@@ -89,6 +90,7 @@ def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
             "families": sliver_families(record),
         },
         "energy": lambda: {},
+        "claims": lambda: {},
         "cost": lambda: {"running": _running(record), "precision": _precision(record)},
         "budget": lambda: {"bars": [_bars(budget) for budget in record["budgets"]]},
         "calibration": lambda: {"scatters": _scatters(record["trials"])},

@@ -1,0 +1,180 @@
+"""The study of claims from the literature: measured where that can be done, and judged by limits.
+
+`claims.toml` has a row per claim: its sense, who makes it and where, and limits with their reasons.
+`verify.study.claims_measured` has a function per claim, by the name in the row.
+"""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from importlib.resources import files
+from typing import Any
+
+from verify.report.notation import number as written
+from verify.result import Verdict
+from verify.runner.tasks import Failure, Task
+from verify.study import claims_measured
+from verify.study.claims_measured import Number
+from verify.study.study import Finding, Making, Study
+
+
+class Judgement(StrEnum):
+    """What the numbers say of a claim."""
+
+    HOLDS = "holds"
+    IN_PART = "holds in part"
+    NOT = "does not hold"
+    UNTOLD = "cannot be told"
+
+
+_AS_VERDICT = {Judgement.HOLDS: Verdict.PASS, Judgement.NOT: Verdict.FAIL}
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a claim means for a number; without bounds the number is shown only.
+
+    Attributes
+    ----------
+    number : str
+        What is measured.
+    at_least, at_most : float or None
+    why : str
+        Argument for the bounds.
+    """
+
+    number: str
+    at_least: float | None = None
+    at_most: float | None = None
+    why: str = ""
+
+    def kept_by(self, found: Number) -> bool | None:
+        """Say whether all of a number's interval is inside (True) or outside (False)."""
+        if found.value is None or found.low is None or found.high is None:
+            return None
+        low = -float("inf") if self.at_least is None else self.at_least
+        high = float("inf") if self.at_most is None else self.at_most
+        if low <= found.low and found.high <= high:
+            return True
+        return False if found.high < low or high < found.low else None
+
+    def in_words(self) -> str:
+        """Return the bounds and their reason; empty without bounds."""
+        pairs = ("at least", self.at_least), ("at most", self.at_most)
+        bounds = " and ".join(f"{word} {value:g}" for word, value in pairs if value is not None)
+        return f"{bounds}: {self.why}" if bounds else ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A row of `claims.toml`.
+
+    Attributes
+    ----------
+    measure : str
+        Function of `verify.study.claims_measured`.
+    solvers : list of str
+        That it runs.
+    sense, who, made, command : str
+        The claim, its authors, where they made it and what differs here, and what runs it again.
+    limits : list of Limit
+        Of the numbers, in their order.
+    """
+
+    measure: str
+    solvers: list[str]
+    sense: str
+    who: str
+    made: str
+    command: str
+    limits: list[Limit]
+
+
+def claims() -> list[Claim]:
+    """Read all claims."""
+    text = files("verify.study").joinpath("claims.toml").read_text(encoding="utf-8")
+    rows = tomllib.loads(text)["claims"]
+    return [Claim(**{**row, "limits": [Limit(**one) for one in row["limits"]]}) for row in rows]
+
+
+def judgement_of(limits: Sequence[Limit], numbers: Sequence[Number]) -> Judgement:
+    """Judge a claim: it holds if every limit is kept, not if every one is broken.
+
+    Kept and broken limits together make it hold in part. A limit that is neither decides nothing,
+    and a claim without limits cannot be told.
+    """
+    pairs = zip(limits, numbers, strict=True)
+    states = [limit.kept_by(n) for limit, n in pairs if limit.in_words()]
+    if True in states and False in states:
+        return Judgement.IN_PART
+    if None in states or not states:
+        return Judgement.UNTOLD
+    return Judgement.HOLDS if states[0] else Judgement.NOT
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with its numbers, their words, and what they say."""
+
+    claim: Claim
+    numbers: list[Number]
+    shown: list[str]
+    judgement: Judgement
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClaimsStudy(Study):
+    """What the study found."""
+
+    judged: list[Judged]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a line for each number."""
+        return [
+            {
+                "claim": one.claim.measure,
+                "judgement": str(one.judgement),
+                **asdict(limit),
+                **asdict(n),
+            }
+            for one in self.judged
+            for limit, n in zip(one.claim.limits, one.numbers, strict=True)
+        ]
+
+
+def claims_study(making: Making) -> ClaimsStudy:
+    """Measure every claim in a process of its own, and judge it.
+
+    A claim whose measurement fails has the reason in the place of its numbers.
+    """
+    every = claims()
+    tasks = [
+        Task(one.measure, getattr(claims_measured, one.measure), {}, tuple(one.solvers))
+        for one in every
+    ]
+    judged = []
+    for claim, found in zip(every, making.parts("claims", tasks, may_fail=True), strict=True):
+        failed = isinstance(found, Failure)
+        numbers = [Number(None, note=found.reason) for _ in claim.limits] if failed else found
+        shown = [in_words(one) for one in numbers]
+        judged.append(Judged(claim, numbers, shown, judgement_of(claim.limits, numbers)))
+    return ClaimsStudy(judged=judged, findings=[_finding(one) for one in judged])
+
+
+def _finding(one: Judged) -> Finding:
+    pairs = zip(one.claim.limits, one.shown, strict=True)
+    said = "; ".join(f"{limit.number}: {words}" for limit, words in pairs)
+    limits = "; ".join(words for limit in one.claim.limits if (words := limit.in_words()))
+    verdict = _AS_VERDICT.get(one.judgement, Verdict.UNDECIDED)
+    return Finding(one.claim.sense, f"{one.judgement}. {said}", limits or "shown", verdict)
+
+
+def in_words(found: Number) -> str:
+    """Write a number with its interval, if it has one, and its note."""
+    if found.value is None or found.low is None or found.high is None:
+        return f"not measured: {found.note}"
+    text = written(found.value, 3)
+    if found.low < found.high:
+        text += f" [{written(found.low, 3)}, {written(found.high, 3)}]"
+    return f"{text} ({found.note})" if found.note else text

@@ -1,0 +1,500 @@
+"""Measurements behind the claims from the literature, one function per claim.
+
+Each returns its numbers in the order of the limits in `claims.toml`, which it does not know.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.exact import exact_of
+from verify.conformance.scenes import held, line, pull, unit_scene, weight
+from verify.errors import InputError
+from verify.judge.accuracy import assess_accuracy
+from verify.judge.convergence import observed_rate
+from verify.judge.intervals import quotient_half_width
+from verify.printable import words_of
+from verify.result import Metric, SolveRecord, Status
+from verify.scene import Scene, load_scene, scene_content
+from verify.simulator.thesis import count_face, count_strips, delays
+from verify.solution import Solution
+from verify.solvers.body_of_scene import background_mesh
+from verify.study.measured_scenes import measured_scene, variant_of
+from verify.study.thesis_measured import sliver_systems
+from verify.system import critical_step, lowest_frequency, with_uncut_twin
+
+Array = NDArray[np.float64]
+_GRAVITY = 9.81
+_ELASTIC = {"young": 1.0e4, "poisson": 0.3, "density": 1000.0}
+_FAMILIES = ("slivers/plane_edges", "slivers/space_faces")
+_SLIVER = "slivers/plane_edges[epsilon=0.01]"
+_SMOOTH, _TIPS = "statics/f3_inclined", "statics/griffith_inside"
+_L2, _ENERGY = "displacement_l2", "energy_norm"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A measured number with the bounds of its true value.
+
+    Attributes
+    ----------
+    value, low, high : float or None
+        None if it could not be measured.
+    note : str
+        Range over what was varied; or why there is no value.
+    """
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+    note: str = ""
+
+
+def exactly(value: float, note: str = "") -> Number:
+    """Return a number that is known to more digits than a limit has."""
+    return Number(float(value), float(value), float(value), note)
+
+
+def within(value: float, width: float, note: str = "") -> Number:
+    """Return a number with its half-width."""
+    return Number(float(value), float(value - width), float(value + width), note)
+
+
+def _extreme(values: Sequence[float], pick: Callable[..., float], note: str) -> Number:
+    return exactly(pick(values), f"{min(values):.3g} to {max(values):.3g} over {note}")
+
+
+def _or_reason(measure: Callable[[], Number]) -> Number:
+    """Measure; what is not installed or refuses gives its reason."""
+    try:
+        return measure()
+    except Exception as problem:  # a guest may raise anything
+        return Number(None, note=words_of(problem))
+
+
+def _solved(scene: Scene, method: str, level: int) -> tuple[Solution, dict[str, Metric]]:
+    """Solve one level by a method and compare with the exact solution of the scene."""
+    variant = variant_of(method)
+    solution = variant.found().solve(scene, level, repetitions=1, **variant.parameters)
+    record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
+    solutions = {variant.solver: {level: solution}}
+    (measured,) = assess_accuracy(scene, [record], solutions, exact_of(scene)).solves
+    return solution, {metric.name: metric for metric in measured.metrics}
+
+
+def _quotient(one: Metric, other: Metric, note: str = "") -> Number:
+    parts = one.value, one.uncertainty, other.value, other.uncertainty
+    return within(one.value / other.value, quotient_half_width(*parts), note)
+
+
+def _least_over_slivers(method: str) -> Number:
+    found = [row.ratio for family in _FAMILIES for row in sliver_systems(family, method)]
+    return _extreme(found, min, f"ε = 0.1 to 1e-12 in {' and '.join(_FAMILIES)}")
+
+
+def _lame(young: float, poisson: float) -> tuple[float, float]:
+    """λ and μ in space and in plane strain, Pa."""
+    shear = young / (2.0 * (1.0 + poisson))
+    return 2.0 * shear * poisson / (1.0 - 2.0 * poisson), shear
+
+
+def _given(folder: Path, points: Array, cells: Array, at: Array, normal: Array) -> Scene:
+    """Make a scene of a given mesh, cut through by the plane through a point."""
+    dim = points.shape[1]
+    kind = "triangle" if dim == 2 else "tetra"
+    spatial = np.pad(points, ((0, 0), (0, 3 - dim)))
+    meshio.Mesh(spatial, [(kind, cells)]).write(folder / "mesh.vtu", file_format="vtu")
+    along = 4.0 * np.linalg.svd(normal[None])[2][1:] * np.ptp(points)
+    corners = [at + sign * along[0] for sign in (-1.0, 1.0)]
+    if dim == 3:
+        corners = [at + along.T @ way for way in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return unit_scene(
+        "given", folder / "given.toml",
+        geometry={"kind": "file", "file": "mesh.vtu", "dimension": dim},
+        mesh={"pattern": "given"},
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.01, "outputs": 2},
+        material=_ELASTIC | ({"plane": "strain"} if dim == 2 else {}),
+        cuts=[{"kind": "polyline" if dim == 2 else "polygon",
+               "points": [one.tolist() for one in corners]}],
+    )  # fmt: skip
+
+
+def _steps(points: Array, cells: Array, at: Array, normal: Array, mass: str) -> tuple[float, float]:
+    """Critical steps of a given mesh, s: cut through by a plane, and whole."""
+    with TemporaryDirectory() as folder:
+        scene = _given(Path(folder), points, cells, at, normal)
+        pair = with_uncut_twin(variant_of("xfem").found().system, scene, 0, {"mass": mass})
+    return critical_step(pair[0]), critical_step(pair[1])
+
+
+def element_step(points: Array, cells: Array) -> float:
+    """Least critical step of the uncut elements alone, each with its mass lumped, s.
+
+    Parameters
+    ----------
+    points : (n, d) float array
+        m; of triangles in plane strain, or of tetrahedra.
+    cells : (m, d + 1) int array
+    """
+    lame, shear = _lame(_ELASTIC["young"], _ELASTIC["poisson"])
+    least = np.inf
+    for corners in points[cells]:
+        count, dim = corners.shape
+        slopes = np.linalg.inv(np.column_stack([np.ones(count), corners]))[1:].T
+        pairs = np.einsum("ik,jl->ikjl", slopes, slopes)
+        dots = np.einsum("ij,kl->ikjl", slopes @ slopes.T, np.eye(dim))
+        matrix = lame * pairs + shear * (pairs.swapaxes(1, 3) + dots)
+        matrix = matrix.reshape(count * dim, count * dim) * count / _ELASTIC["density"]
+        least = min(least, 2.0 / np.sqrt(np.linalg.eigvalsh(matrix)[-1]))
+    return float(least)
+
+
+def _simplices(count: int = 20) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Single triangles and tetrahedra, and planes through a random inner point of each."""
+    random = np.random.default_rng(0)
+    for dim in (2, 3):
+        for _ in range(count):
+            points = random.normal(size=(dim + 1, dim))
+            inside = random.dirichlet(np.ones(dim + 1)) @ points
+            yield points, np.arange(dim + 1)[None], inside, random.normal(size=dim)
+
+
+def _bodies(count: int = 10) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Squares and cubes with inner nodes moved by up to a sixth of an element, and planes."""
+    random = np.random.default_rng(1)
+    for dim in (2, 3):
+        box = {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3}
+        given = {"geometry": box, "material": _ELASTIC} if dim == 3 else {}
+        supports = [held("bottom", [0.0] * dim)]
+        grid = unit_scene("grid", mesh={"cells": [[4] * dim]}, supports=supports, **given)
+        mesh, size = background_mesh(grid, 0)
+        inner = ((mesh.points > 1e-9) & (mesh.points < 1.0 - 1e-9)).all(axis=1)
+        for _ in range(count):
+            moved = random.uniform(-1.0, 1.0, mesh.points.shape) * size / 6.0
+            middle = random.uniform(0.3, 0.7, dim)
+            points = mesh.points + inner[:, None] * moved
+            yield points, mesh.cells, middle, random.normal(size=dim)
+
+
+def uncut_step() -> list[Number]:
+    """Compare steps with the side-wise mass: one element, bodies, the smallest element."""
+    singles = [np.divide(*_steps(*one, "sidewise")) for one in _simplices()]
+    off = [abs(ratio - 1.0) for ratio in singles]
+    bodies = list(_bodies())
+    steps = [_steps(*body, "sidewise") for body in bodies]
+    least = [own / element_step(*b[:2]) for b, (own, _) in zip(bodies, steps, strict=True)]
+    return [
+        _extreme(off, max, f"{len(off)} cut triangles and tetrahedra"),
+        _least_over_slivers("xfem"),
+        _extreme([own / whole for own, whole in steps], min, f"{len(steps)} cut bodies"),
+        _extreme(least, min, "the same bodies"),
+    ]
+
+
+def diagonal_step() -> list[Number]:
+    """Compare steps with the diagonal mass of the thesis (2.80), after Menouillard et al. 2006."""
+    ratios = [np.divide(*_steps(*one, "thesis")) for one in _simplices()]
+    return [
+        _extreme(ratios, min, f"{len(ratios)} cut triangles and tetrahedra"),
+        _least_over_slivers("xfem mass=thesis"),
+    ]
+
+
+def rigid_motion() -> list[Number]:
+    """Let a freed half fall: distance of its fall from g t²/2, relative."""
+    found, heights = [], (0.5, 0.3, 0.03, 1e-6)
+    for mass in ("sidewise", "thesis"):
+        off = []
+        for height in heights:
+            level, end = 0.5 + height / 8.0, 0.1
+            scene = unit_scene(
+                "falls", mesh={"cells": [[8, 8]]}, cuts=[line((-0.1, level), (1.1, level))],
+                material=_ELASTIC | {"young": 1e9, "plane": "strain"},
+                supports=[held("top", [0.0, 0.0])], loads=[weight(0.0, -_GRAVITY)],
+                analysis={"kind": "dynamic", "duration": end, "time_step": 0.01, "outputs": 2},
+            )  # fmt: skip
+            solution = variant_of("xfem").found().solve(scene, 0, repetitions=1, mass=mass)
+            lowest = solution.points[:, 1] == 0.0
+            fallen = float(solution.displacement[-1, lowest, 1].mean())
+            off.append(abs(fallen / (-0.5 * _GRAVITY * end**2) - 1.0))
+        found.append(_extreme(off, max, "cuts at 0.5, 0.3, 0.03 and 1e-6 of an element"))
+    return found
+
+
+def fewer_unknowns() -> list[Number]:
+    """Compare unknowns with a mesh made anew for the cut, at equal error around crack tips."""
+
+    @cache
+    def rows(method: str) -> list[tuple[Solution, dict[str, Metric]]]:
+        return [_solved(load_scene(_TIPS), method, level) for level in range(3)]
+
+    def compared(method: str, metric: str) -> Number:
+        own, other = (
+            np.log([(s.unknowns, metrics[metric].value) for s, metrics in rows(name)]).T
+            for name in (method, "conforming mesh=remeshed")
+        )
+        ratios = [_unknowns_at(other, error, size) for size, error in own.T[1:]]
+        return Number(ratios[-1], min(ratios), max(ratios), "on the two finest of three levels")
+
+    return [
+        _or_reason(partial(compared, method, metric))
+        for method in ("getfem tip=functions", "xfem")
+        for metric in (_L2, _ENERGY)
+    ]
+
+
+def _unknowns_at(other: Array, error: float, size: float) -> float:
+    """Unknowns e^size over those at which the other curve (unknowns, errors; logs) has an error."""
+    slope, offset = np.polyfit(other[0], other[1], 1)
+    return float(np.exp(size - (error - offset) / slope))
+
+
+def blade() -> list[Number]:
+    """Energy that an opening at once makes or loses, and its share that leaves the body."""
+    found = _solved(load_scene("benchmark/c5_blade_03"), "xfem opening=late", 1)[1]
+    drift, waves = found["energy_drift"], found["released_to_kinetic"]
+    return [
+        exactly(drift.value, "of the energy in play"),
+        exactly(waves.value / found["released"].value),
+    ]
+
+
+def gradual_release() -> list[Number]:
+    """Let forces fade behind a blade, and open at once: errors of K_III, energy that is taken."""
+    scene = load_scene("benchmark/c5_blade_03")
+    once, faded = (_solved(scene, f"xfem opening={rule}", 1)[1] for rule in ("late", "swept"))
+    off = [abs(one["K_III"].value / (one["K_III"].reference or 1.0) - 1.0) for one in (once, faded)]
+    return [
+        exactly(off[1] / off[0], f"relative errors {off[1]:.2g} and {off[0]:.2g}"),
+        exactly(faded["released_to_cut"].value / faded["released"].value),
+    ]
+
+
+def stabilised_mass() -> list[Number]:
+    """Least steps with masses that eigenvalues stabilise, and with the plain consistent mass."""
+    gevs, evs, plain = (
+        _least_over_slivers(f"xfem mass={name}") for name in ("gevs", "evs", "consistent")
+    )
+    return [gevs, exactly((evs.value or 0.0) / (plain.value or 1.0), f"EVS {evs.value:.3g}")]
+
+
+def ghost_locks() -> list[Number]:
+    """Errors with a ghost penalty of a large factor, and with aggregated cells."""
+    content = scene_content(load_scene(_SLIVER))
+
+    def error(method: str) -> float:
+        rows = {m.quantity: m for m in measured_scene(asdict(variant_of(method)), content)}
+        if _L2 not in rows:
+            raise InputError("; ".join(m.reason for m in rows.values()))
+        return rows[_L2].value or 0.0
+
+    fitted = error("conforming")
+    large = partial(lambda: exactly(error("ngsxfem ghost=100000") / error("ngsxfem")))
+    return [_or_reason(large), exactly(error("xfem slivers=merge") / fitted)]
+
+
+def virtual_nodes() -> list[Number]:
+    """Least steps with virtual nodes, and with cells divided along the cut."""
+    return [_least_over_slivers("virtual_node"), _least_over_slivers("subdivision")]
+
+
+def open_question() -> list[Number]:
+    """Step, and order of the frequency error, of the side-wise mass on linear simplices."""
+    scene, variant = load_scene(_SLIVER), variant_of("xfem")
+    sizes, errors = (8, 16, 32), []
+    for n in sizes:
+        mesh = scene.mesh.model_copy(update={"cells": ((n, n),)})
+        own = scene.model_copy(update={"mesh": mesh})
+        lumped, plain = (
+            lowest_frequency(variant.found().system(own, 0, mass=mass))  # type: ignore[attr-defined]
+            for mass in ("sidewise", "consistent")
+        )
+        errors.append(abs(lumped / plain - 1.0))
+    order = np.log2(errors[-2] / errors[-1])
+    shown = ", ".join(f"{error:.2g}" for error in errors)
+    return [
+        _least_over_slivers("xfem"),
+        exactly(order, f"distances {shown} at h = 1/8, 1/16, 1/32"),
+    ]
+
+
+def optimal_rates() -> list[Number]:
+    """Observed orders in L² and energy norm: smooth field, and halves that bend to half circles."""
+    found = []
+    for case in (_SMOOTH, "rotation/peeled_halves"):
+        rows = [_solved(load_scene(case), "xfem", level) for level in range(3)]
+        sizes = [solution.size for solution, _ in rows]
+        for name in (_L2, _ENERGY):
+            metrics = [row[1][name] for row in rows]
+            errors, widths = [m.value for m in metrics], [m.uncertainty for m in metrics]
+            rate = observed_rate("xfem", name, sizes, errors, widths)
+            known = rate.order is not None
+            found.append(
+                within(rate.order, rate.uncertainty) if known else Number(None, note=rate.reason)
+            )
+    return found
+
+
+def error_control() -> list[Number]:
+    """Estimates by recovered strains over true errors in the energy norm, on exact scenes."""
+    found = []
+    for method in ("conforming", "xfem"):
+        shares = []
+        for case in (_SMOOTH, _TIPS, "curved/circle"):
+            scene = load_scene(case)
+            for level in range(3):
+                solution, metrics = _solved(scene, method, level)
+                norm = np.sqrt(2.0 * (metrics["strain_energy"].reference or 0.0))
+                lame = _lame(scene.material.young, scene.material.poisson)
+                estimate = recovered_error(solution, *lame)
+                shares.append(estimate / (norm * metrics[_ENERGY].value))
+        found += [_extreme(shares, min, "three scenes on three levels")]
+        found += [exactly(float(np.median(shares)))]
+    return found
+
+
+def recovered_error(solution: Solution, lame: float, shear: float) -> float:
+    """Estimate the error of linear triangles in the energy norm from averaged strains.
+
+    Zienkiewicz and Zhu (1987): strains averaged at nodes, interpolated linearly, less those of the
+    cells. Nodes of the two faces of a cut are averaged apart.
+
+    Parameters
+    ----------
+    solution : Solution
+        Plane, of order 1.
+    lame, shear : float
+        Of the plane problem, Pa.
+
+    Returns
+    -------
+    float
+        √∫ σ:ε of the difference, √J (per metre of thickness).
+    """
+    cells, corners = solution.cells, solution.points[solution.cells]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    moved = solution.displacement[-1][cells]
+    gradient = np.swapaxes(moved[:, 1:] - moved[:, :1], 1, 2) @ np.linalg.inv(edges)
+    strain = 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
+    area = 0.5 * np.abs(np.linalg.det(edges))
+    share, total = np.zeros(len(solution.points)), np.zeros((len(solution.points), 2, 2))
+    np.add.at(share, cells, area[:, None])
+    np.add.at(total, cells, (area[:, None, None] * strain)[:, None])
+    off = (total / np.where(share > 0.0, share, 1.0)[:, None, None])[cells] - strain[:, None]
+
+    def products(d: Array) -> Array:
+        return lame * np.trace(d, axis1=-2, axis2=-1) ** 2 + 2.0 * shear * (d**2).sum(axis=(-2, -1))
+
+    # ∫ of the square of a linear field over a triangle: A/12 (Σ d_i² + (Σ d_i)²)
+    squares = area / 12.0 * (products(off).sum(axis=1) + products(off.sum(axis=1)))
+    return float(np.sqrt(squares.sum()))
+
+
+def hanging_bar(cells_of_mass: bool) -> Scene:
+    """Make the bar of Newton's test: 0.2 × 0.2 × 1 m, μ = λ = 5e4 Pa, 4 × 4 × 20 cells, held above.
+
+    With a cell's mass at every vertex each layer has 25/16 of its mass, and the lowest, of half a
+    cell, as much as the others: more gravity, and a pull on the lower end.
+    """
+    more = 25.0 / 16.0 if cells_of_mass else 1.0
+    loads = [weight(0.0, 0.0, -more * _GRAVITY)]
+    if cells_of_mass:
+        loads.append(pull("bottom", 0.0, 0.0, -more * _GRAVITY * 1000.0 * 0.025))
+    return unit_scene(
+        "bar",
+        geometry={"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [0.2, 0.2, 1.0]},
+        mesh={"cells": [[4, 4, 20]]},
+        material={"young": 1.25e5, "poisson": 0.25, "density": 1000.0,
+                  "model": "stable_neo_hookean"},
+        analysis={"kinematics": "finite_rotation"},
+        supports=[held("top", [0.0, 0.0, 0.0])],
+        loads=loads,
+    )  # fmt: skip
+
+
+def extension(cells_of_mass: bool, method: str = "xfem") -> float:
+    """Mean displacement of the lower end of the hanging bar, downwards, m."""
+    variant = variant_of(method)
+    scene = hanging_bar(cells_of_mass)
+    solution = variant.found().solve(scene, 0, repetitions=1, **variant.parameters)
+    return float(-solution.displacement[-1, solution.points[:, 2] == 0.0, 2].mean())
+
+
+def vbd_bar() -> list[Number]:
+    """Compare baselines of Newton's test, and a run of its solver, with the equilibrium."""
+    linear = 525 * 1000.0 * 0.05**3 * 9.81 / (2.0 * 0.04 * 1.25e5)
+    heavy, true = extension(True), extension(False)
+    solver = partial(lambda: exactly(extension(False, "vbd iterations=100") / true,
+                                     f"equilibrium {true:.5f} m"))  # fmt: skip
+    return [
+        exactly(0.0999 / heavy, f"equilibrium {heavy:.5f} m with their masses"),
+        exactly(heavy / linear, f"{linear:.5f} m by their formula"),
+        _or_reason(solver),
+    ]
+
+
+def half_the_unknowns() -> list[Number]:
+    """Nodes that XFEM adds on the face over those that snapping and subdivision adds."""
+    last = count_face((100,))[-1].added
+    ratios = {n.split()[1]: last["xfem"] / c for n, c in last.items() if n.startswith("snapping_")}
+    return [exactly(ratios["0.02"]), _extreme(list(ratios.values()), max, "six thresholds")]
+
+
+def thesis_laws() -> list[Number]:
+    """Laws behind Tables 4.3 and 4.6: unknowns of strips, and delays of openings."""
+    off = [abs(strip.enriched - strip.triangles - 2) for strip in count_strips((1, 2, 7, 50))]
+    size = [row.delay * row.speed / row.edge for row in delays((200, 400))]
+    spread = exactly(max(size) / min(size) - 1.0, f"{min(size):.3f} to {max(size):.3f} of an edge")
+    return [exactly(max(off), f"{len(off)} strips"), spread]
+
+
+def stable_and_accurate() -> list[Number]:
+    """Least step, and errors over those of a mesh that conforms to the cut."""
+    found = [_least_over_slivers("xfem")]
+    for case in (_SMOOTH, _TIPS):
+        own, other = (_solved(load_scene(case), m, 2)[1] for m in ("xfem", "conforming"))
+        found += [_quotient(own[name], other[name]) for name in (_L2, _ENERGY)]
+    return found
+
+
+def snapping() -> list[Number]:
+    """Least steps of meshes whose nodes were moved onto the cut."""
+    face = count_face((100,))[-1].step["snapping"]
+    return [_least_over_slivers("snapping"), exactly(face, "hundred cut elements of the face")]
+
+
+def removal() -> list[Number]:
+    """Area that removal takes out of the body, on the finest of three meshes, and its order."""
+    lost = []
+    for level in range(3):
+        solution, _ = _solved(load_scene(_SMOOTH), "removal", level)
+        corners = solution.points[solution.cells]
+        lost.append(1.0 - 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum())
+    shown = ", ".join(f"{share:.2g}" for share in lost)
+    return [exactly(lost[-1], f"{shown} on three meshes"), exactly(np.log2(lost[-2] / lost[-1]))]
+
+
+def springs() -> list[Number]:
+    """L² errors of springs in a state of uniform strains: on a fine mesh, and over a coarse one."""
+    scene = load_scene("statics/f1_patch")
+    errors = [_solved(scene, "mass_spring fit=van_gelder", k)[1][_L2] for k in range(2)]
+    note = f"{errors[0].value:.2g} and {errors[1].value:.2g} at h = 1/8 and 1/16"
+    return [within(errors[1].value, errors[1].uncertainty, note), _quotient(errors[1], errors[0])]
+
+
+def diagonal_scaling() -> list[Number]:
+    """Condition numbers over ε, largest over least, scaled by the diagonal; and the raw largest."""
+    found = []
+    for family in _FAMILIES:
+        rows = sliver_systems(family, "xfem")
+        scaled = [row.scaled for row in rows]
+        raw = max(row.condition for row in rows)
+        note = f"{min(scaled):.3g} to {max(scaled):.3g}; unscaled up to {raw:.1e}"
+        found.append(exactly(max(scaled) / min(scaled), note))
+    return found
