@@ -20,7 +20,7 @@ from verify.study.study import Finding, Making, Study
 
 
 class Judgement(StrEnum):
-    """What the numbers say of a claim."""
+    """What the numbers say about a claim."""
 
     HOLDS = "holds"
     IN_PART = "holds in part"
@@ -38,7 +38,7 @@ class Limit:
     Attributes
     ----------
     number : str
-        What is measured.
+        Its name.
     at_least, at_most : float or None
     why : str
         Argument for the bounds.
@@ -143,22 +143,34 @@ class ClaimsStudy(Study):
         ]
 
 
+_TOGETHER = 7  # claims in a process: they share imports and solves
+
+
 def claims_study(making: Making) -> ClaimsStudy:
-    """Measure every claim in a process of its own, and judge it.
+    """Measure all claims, and judge them.
 
     A claim whose measurement fails has the reason in the place of its numbers.
     """
     every = claims()
+    groups = [every[at : at + _TOGETHER] for at in range(0, len(every), _TOGETHER)]
     tasks = [
-        Task(one.measure, getattr(claims_measured, one.measure), {}, tuple(one.solvers))
-        for one in every
+        Task(
+            f"{group[0].measure} to {group[-1].measure}",
+            claims_measured.measured,
+            {"names": [one.measure for one in group]},
+            tuple(sorted({name for one in group for name in one.solvers})),
+        )
+        for group in groups
     ]
     judged = []
-    for claim, found in zip(every, making.parts("claims", tasks, may_fail=True), strict=True):
-        failed = isinstance(found, Failure)
-        numbers = [Number(None, note=found.reason) for _ in claim.limits] if failed else found
-        shown = [in_words(one) for one in numbers]
-        judged.append(Judged(claim, numbers, shown, judgement_of(claim.limits, numbers)))
+    for group, found in zip(groups, making.parts("claims", tasks, may_fail=True), strict=True):
+        lost = [Number(None, note=found.reason)] if isinstance(found, Failure) else []
+        for claim in group:
+            numbers = lost or found[claim.measure]
+            if len(numbers) == 1:  # it failed
+                numbers = numbers * len(claim.limits)
+            shown = [in_words(one) for one in numbers]
+            judged.append(Judged(claim, numbers, shown, judgement_of(claim.limits, numbers)))
     return ClaimsStudy(judged=judged, findings=[_finding(one) for one in judged])
 
 

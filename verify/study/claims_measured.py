@@ -22,7 +22,7 @@ from verify.judge.intervals import quotient_half_width
 from verify.printable import words_of
 from verify.result import Metric, SolveRecord, Status
 from verify.scene import Scene, load_scene, scene_content
-from verify.simulator.thesis import count_face, count_strips, delays
+from verify.simulator.thesis import FaceCount, count_face, count_strips, delays
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh
 from verify.study.measured_scenes import measured_scene, variant_of
@@ -71,16 +71,17 @@ def _extreme(values: Sequence[float], pick: Callable[..., float], note: str) -> 
 
 
 def _or_reason(measure: Callable[[], Number]) -> Number:
-    """Measure; what is not installed or refuses gives its reason."""
+    """Measure; a program that is absent or refuses gives its reason."""
     try:
         return measure()
     except Exception as problem:  # a guest may raise anything
         return Number(None, note=words_of(problem))
 
 
-def _solved(scene: Scene, method: str, level: int) -> tuple[Solution, dict[str, Metric]]:
-    """Solve one level by a method and compare with the exact solution of the scene."""
-    variant = variant_of(method)
+@cache
+def _solved(case: str, method: str, level: int) -> tuple[Solution, dict[str, Metric]]:
+    """Solve one level of a case by a method and compare with its exact solution."""
+    scene, variant = load_scene(case), variant_of(method)
     solution = variant.found().solve(scene, level, repetitions=1, **variant.parameters)
     record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
     solutions = {variant.solver: {level: solution}}
@@ -93,8 +94,11 @@ def _quotient(one: Metric, other: Metric, note: str = "") -> Number:
     return within(one.value / other.value, quotient_half_width(*parts), note)
 
 
+_systems = cache(sliver_systems)
+
+
 def _least_over_slivers(method: str) -> Number:
-    found = [row.ratio for family in _FAMILIES for row in sliver_systems(family, method)]
+    found = [row.ratio for family in _FAMILIES for row in _systems(family, method)]
     return _extreme(found, min, f"ε = 0.1 to 1e-12 in {' and '.join(_FAMILIES)}")
 
 
@@ -230,15 +234,12 @@ def rigid_motion() -> list[Number]:
 def fewer_unknowns() -> list[Number]:
     """Compare unknowns with a mesh made anew for the cut, at equal error around crack tips."""
 
-    @cache
-    def rows(method: str) -> list[tuple[Solution, dict[str, Metric]]]:
-        return [_solved(load_scene(_TIPS), method, level) for level in range(3)]
+    def curve(method: str, metric: str) -> Array:
+        rows = [_solved(_TIPS, method, level) for level in range(3)]
+        return np.log([(solution.unknowns, found[metric].value) for solution, found in rows]).T
 
     def compared(method: str, metric: str) -> Number:
-        own, other = (
-            np.log([(s.unknowns, metrics[metric].value) for s, metrics in rows(name)]).T
-            for name in (method, "conforming mesh=remeshed")
-        )
+        own, other = (curve(name, metric) for name in (method, "conforming mesh=remeshed"))
         ratios = [_unknowns_at(other, error, size) for size, error in own.T[1:]]
         return Number(ratios[-1], min(ratios), max(ratios), "on the two finest of three levels")
 
@@ -257,7 +258,7 @@ def _unknowns_at(other: Array, error: float, size: float) -> float:
 
 def blade() -> list[Number]:
     """Energy that an opening at once makes or loses, and its share that leaves the body."""
-    found = _solved(load_scene("benchmark/c5_blade_03"), "xfem opening=late", 1)[1]
+    found = _solved("benchmark/c5_blade_03", "xfem opening=late", 1)[1]
     drift, waves = found["energy_drift"], found["released_to_kinetic"]
     return [
         exactly(drift.value, "of the energy in play"),
@@ -267,8 +268,8 @@ def blade() -> list[Number]:
 
 def gradual_release() -> list[Number]:
     """Let forces fade behind a blade, and open at once: errors of K_III, energy that is taken."""
-    scene = load_scene("benchmark/c5_blade_03")
-    once, faded = (_solved(scene, f"xfem opening={rule}", 1)[1] for rule in ("late", "swept"))
+    case = "benchmark/c5_blade_03"
+    once, faded = (_solved(case, f"xfem opening={rule}", 1)[1] for rule in ("late", "swept"))
     off = [abs(one["K_III"].value / (one["K_III"].reference or 1.0) - 1.0) for one in (once, faded)]
     return [
         exactly(off[1] / off[0], f"relative errors {off[1]:.2g} and {off[0]:.2g}"),
@@ -328,7 +329,7 @@ def optimal_rates() -> list[Number]:
     """Observed orders in L² and energy norm: smooth field, and halves that bend to half circles."""
     found = []
     for case in (_SMOOTH, "rotation/peeled_halves"):
-        rows = [_solved(load_scene(case), "xfem", level) for level in range(3)]
+        rows = [_solved(case, "xfem", level) for level in range(3)]
         sizes = [solution.size for solution, _ in rows]
         for name in (_L2, _ENERGY):
             metrics = [row[1][name] for row in rows]
@@ -349,7 +350,7 @@ def error_control() -> list[Number]:
         for case in (_SMOOTH, _TIPS, "curved/circle"):
             scene = load_scene(case)
             for level in range(2):
-                solution, metrics = _solved(scene, method, level)
+                solution, metrics = _solved(case, method, level)
                 norm = np.sqrt(2.0 * (metrics["strain_energy"].reference or 0.0))
                 lame = _lame(scene.material.young, scene.material.poisson)
                 estimate = recovered_error(solution, *lame)
@@ -362,8 +363,8 @@ def error_control() -> list[Number]:
 def recovered_error(solution: Solution, lame: float, shear: float) -> float:
     """Estimate the error of linear triangles in the energy norm from averaged strains.
 
-    Zienkiewicz and Zhu (1987): strains averaged at nodes, interpolated linearly, less those of the
-    cells. Nodes of the two faces of a cut are averaged apart.
+    Zienkiewicz and Zhu (1987): strains averaged at nodes and interpolated linearly, less the
+    strains of the cells. Nodes of the two faces of a cut are averaged apart.
 
     Parameters
     ----------
@@ -399,8 +400,8 @@ def recovered_error(solution: Solution, lame: float, shear: float) -> float:
 def hanging_bar(cells_of_mass: bool) -> Scene:
     """Make the bar of Newton's test: 0.2 × 0.2 × 1 m, μ = λ = 5e4 Pa, 4 × 4 × 20 cells, held above.
 
-    With a cell's mass at every vertex each layer has 25/16 of its mass, and the lowest, of half a
-    cell, as much as the others: more gravity, and a pull on the lower end.
+    A cell's mass at every vertex makes each layer 25/16 times as heavy, and the lowest twice that.
+    So gravity is larger, and a traction pulls at the lower end.
     """
     more = 25.0 / 16.0 if cells_of_mass else 1.0
     loads = [weight(0.0, 0.0, -more * _GRAVITY)]
@@ -439,9 +440,14 @@ def vbd_bar() -> list[Number]:
     ]
 
 
+@cache
+def _face() -> FaceCount:
+    return count_face((50,))[-1]
+
+
 def half_the_unknowns() -> list[Number]:
-    """Nodes that XFEM adds on the face over those that snapping and subdivision adds."""
-    last = count_face((50,))[-1].added
+    """Nodes that XFEM adds on the face over the count of snapping and subdivision."""
+    last = _face().added
     ratios = {n.split()[1]: last["xfem"] / c for n, c in last.items() if n.startswith("snapping_")}
     return [exactly(ratios["0.02"]), _extreme(list(ratios.values()), max, "six thresholds")]
 
@@ -455,17 +461,17 @@ def thesis_laws() -> list[Number]:
 
 
 def stable_and_accurate() -> list[Number]:
-    """Least step, and errors over those of a mesh that conforms to the cut."""
+    """Measure the least step, and errors over the errors of a mesh that conforms to the cut."""
     found = [_least_over_slivers("xfem")]
     for case in (_SMOOTH, _TIPS):
-        own, other = (_solved(load_scene(case), m, 2)[1] for m in ("xfem", "conforming"))
+        own, other = (_solved(case, m, 2)[1] for m in ("xfem", "conforming"))
         found += [_quotient(own[name], other[name]) for name in (_L2, _ENERGY)]
     return found
 
 
 def snapping() -> list[Number]:
     """Least steps of meshes whose nodes were moved onto the cut."""
-    face = count_face((50,))[-1].step["snapping"]
+    face = _face().step["snapping"]
     return [_least_over_slivers("snapping"), exactly(face, "fifty cut elements of the face")]
 
 
@@ -473,7 +479,7 @@ def removal() -> list[Number]:
     """Area that removal takes out of the body, on the finest of three meshes, and its order."""
     lost = []
     for level in range(3):
-        solution, _ = _solved(load_scene(_SMOOTH), "removal", level)
+        solution, _ = _solved(_SMOOTH, "removal", level)
         corners = solution.points[solution.cells]
         lost.append(1.0 - 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum())
     shown = ", ".join(f"{share:.2g}" for share in lost)
@@ -482,8 +488,8 @@ def removal() -> list[Number]:
 
 def springs() -> list[Number]:
     """L² errors of springs in a state of uniform strains: on a fine mesh, and over a coarse one."""
-    scene = load_scene("statics/f1_patch")
-    errors = [_solved(scene, "mass_spring fit=van_gelder", k)[1][_L2] for k in range(2)]
+    case = "statics/f1_patch"
+    errors = [_solved(case, "mass_spring fit=van_gelder", k)[1][_L2] for k in range(2)]
     note = f"{errors[0].value:.2g} and {errors[1].value:.2g} at h = 1/8 and 1/16"
     return [within(errors[1].value, errors[1].uncertainty, note), _quotient(errors[1], errors[0])]
 
@@ -492,9 +498,31 @@ def diagonal_scaling() -> list[Number]:
     """Condition numbers over ε, largest over least, scaled by the diagonal; and the raw largest."""
     found = []
     for family in _FAMILIES:
-        rows = sliver_systems(family, "xfem")
+        rows = _systems(family, "xfem")
         scaled = [row.scaled for row in rows]
         raw = max(row.condition for row in rows)
         note = f"{min(scaled):.3g} to {max(scaled):.3g}; unscaled up to {raw:.1e}"
         found.append(exactly(max(scaled) / min(scaled), note))
+    return found
+
+
+def measured(names: list[str]) -> dict[str, list[Number]]:
+    """Measure claims one after the other, which share solves.
+
+    Parameters
+    ----------
+    names : list of str
+        Functions of this module.
+
+    Returns
+    -------
+    dict of str to list of Number
+        One number with the reason where a measurement failed.
+    """
+    found = {}
+    for name in names:
+        try:
+            found[name] = globals()[name]()
+        except Exception as problem:  # a guest may raise anything
+            found[name] = [Number(None, note=words_of(problem))]
     return found
