@@ -5,7 +5,8 @@ Neither is negative, and p g = 0. Pressures are linear over facets, with a value
 corner; the gap that belongs to one is weighted by its hat function. Of linear elements that is one
 value per node (the rule of the corners). Of quadratic ones it is the stable pair P2/P1 (S. Hüeber,
 M. Mair, B. Wohlmuth, Appl. Numer. Math. 54, 2005). Corners of a facet at a tip have the pressure of
-its other corners, so that a uniform pressure is one.
+its other corners, so that a uniform pressure is one. Where a cut bends, or two join, a node lies on
+two faces and has a pressure on each: a gap at one does not pay for an overlap at the other.
 
 With weighted gaps B u, forces on the nodes are Bᵀ p. The pressures solve a complementarity problem
 of the dense compliance S = B A⁻¹ Bᵀ. A is the matrix of the body with its cuts open.
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import nnls
 from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from reference.nodal_algebra import facing_nodes, sides_of_cut
 from reference.space import ConformingSpace
@@ -27,6 +29,7 @@ Array = NDArray[np.float64]
 _BLOCK = 64  # right sides that are solved for at once
 _MOST = 100  # changes of the active set, far more than any took
 _ROUND_OFF = 1e-12  # of the largest gap without pressures
+_SMOOTH = np.cos(np.pi / 6.0)  # a resolved arc turns by at most half a radian from facet to facet
 
 # Integrals over a facet, per its size, of the hat of a corner times a quadratic function: of the
 # corner, another corner, the middle of an edge at the corner, the middle of another edge
@@ -53,7 +56,7 @@ class FaceContact:
     gaps : (m, k) csr_array
         Weighted gaps of nodal displacements (k,): B.
     pairs : (m, 2) int array
-        The nodes that face each other there.
+        The nodes that face each other there; the same on several faces at a bend.
     """
 
     def __init__(self, space: ConformingSpace, held: NDArray[np.int32]) -> None:
@@ -69,8 +72,10 @@ class FaceContact:
         moves &= facing[:, :, 0] != facing[:, :, 1]
         shares, hats = _shares(space, facing, moves)
         pairs = np.sort(facing, axis=2)
-        keys = pairs[hats > 0.0]
-        self.pairs, row = np.unique(keys, axis=0, return_inverse=True)
+        faces = np.broadcast_to(_faces(pairs, normals)[:, None], hats.shape)
+        keys = np.column_stack([pairs[hats > 0.0], faces[hats > 0.0]])
+        found, row = np.unique(keys, axis=0, return_inverse=True)
+        self.pairs = found[:, :2]
         number = np.full(hats.shape, -1)
         number[hats > 0.0] = row.ravel()
         facet, i, j = np.nonzero(shares)
@@ -116,6 +121,18 @@ class FaceContact:
         found = np.zeros(len(self.weights))
         found[apart] = pressures(compliance[np.ix_(apart, apart)], gaps[apart])[0]
         return found, np.asarray(self.gaps.T @ found)
+
+
+def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int32]:
+    """Return the smooth face (f,) of each facet; `pairs` (f, q, 2) say which facets touch."""
+    at = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)[1].reshape(pairs.shape[:2])
+    facets = np.repeat(np.arange(len(at)), at.shape[1])
+    touch = coo_array((np.ones(at.size), (facets, at.ravel()))).tocsr()
+    one, other = (touch @ touch.T).nonzero()
+    smooth = np.abs(np.sum(normals[one] * normals[other], axis=1)) > _SMOOTH
+    shape = (len(at), len(at))
+    joined = coo_array((np.ones(smooth.sum()), (one[smooth], other[smooth])), shape=shape)
+    return np.asarray(connected_components(joined, directed=False)[1])
 
 
 def _shares(

@@ -476,9 +476,9 @@ class OpeningCurve:
     """The displacement jump of one field along a line on a cut.
 
     `level` is None for an exact solution. `normal` and `tangential` are in m, positive where the
-    cut opens; in space the tangential jump is a length. `pressure` is that of faces that touch, Pa;
-    empty without contact. The bands are half-widths of a reference; empty where nothing says how
-    well the field is known.
+    cut opens; in space the tangential jump is a length. `pressure` acts between faces that touch,
+    in Pa; empty without contact. The bands are half-widths of a reference; empty where nothing
+    says how well the field is known.
     """
 
     solver: str

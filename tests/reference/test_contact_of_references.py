@@ -149,6 +149,29 @@ def test_faces_under_hydrostatic_pressure_pass_it_on_as_if_uncut(cuts, d, degree
 
 
 @pytest.mark.fenicsx
+def test_both_faces_at_a_bend_of_a_cut_are_kept_apart():
+    """Pushed along, one leg of a bent cut closes and the other opens: no mean of both counts."""
+    bend, ends = np.array([0.47, 0.52]), np.array([[-0.1, 0.31], [1.1, 0.2]])
+    line = {"kind": "polyline", "points": [ends[0].tolist(), bend.tolist(), ends[1].tolist()]}
+    scene = scenes.scene(
+        [line], contact={"expected": "closed"}, mesh={"cells": [[5, 5]]},
+        supports=[{"where": "bottom", "displacement": [0.0, 0.0]},
+                  {"where": "top", "displacement": [0.04, -0.01]}],
+    )  # fmt: skip
+    found = ConformingSolver().solve(scene, 0, 0, mesh="remeshed")
+    nodes = np.flatnonzero(np.linalg.norm(found.points - bend, axis=1) < 1e-9)
+    middle = found.points[found.cells].mean(axis=1)[:, 1]
+    height = [middle[(found.cells == node).any(axis=1)].mean() for node in nodes]
+    below, above = nodes[np.argsort(height)]
+    jump = found.displacement[0][above] - found.displacement[0][below]
+    legs = np.stack([bend - ends[0], ends[1] - bend])
+    normals = np.stack([-legs[:, 1], legs[:, 0]], axis=1)
+    gaps = normals @ jump / np.linalg.norm(legs, axis=1)
+    assert gaps.min() > -1e-12
+    assert gaps.max() > 1e-3
+
+
+@pytest.mark.fenicsx
 def test_drawn_faces_are_free_and_what_contact_adds_is_nothing():
     strain = 0.1 * np.eye(2)
     closed = pressed(LINES, 2, "linear", {"matrix": strain.tolist(), "shift": [0.0, 0.0]})

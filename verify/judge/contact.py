@@ -63,7 +63,7 @@ class ContactTruth:
     falls: float = inf
 
     def width_of_norm(self, differences: Sequence[float]) -> float:
-        """Half-width of the norm of an error, from those of the differences of levels."""
+        """Half-width of the norm of an error, from norms of the differences of levels."""
         if not self.sizes:
             return 0.0
         return field_uncertainty(differences, self.sizes, self.order, self.falls).half_width
@@ -87,7 +87,7 @@ def known_contact(
 ) -> ContactTruth | None:  # fmt: skip
     """Take the contact that levels of a reference state, coarse to fine; None without any.
 
-    Their resultants at the last output time are by one rule, whoever is judged.
+    Their resultants at the last output time are by one rule, for all solvers.
     """
     if rule is None or any(one.contact is None for one in levels):
         return None

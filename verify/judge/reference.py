@@ -93,7 +93,7 @@ class Reference:
     record : ReferenceRecord
         What the result says about it.
     contact : ContactTruth, optional
-        Pressures that its levels state; those of an exact field follow from its stress.
+        Pressures that its levels state; an exact field has them in its stress.
     rules : Rules, optional
         At the points of which the motion was asked before, and remembers what it was.
     """
