@@ -38,7 +38,7 @@ _SHARP = 40.0  # degrees: edges beyond that are drawn as edges
 
 @dataclass(frozen=True)
 class Frame:
-    """What is seen at a time: the body, the blades as they are held, the hooks where they grip.
+    """A frame of the animation: the body, the blades as held, the hooks where they grip.
 
     A blade is its tip and its other end, a hook its place and the direction in which it draws.
     """
@@ -51,7 +51,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Underlay:
-    """What is drawn with a skin: the uncut body at rest, behind it; a membrane's `thickness`, m."""
+    """Background of a skin: the uncut body at rest; a membrane's `thickness`, m."""
 
     picture: Picture
     thickness: float = 0.0
@@ -95,10 +95,10 @@ def view_of(
 ) -> View:
     """Choose a view that holds the first and the last frame.
 
-    Below a `skin` (`Stage.skin`) its first frame is drawn as what lies under it.
-    With `zoom` above 1 it is so many times as near, about what the hooks of the last frame hold
-    apart, else about its blades, else about the middle. A plane body is looked at from above its
-    plane, a sheet almost so, a block from a corner.
+    Below a `skin` (`Stage.skin`) its first frame is drawn as what lies under it. With `zoom` above
+    1 the camera is so many times as near. It looks at the gap between the hooks of the last frame,
+    else at its blades, else at the middle. A plane body is looked at from above its plane, a sheet
+    almost so, a block from a corner.
     """
     points = np.concatenate([frames[k].picture.points for k in (0, -1)])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -216,7 +216,7 @@ def look(camera: Any, view: View) -> None:
 
 
 def meshes_of(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
-    """Meshes for PyVista: skin, faces of cuts, their lines; colour; if shaded smoothly."""
+    """Make meshes for PyVista: skin, faces of cuts, their lines; colour; if shaded smoothly."""
     import pyvista
 
     picture, found = frame.picture, []
@@ -242,7 +242,7 @@ def _polydata(picture: Picture, chosen: NDArray[np.bool_]) -> Any:
 
 
 def beside(frame: Frame, view: View) -> list[tuple[Any, str, bool]]:
-    """Meshes of what is drawn and not simulated: tissue under a skin, lips, instruments."""
+    """Make meshes that are drawn and not simulated: tissue under a skin, lips, instruments."""
     import pyvista
 
     found: list[tuple[Any, str, bool]] = []
@@ -278,7 +278,7 @@ def _on_edge(place: Floats, picture: Picture, view: View) -> Floats:
 
 
 def _lips(picture: Picture, thickness: float, view: View) -> Any:
-    """Walls of the depth of a membrane below the lines of its cuts."""
+    """Make walls of the depth of a membrane below the lines of its cuts."""
     import pyvista
 
     triangles: Any = picture.triangles
@@ -606,7 +606,7 @@ class PlayWindow:
             self.scalpel.touch(place, far - near)
 
     def _seen_at(self, x: int, y: int, depth: float) -> Floats:
-        """Find the point (3,) of space behind a pixel: 0 is the near end of what is seen."""
+        """Find the point (3,) of space behind a pixel: 0 is the near end of the view."""
         renderer = self.plotter.renderer
         renderer.SetDisplayPoint(x, y, depth)
         renderer.DisplayToWorld()

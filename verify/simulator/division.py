@@ -56,11 +56,11 @@ class PatchCutter:
         self._starts, self._around = mesh.node_cells
 
     def nodes_of(self, cells: Ints) -> Ints:
-        """Nodes of some cells, ascending."""
+        """Find nodes of some cells, ascending."""
         return distinct(self.mesh.cells[cells])
 
     def cells_around(self, nodes: Ints) -> Ints:
-        """Cells that have one of the nodes, ascending."""
+        """Find cells that have one of the nodes, ascending."""
         return distinct(of_lists(self._starts, self._around, nodes))
 
     def patch(self, cells: Ints) -> MeshPatch:
@@ -97,14 +97,14 @@ class StoredPieces(NamedTuple):
             rows, pieces = rows[more], pieces[more]
 
     def labelled(self, cells: Ints, cut: int) -> Bools:
-        """Whether any piece of each cell has a side of the cut."""
+        """Tell whether any piece of each cell has a side of the cut."""
         found = np.zeros(len(cells), dtype=bool)
         for rows, pieces in self.in_turn(cells):
             found[rows] |= self.label[pieces, cut] != 0
         return found
 
     def separated(self, cells: Ints, label: Sides, numbers: Ints, cut: int) -> Bools:
-        """Whether a cut has split every stored piece of which each given piece may be a part.
+        """Tell whether a cut has split every stored piece of which each given piece may be a part.
 
         `numbers` says which cuts the columns of `label` (p, q) are.
         """
@@ -152,7 +152,7 @@ class TiedParts:
         self._part = GrowingArray(np.arange(cells))
 
     def still(self, tied: Ints, old: Ints) -> Ints:
-        """Those of the pairs (t, 2) of new pieces that have not been apart before.
+        """Select pairs (t, 2) of new pieces that have not been apart before.
 
         `old` (p,) is the stored piece of each new one, -1 if it has none.
         """
@@ -161,7 +161,7 @@ class TiedParts:
         return tied[same & (first >= 0) & (second >= 0)]
 
     def parted(self, tied: Ints, old: Ints) -> Bools:
-        """Which new pieces (p,) come from a part that is several by now."""
+        """Tell which new pieces (p,) come from a part that is several by now."""
         now = connected(len(old), *tied.T)
         known = np.flatnonzero(old >= 0)
         before = np.unique(self._part.rows[old[known]], return_inverse=True)[1]
@@ -194,7 +194,7 @@ class TiedParts:
 
 @dataclass(frozen=True)
 class Division:
-    """Pieces of a patch of them against those of the body.
+    """Pieces of a patch of the body, against the body's own.
 
     Attributes
     ----------
@@ -293,8 +293,8 @@ def number_groups(
 ) -> Renumbered:
     """Give every group (p, d + 1) of slots its dof node, new ones from `count` on.
 
-    A group keeps the dof node from which it descends; if several descend from one, that in which
-    the node lies keeps it (else the first), and the others get new numbers and it as source.
+    A group keeps the dof node from which it descends. If several descend from one, the group in
+    which the node lies keeps it, else the first. The others get new numbers, with it as source.
     """
     piece, corner = np.nonzero(slots.solid[:, None] & slots.touched)
     mine, before = group[piece, corner], piece_cells[slots.old[piece], corner]

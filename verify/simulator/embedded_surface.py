@@ -105,9 +105,9 @@ def divide_facets(
 def _divided(facets, row, alone, positive, points, shares):
     """Write the parts of facets: corners, their coordinates, facet, side of the cut.
 
-    `row` (f,) is that of a divided facet in what follows: its corner alone on its side, whether
-    that is above the cut, the two points (r, 2) on the edges from it, and the shares (r, 2, 2) of
-    the ends of these edges in them, of that above first.
+    `row` (f,) is the row of a divided facet in the other arrays. They are: its corner alone on its
+    side; whether the corner is above the cut; the two points (r, 2) on the edges from it; and the
+    shares (r, 2, 2) of the ends of these edges in the points, the end above first.
     """
     most = 3 * len(facets)
     ids, at = np.empty((most, 3), dtype=np.int64), np.zeros((most, 3, 3))
@@ -156,7 +156,7 @@ class _Fragments(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """Cell (q, k) of each corner of facets, its coordinates, those of a place inside the facet."""
+    """Find the cell (q, k) of each corner of facets; coordinates of it and a place inside."""
 
     cell: Ints
     weights: Floats
@@ -170,11 +170,11 @@ class _SurfaceCut:
         self._nodes, self._values, self._cut, self._embedded = nodes, values, cut, embedded
 
     def level_set(self, points: Floats) -> Floats:
-        """Realised level set at the vertices; zero points are on the cut by construction."""
+        """Return the realised level set at the vertices; zero points are exactly on the cut."""
         return self._values if points is self._nodes else np.zeros(len(points))
 
     def depth(self, points: Floats) -> Floats:
-        """Infinite where the body is split, minus that where it is not."""
+        """Return infinity where the body is split, minus infinity where it is not."""
         return np.where(self._embedded.is_cut(points, self._cut), np.inf, -np.inf)
 
 
@@ -194,7 +194,7 @@ class EmbeddedSurface:
     Attributes
     ----------
     surface : MovingSurface
-        Its first v vertices are those given, as far as they have not been doubled.
+        Its first v vertices are the given ones; copies follow.
 
     Raises
     ------
@@ -245,17 +245,17 @@ class EmbeddedSurface:
             self._replace(concerned, nodes, numbers, values)
 
     def is_cut(self, places: Floats, cut: int) -> Bools:
-        """Whether the element at each material place (q, s) is split by a cut."""
+        """Tell whether the element at each material place (q, s) is split by a cut."""
         place, cell = self._places.holding(places)
         found = np.zeros(len(places), dtype=bool)
         found[place[self._cutter.body.split_by(cell, cut)]] = True
         return found
 
     def _facets_and_cells(self) -> tuple[Ints, Ints]:
-        """Facet, ascending, and cell of all pairs that are near each other.
+        """Find the facet, ascending, and cell of all pairs that are near each other.
 
         They are if their boxes meet, or if a vertex of the facet belongs to the cell. Outside the
-        mesh a cell is looked for up to twice as far as it is to the next box: so it is here.
+        mesh boxes count up to twice the distance of the next one, as in `places`.
         """
         corners, size = self.points[self.facets], self.facets.shape[1]
         outside = np.maximum(0.0, self._places.gap(self._vertex_cell, self.points))
@@ -306,7 +306,7 @@ class EmbeddedSurface:
         )  # fmt: skip
 
     def _pieces(self, corners: _Corners, label: Sides) -> Ints:
-        """Piece (q, k) of each corner of parts of facets, from its cell and the place inside.
+        """Find piece (q, k) of each corner of parts of facets, from its cell and the place inside.
 
         `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
         side of the others a corner is, the level sets tell.

@@ -20,7 +20,7 @@ class CutElements(NamedTuple):
 
 
 class SubSimplices(NamedTuple):
-    """Sub-simplices of split elements, those of each by `sub_range` (m, 2); see `GrowingBody`."""
+    """Sub-simplices of split elements, of each by `sub_range` (m, 2); see `GrowingBody`."""
 
     sub_range: Ints
     sub_piece: Ints
@@ -30,7 +30,7 @@ class SubSimplices(NamedTuple):
 
 
 def cut_elements(body: GrowingBody) -> CutElements:
-    """Elements of a body as it is now."""
+    """Collect the elements of a body as it is now."""
     mesh = body.mesh
     return CutElements(
         mesh.cells, mesh.neighbours, body.piece_cells.rows, body.first_piece, body.next_piece.rows
@@ -38,7 +38,7 @@ def cut_elements(body: GrowingBody) -> CutElements:
 
 
 def sub_simplices(body: GrowingBody) -> SubSimplices:
-    """Sub-simplices of a body as it is now."""
+    """Collect the sub-simplices of a body as it is now."""
     return SubSimplices(
         body.sub_range, body.sub_piece.rows, body.sub_points.rows, body.sub_barycentric.rows,
         body.sub_sign.rows,
@@ -47,7 +47,7 @@ def sub_simplices(body: GrowingBody) -> SubSimplices:
 
 @njit(cache=True)
 def _same_facet(s, skip, t, other, sub_points):
-    """Whether the facets of two simplices opposite to these corners have the same points."""
+    """Tell whether the facets of two simplices opposite to these corners have the same points."""
     corners, same = sub_points.shape[1], True
     for i in range(corners):
         found = i == skip
@@ -100,7 +100,7 @@ def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
 
 @njit(cache=True)
 def _face_of(barycentric, skip):
-    """Corner opposite to the face of the element in which a facet lies, or -1."""
+    """Find the corner opposite to the face of the element in which a facet lies, or -1."""
     for a in range(barycentric.shape[1]):
         flat = True
         for k in range(barycentric.shape[0]):
@@ -112,7 +112,7 @@ def _face_of(barycentric, skip):
 
 @njit(cache=True)
 def _meets(piece, other, cell, across, opposite, body):
-    """Whether pieces of two cells move together at the nodes of the face between these."""
+    """Tell whether pieces of two cells move together at the nodes of the face between these."""
     cells, piece_cells, same = body.cells, body.piece_cells, True
     for a in range(cells.shape[1]):
         for b in range(cells.shape[1]):
@@ -133,7 +133,7 @@ def _partner(piece, cell, opposite, body):
 
 @njit(inline="always")
 def _is_whole(points, skip, nodes):
-    """Whether a facet is a whole face of the element: all its points are nodes."""
+    """Tell whether a facet is a whole face of the element: all its points are nodes."""
     whole = True
     for k in range(len(points)):
         node = k == skip
@@ -192,12 +192,12 @@ def _whole_facet(cell, across, body, parts):
 
 @njit(cache=True)
 def _is_parted(cell, across, body, parts):
-    """Whether pieces that move otherwise meet in facets that one side of a face has alone.
+    """Tell whether pieces that move otherwise meet in facets that one side of a face has alone.
 
     A cut that ends between two cells may have divided one of them since, and pieces of round-off
-    size go with others: then the facets differ. Where so, both sides show all that have no equal
-    (else a part that one side hides would be larger than what the other does, and the surface
-    would have a gap); where all of them move together, none.
+    size go with others: then the facets differ. Then both sides show all facets without an equal,
+    as otherwise the hidden parts could differ in size and leave a gap in the surface. Where all of
+    them move together, none is shown.
     """
     sub_range, sub_piece, sub_points, sub_barycentric, _ = parts
     own, beyond = sub_range[cell], sub_range[across]
@@ -275,7 +275,7 @@ def _expose_split(cell, body, parts, orientation, shared, out, count):
             piece, face = sub_piece[s], _face_of(sub_barycentric[s], skip)
             across = neighbours[cell, face] if face >= 0 else -1
             if across >= 0 and _partner(piece, cell, face, body) >= 0:
-                # the same facet of the cell across may be that of a piece that moves otherwise
+                # the same facet of the cell across may belong to a piece that moves otherwise
                 begin_across, end_across = sub_range[across, 0], sub_range[across, 1]
                 same = _find_facet(s, skip, begin_across, end_across, sub_points)
                 whole = _is_whole(sub_points[s], skip, body.cells[cell])
@@ -297,11 +297,11 @@ def _expose_split(cell, body, parts, orientation, shared, out, count):
 
 @njit(cache=True)
 def exposed_facets(wanted, split, body, parts, orientation):
-    """Facets of these cells on the surface of the material.
+    """Find facets of these cells on the surface of the material.
 
-    Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell,
-    and whether it lies on a cut. Facets are oriented outwards. `body` is as `CutElements`, `parts`
-    as `SubSimplices`, `orientation` (m,) that of the elements.
+    Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell, and
+    whether it lies on a cut. Facets are oriented outwards. `body` is as `CutElements`, `parts` as
+    `SubSimplices`, `orientation` (m,) counts by element.
     """
     sub_range, sub_piece, sub_points = parts.sub_range, parts.sub_piece, parts.sub_points
     corners, most, longest = body.cells.shape[1], 0, 1

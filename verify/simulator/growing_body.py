@@ -49,7 +49,7 @@ class Increment:
         Cells that share an edge with these and are not on one side of all cuts, have new unknowns,
         or have pieces left out beside those that have: their surfaces may change.
     moved : int array
-        Those of them that have new unknowns, or are split anew.
+        Cells among them that have new unknowns, or are split anew.
     nodes_before : int
         Number of dof nodes before.
     source : (new,) int array
@@ -63,7 +63,7 @@ class Increment:
     source: Ints
 
     def inherit(self, values: Floats) -> Floats:
-        """Nodal values (N_before, ...) after the cut: new nodes move as their source does.
+        """Carry nodal values (N_before, ...) over to the cut body: new nodes move as their source.
 
         The displacement field does not change, and the lumped masses of the parts of a piece sum
         to its own: energy and momentum are continuous.
@@ -71,7 +71,7 @@ class Increment:
         Raises
         ------
         XfemError
-            If the number of values is not that of the dof nodes before the cut.
+            If the number of values differs from the number of dof nodes before the cut.
         """
         if len(values) != self.nodes_before:
             raise XfemError(f"{len(values)} nodal values; expected {self.nodes_before}")
@@ -150,7 +150,7 @@ class GrowingBody:
         return StoredPieces(self.piece_label.rows, self.first_piece, self.next_piece.rows)
 
     def split_by(self, cells: Ints, cut: int) -> Bools:
-        """Whether a cut has split cells, or pieces of them."""
+        """Tell whether a cut has split cells, or pieces of them."""
         return self.pieces.labelled(cells, cut)
 
     def add_cut(self) -> int:
@@ -176,7 +176,7 @@ class GrowingBody:
         Raises
         ------
         XfemError
-            If a cut would join what is already separate.
+            If a cut would join material that is already separate.
         """
         wanted = distinct(candidates)
         while len(wanted):
@@ -200,7 +200,7 @@ class GrowingBody:
         Raises
         ------
         XfemError
-            If a cut would join what is already separate.
+            If a cut would join material that is already separate.
         """
         cells = division.changed_cells
         before = self.node_count
@@ -244,7 +244,8 @@ class GrowingBody:
         cell = patch.whole_cells[partition.parent]
         old, changed = self.pieces.match(cell, label, label)
         if (solid & (old < 0)).any():
-            # a piece on one side of a cut that does not split it is part of what is on that side
+            # a piece on one side of a cut that does not split it is part of the material on that
+            # side
             side = label.copy()
             side[:, numbers] = _sides(partition)
             old, changed = self.pieces.match(cell, label, side)
@@ -326,7 +327,7 @@ class GrowingBody:
 
 
 def _sides(partition: Partition) -> Sides:
-    """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
+    """Find the side (p, cuts) of each cut on which a piece lies, 0 if it lies on both."""
     side, piece = partition.label.copy(), partition.simplices.piece
     plus = partition.points.values[partition.simplices.points] >= 0.0
     for cut in range(side.shape[1]):
@@ -338,7 +339,7 @@ def _sides(partition: Partition) -> Sides:
 
 
 def _among(values: Ints, ascending: Ints) -> Bools:
-    """Whether each value is one of some ascending ones, of which there is at least one."""
+    """Tell whether each value is one of some ascending ones, of which there is at least one."""
     place = np.searchsorted(ascending, values)
     return ascending[np.minimum(place, len(ascending) - 1)] == values
 
@@ -374,7 +375,7 @@ def whole_mesh(body: GrowingBody, level_sets: Floats) -> PhantomMesh:
 
 
 class _GrownSubCells(SubCells):
-    """Sub-simplices of a growing body; what is not asked for at every cut is made when it is."""
+    """Sub-simplices of a growing body; arrays that not every cut needs are made on demand."""
 
     _points: tuple[Floats, Ints, Ints]
     _nodes: tuple[Floats, Floats]
@@ -385,7 +386,7 @@ class _GrownSubCells(SubCells):
             points=body.sub_points.rows[used],
             barycentric=body.sub_barycentric.rows[used],
             fraction=body.sub_fraction.rows[used],
-            # rows that are there never change, so these stay those of the body as it is now
+            # existing rows never change, so these stay the rows of the body as it is now
             _points=(body.points.positions.rows, body.points.ends.rows, body.points.cut.rows),
             _nodes=(body.mesh.points, level_sets),
         )

@@ -1,15 +1,14 @@
-"""Surfaces whose vertices move with the unknowns of a cut body, x = X + W u; that of the material.
+"""Surfaces that move with a cut body, x = X + W u; the surface of the material itself.
 
 Every vertex belongs to one piece: its weights are its barycentric coordinates in the parent
-element, its nodes the dof nodes of the piece (barycentric mapping, thesis 3.2.2). Forces go
-back by the transpose, so that the virtual work of a force on the surface and of what the solver
-gets is the same.
+element, its nodes the dof nodes of the piece (barycentric mapping, thesis 3.2.2). Forces go back by
+the transpose, so that their virtual work on the surface and in the solver is the same.
 
 The surface of the material itself is the mesh's own boundary, split, and the faces of the cuts.
-Each piece's share of it closes around the material: facets on the boundary of the mesh, and inner
-facets from the polygons in which cuts cross elements (thesis 3.2.4), oriented outwards, with
-vertices doubled where, and only where, the material is separate. A membrane is its own surface,
-with two new rims along a cut instead of inner facets.
+Each piece's share of it closes around the material. It has facets on the boundary of the mesh, and
+inner facets from the polygons in which cuts cross elements (thesis 3.2.4). They are oriented
+outwards. Vertices are doubled where, and only where, the material is separate. A membrane is its
+own surface, with two new rims along a cut instead of inner facets.
 """
 
 from collections.abc import Callable
@@ -90,7 +89,7 @@ class MovingSurface:
             Whether corners (n,), counted through all facets, move with each node (n, c): where not,
             the weight is zero; where so, the weight may still round to zero.
         piece : (q, k) int array
-            Piece of each corner; that of the first is the facet's.
+            Piece of each corner; the first corner's is the facet's.
         inner : (q,) bool array
         piece_cells : (p, c) int array
             Dof nodes of each piece.
@@ -143,7 +142,7 @@ class MovingSurface:
         return part
 
     def positions(self, displacement: Floats) -> Floats:
-        """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes, in metres.
+        """Compute the positions (v, s) of the vertices for a displacement (N, s), in metres.
 
         Raises
         ------
@@ -263,7 +262,7 @@ class BodySurface:
 
 
 def _membrane_facets(body: GrowingBody, cells: Ints) -> tuple[Ints, Floats, Ints, Ints, Bools]:
-    """Triangles of these elements: whole, or as the cuts have divided them.
+    """Find triangles of these elements: whole, or as the cuts have divided them.
 
     Returns for each, cell by cell: point numbers (q, 3), barycentric corners (q, 3, 3), piece,
     cell, and that it lies on no cut. They keep the direction of their element.

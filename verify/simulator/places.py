@@ -5,8 +5,8 @@ children 2i and 2i + 1. With n items the leaves are nodes n to 2n − 1, in the 
 fills space.
 
 A point outside the mesh belongs to the element whose smallest barycentric coordinate at it is
-largest, of those whose boxes are at most twice as far from it as the nearest box; on a common face
-several elements tie.
+largest. Only elements with boxes within twice the distance of the nearest box count; on a common
+face several elements tie.
 """
 
 from typing import NamedTuple
@@ -55,7 +55,7 @@ class BoundingTree:
             end = int(level[0])
 
     def meeting(self, floor: Floats, ceiling: Floats) -> tuple[Ints, Ints]:
-        """Simplices whose boxes meet those from `floor` (q, s) to `ceiling`.
+        """Find simplices whose boxes meet those from `floor` (q, s) to `ceiling`.
 
         Returns the first of each box (q + 1,), and all of them one after the other.
         """
@@ -63,7 +63,7 @@ class BoundingTree:
 
 
 def _places_on_curve(centres: Floats) -> Ints:
-    """Places (n,) on the Z-order curve of the box around all centres (n, s)."""
+    """Find places (n,) on the Z-order curve of the box around all centres (n, s)."""
     low, widest = centres.min(axis=0), float(np.ptp(centres, axis=0).max())
     places = ((centres - low) * ((2**_BITS - 1) / widest if widest > 0.0 else 0.0)).astype(int)
     codes, space = np.zeros(len(centres), dtype=np.int64), centres.shape[1]
@@ -132,7 +132,7 @@ class MaterialPlaces:
         )
 
     def barycentric(self, cells: Ints, places: Floats) -> Floats:
-        """Barycentric coordinates (q, d + 1) of places (q, s), each in one cell."""
+        """Compute barycentric coordinates (q, d + 1) of places (q, s), each in one cell."""
         mesh = self._mesh
         away = places - mesh.points[mesh.cells[cells, 0]]
         at = np.einsum("qai,qi->qa", mesh.gradients[cells], away)
@@ -140,7 +140,7 @@ class MaterialPlaces:
         return at
 
     def gap(self, cells: Ints, places: Floats) -> Floats:
-        """How far (q,) each place is beyond the box of a cell along some axis, or negative."""
+        """Measure by how much (q,) places are beyond the box of a cell along some axis."""
         floor, ceiling = self._tree.floor[cells], self._tree.ceiling[cells]
         found: Floats = np.maximum(floor - places, places - ceiling).max(axis=1)
         return found
@@ -148,7 +148,7 @@ class MaterialPlaces:
     def cells_of(
         self, places: Floats, near: tuple[Ints, Ints] | None = None
     ) -> tuple[Ints, Floats]:
-        """Cell (q,) of each place and the barycentric coordinates (q, d + 1) there.
+        """Find the cell (q,) of each place and the barycentric coordinates (q, d + 1) there.
 
         `near` are the cells to try, if they are known: the first of each place and one past its
         last (q, 2), and all of them.
@@ -166,7 +166,7 @@ class MaterialPlaces:
         return place[holds], cells[holds]
 
     def _near(self, places: Floats) -> tuple[Ints, Ints]:
-        """Cells to which each place may belong: bounds (q, 2) of each, and all of them."""
+        """Find cells to which each place may belong: bounds (q, 2) of each, and all of them."""
         reach = np.full((len(places), 1), self.reach)
         while True:
             starts, cells = self._tree.meeting(places - reach, places + reach)

@@ -6,9 +6,9 @@ is; otherwise the edge on which it was found does. Its number is the same in wha
 come.
 
 Where a cut ends, a facet beside the end has a point on its edge that is not a vertex of it. All
-facets along an edge ask the same record of points, so that they are bisected alike and no hanging
-vertex is left on a surface. Edges on which elements meet lie on an edge of the mesh, or on the line
-in which a cut crosses a face of it: the record is by these.
+facets along an edge share one record of points. So they are bisected alike, and no hanging vertex
+is left on a surface. Edges on which elements meet lie on an edge of the mesh, or on the line in
+which a cut crosses a face of it: the record is by these.
 """
 
 from collections import defaultdict
@@ -69,7 +69,7 @@ class RowNumbers:
         self._number: defaultdict[bytes, int] = defaultdict(count().__next__)
 
     def number(self, rows: Ints) -> tuple[Ints, Ints]:
-        """Numbers (k,) of rows (k, width), and where each new one comes first.
+        """Find numbers (k,) of rows (k, width), and where each new one comes first.
 
         New rows get the next numbers, in their order.
         """
@@ -84,7 +84,7 @@ class RowNumbers:
 
 
 def distinct(values: Ints) -> Ints:
-    """Distinct values (q,), ascending: for a few thousand a sort beats numpy's hashing."""
+    """Find distinct values (q,), ascending: for a few thousand a sort beats numpy's hashing."""
     ordered = np.sort(values, axis=None)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
@@ -92,7 +92,7 @@ def distinct(values: Ints) -> Ints:
 
 
 def ranges(bounds: Ints) -> Ints:
-    """Integers from the first up to the second bound of each row (k, 2), row after row."""
+    """List integers from the first up to the second bound of each row (k, 2), row after row."""
     counts = bounds[:, 1] - bounds[:, 0]
     ends = np.cumsum(counts)
     shift = np.repeat(bounds[:, 0] - ends + counts, counts)
@@ -100,7 +100,7 @@ def ranges(bounds: Ints) -> Ints:
 
 
 def of_lists(starts: Ints, items: Ints, rows: Ints) -> Ints:
-    """Integers of some lists, of which each begins where the one before ends."""
+    """Collect the integers of some lists, each of which begins where the one before ends."""
     return items[ranges(np.stack([starts[rows], starts[rows + 1]], axis=1))]
 
 
@@ -110,7 +110,7 @@ _WIDTH = NODES + CUTS
 
 
 class FoundPoints(NamedTuple):
-    """What is asked of the points of a patch, as in `ZeroPoints`."""
+    """Points of a patch, with the methods of `ZeroPoints` that its division needs."""
 
     positions: Floats
     values: Floats
@@ -150,7 +150,7 @@ class PointNumbers:
         return self._supports.rows
 
     def number(self, points: ZeroPoints | FoundPoints, whole_nodes: Ints, cuts: Ints) -> Ints:
-        """Numbers of all points of a patch: its nodes, then its zero points.
+        """Find numbers of all points of a patch: its nodes, then its zero points.
 
         Parameters
         ----------
@@ -179,7 +179,7 @@ class PointNumbers:
         return numbers
 
     def _number(self, ends: Ints, cut: Ints) -> tuple[Ints, Ints]:
-        """Numbers (k,) of the zero points of cuts (k,) on edges (k, 2), and the first new ones."""
+        """Find numbers (k,) of zero points of cuts (k,) on edges (k, 2), and the first new ones."""
         span, on = np.full((len(cut), NODES), NONE), np.full((len(cut), CUTS), NONE)
         span[:, :2], on[:, 0] = np.sort(ends, axis=1), cut
         if on_cuts := bool((ends >= self.nodes).any()):
@@ -206,7 +206,7 @@ class PointNumbers:
         return self.nodes + number, new
 
     def supports_of(self, points: Ints) -> Ints:
-        """(..., 7) mesh nodes and cuts of points (...), ascending, padded at the end."""
+        """Find mesh nodes and cuts (..., 7) of points (...), ascending, padded at the end."""
         found = np.full((*points.shape, _WIDTH), NONE)
         zero = points >= self.nodes
         found[..., 0] = points
@@ -214,7 +214,7 @@ class PointNumbers:
         return found
 
     def spans(self, nodes: Ints, points: Ints) -> Bools:
-        """Whether each of some mesh nodes (q, c) spans the simplex of a point (q,).
+        """Tell whether each of some mesh nodes (q, c) spans the simplex of a point (q,).
 
         The weights of the others at the point are zero; its own may round to zero.
         """
@@ -225,7 +225,7 @@ class PointNumbers:
 
 
 def distinct_in_rows(rows: Ints, most: int) -> Ints:
-    """Distinct integers of each row, ascending, at most so many, padded with `NONE`."""
+    """Find distinct integers of each row, ascending, at most so many, padded with `NONE`."""
     found = np.sort(rows, axis=1)
     again = found[:, 1:] == found[:, :-1]
     again &= found[:, 1:] < NONE
@@ -341,7 +341,7 @@ class EdgePoints:
         return facets, at, source
 
     def _suspects(self, facets: Ints) -> Ints:
-        """Facets on the edges of which there may be points, ascending."""
+        """Find facets on the edges of which there may be points, ascending."""
         nodes, other = self._points.nodes, facets[:, [1, 2, 0]]
         low, high = np.minimum(facets, other), np.maximum(facets, other)
         zero = high >= nodes
@@ -383,8 +383,8 @@ class EdgePoints:
     def _between(self, x: int, y: int) -> tuple[int, float] | None:
         """Find a recorded point strictly between two, and its share from x to y.
 
-        The order on a line is that of projections on one direction: points that nearly coincide are
-        in the same order for every facet.
+        The order on a line goes by projections on one direction: points that nearly coincide are in
+        the same order for every facet.
         """
         for key, line in self._lines(x, y):
             others = [z for z in reversed(line) if z not in (x, y)]
@@ -444,8 +444,8 @@ class EdgePoints:
     def _directed(self, line: _Line, x: int, y: int) -> Floats:
         """Direction of a line: it leads from one end of the edge to the farthest point known.
 
-        It is replaced once there is a point far beyond: what is 1e-14 long may point anywhere. That
-        of an edge of the mesh is the edge's, from x to y.
+        It is replaced once there is a point far beyond: a vector of length 1e-14 may point
+        anywhere. An edge of the mesh has its own direction, from x to y.
         """
         begin, known = self._place(x), line.direction
         steps = np.array([self._place(z) for z in (y, *reversed(line))]) - begin

@@ -75,7 +75,7 @@ def quality_of(session: Session) -> Quality:
 def deformation_gradients(
     mesh: SimplexMesh, parent: Ints, nodes: Ints, displacement: Floats
 ) -> Floats:
-    """(p, s, s) deformation gradient of each piece; of a membrane that within its plane."""
+    """Compute the deformation gradient (p, s, s) of each piece; of a membrane in its plane."""
     corners = mesh.points[mesh.cells[parent]] + displacement[nodes]
     return np.einsum("pki,pkj->pij", corners, mesh.gradients[parent])
 
@@ -103,7 +103,7 @@ def _loose_edges(facets: Ints) -> int:
 def _bad_facets(
     surface: MovingSurface, displacement: Floats, gradients: Floats, stretch: float
 ) -> tuple[int, int]:
-    """Facets that face the wrong way, and facets that are stretched beyond the material."""
+    """Find facets that face the wrong way, and facets that are stretched beyond the material."""
     used = surface.used
     facets, piece = surface.facets.rows[used], surface.facet_piece.rows[used]
     before, after = surface.material.rows[facets], surface.positions(displacement)[facets]

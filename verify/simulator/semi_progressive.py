@@ -1,9 +1,10 @@
 """Semi-progressive cutting: an element is split when the tool has crossed it through.
 
 The rule of the thesis (section 3.2.3): an element is split when *all* edges that the cut crosses
-have been passed (three or four in a tetrahedron, two in a triangle), each counted once. Its walk
-from element to neighbour is not needed: the tree of bounding boxes gives the elements near what was
-swept since the last frame, and those that were not crossed through yet are tested again.
+have been passed, each counted once. These are three or four in a tetrahedron, two in a triangle.
+The walk of the thesis from element to neighbour is not needed. The tree of bounding boxes gives the
+elements near the sweep since the last frame. Elements that were not crossed through yet are tested
+again.
 """
 
 from dataclasses import dataclass
@@ -50,7 +51,7 @@ class SeenCut:
         self._asked, self._found = np.empty((0, 0)), np.empty((0, 3))
 
     def level_set(self, points: Floats) -> Floats:
-        """Values taken, at the nodes; the distance to the sweep elsewhere."""
+        """Return the values taken, at the nodes; the distance to the sweep elsewhere."""
         if points is self._nodes:
             return self._values
         if points.shape == self._nodes.shape and np.array_equal(points, self._nodes):
@@ -58,7 +59,7 @@ class SeenCut:
         return self._probed(points)[:, 0]
 
     def depth(self, points: Floats) -> Floats:
-        """Distance to the rim or to the blade, negative past it."""
+        """Compute the distance to the rim or to the blade, negative past it."""
         found = self._probed(points)
         return np.minimum(found[:, 1], self._front - found[:, 2])
 
@@ -129,7 +130,7 @@ class Stroke:
         return self.front >= 0.0 if self.opens is None else self._time >= self._first
 
     def open_cells(self, cells: Ints) -> Bools:
-        """Whether the stroke may split each of some cells by now."""
+        """Tell whether the stroke may split each of some cells by now."""
         if self.opens is None:
             return np.ones(len(cells), dtype=bool)
         return np.asarray(self.opens[cells] <= self._time)
@@ -160,19 +161,19 @@ class Stroke:
         self.near[fresh] = True
         self._strokes_near[fresh] += 1
         alone, recorded = self._strokes_near[cells] == 1, self.recorded[cells]
-        # what other strokes have left of a cell may be crossed through later than its edges; and
-        # what is crossed through only just may be split only when the blade is farther on
+        # pieces that other strokes have left of a cell may be crossed through later than its edges;
+        # and a cell that is crossed through only just may be split only when the blade is farther
+        # on
         settled = alone & (recorded | (latest < front - self._size[cells]))
         self._settled[cells[settled]] = True
         self._under_way = cells[~settled]
         return cells[(through & ~recorded) | ~alone]
 
     def _crossed(self, cells: Ints) -> tuple[Ints, Bools, Floats]:
-        """Those of some cells (q,) that the blade is near, if crossed through, latest travel.
+        """Select from cells (q,) the ones near the blade: if crossed through, and latest travel.
 
-        Writes the travel at which the blade entered each, and crossed it through. The tolerances
-        are those of `verify.xfem.crossing`, so that a cell that is crossed through is one that is
-        split.
+        Writes the travel at which the blade entered each, and crossed it through. The tolerances of
+        `verify.xfem.crossing` apply, so that every cell that is crossed through is split.
         """
         self.level_sets(distinct(self._mesh.cells[cells]))
         above = self.values[self._mesh.cells[cells]] >= 0.0
@@ -204,11 +205,11 @@ class Stroke:
         self.values[~self._fixed] = np.nan
 
     def fix(self, nodes: Ints) -> None:
-        """From now on the level sets of these nodes do not change."""
+        """Keep the level sets of these nodes as they are from now on."""
         self._fixed[nodes] = True
 
     def level_sets(self, nodes: Ints) -> Floats:
-        """Level sets of mesh nodes, computed where they have not been, in metres."""
+        """Compute level sets of mesh nodes, computed where they have not been, in metres."""
         unknown = nodes[np.isnan(self.values[nodes])]
         if len(unknown):
             values = self.path.sweep.level_set(self._mesh.points[unknown])
@@ -230,7 +231,7 @@ class Stroke:
 def _cells_hit(
     sweep: FacetArrays, after: float, front: float, margin: float, elements: BoundingTree
 ) -> Ints:
-    """Cells near what is swept between two travels; may hold doubles."""
+    """Find cells near the sweep between two travels; may hold doubles."""
     corners, travel = sweep.corners, sweep.travel
     # corners there, and where an edge passes one of the two
     k, j = np.array(list(combinations(range(travel.shape[1]), 2))).T

@@ -4,9 +4,9 @@ Only the phases of a step are timed: all that a simulator does in it. The record
 of energies and the measures of `verify.simulator.quality` are kept beside it.
 
 Elements open by the rule of all solvers (`swept`): in the step in which the blade begins to sweep
-the cut in the support of one of their nodes; what is then released is held by forces that fade with
-the swept share (`verify.xfem.release`). A blade that is led by hand has no way ahead: elements open
-when it has crossed them through, and let go at once.
+the cut in the support of one of their nodes. Tie forces then fade with the swept share
+(`verify.xfem.release`). A blade that is led by hand has no way ahead: elements open when it has
+crossed them through, and let go at once.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -159,8 +159,8 @@ class Session:
     ----------
     stage : Stage
     account : bool
-        Whether to keep the account of the energies. Without it the hot path is that of a
-        simulator: that is what is timed.
+        Whether to keep the account of the energies. Without it the session runs the hot path of a
+        simulator, which is timed.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
         machine shall not be counted.
@@ -215,17 +215,17 @@ class Session:
         return self.state.time
 
     def blade_forces(self, stroke: int, trailing: bool = False) -> tuple[Floats, Floats]:
-        """Driving force of a blade after each step, and resistance against it, in newtons.
+        """Compute driving force of a blade after each step, and resistance against it, in newtons.
 
-        The driving force is what is taken of the body's energy per advance: positive pulls the
-        blade on. The resistance is toughness times width, less the driving force. In the plane
-        both are per metre of thickness; they are smoothed over `Stage.smoothing`.
+        The driving force is the energy that the body loses per advance: positive pulls the blade
+        on. The resistance is toughness times width, less the driving force. In the plane both are
+        per metre of thickness; they are smoothed over `Stage.smoothing`.
 
         Parameters
         ----------
         stroke : int
         trailing : bool
-            Whether only the last step is asked for, over the advance before it.
+            Whether to return only the last step, over the advance before it.
 
         Returns
         -------
@@ -302,7 +302,7 @@ class Session:
         return self.surfaces.picture(self.phantom, self.displacement)
 
     def blades(self) -> list[tuple[Floats, Floats]]:
-        """Tip and other end of each blade under way, m."""
+        """Return the tip and other end of each blade under way, m."""
         now = self.state.time
         return [_blade_at(path, now) for path in self._under_way()]
 
@@ -465,7 +465,7 @@ class Session:
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[Floats, Floats]:
-    """Tip and other end of a blade at a time."""
+    """Return the tip and other end of a blade at a time."""
     after = min(max(int(np.searchsorted(path.times, time)), 1), len(path.times) - 1)
     begin, end = path.times[after - 1], path.times[after]
     share = min(max((time - begin) / (end - begin), 0.0), 1.0) if end > begin else 0.0
@@ -503,7 +503,7 @@ class KnownWays:
         stroke.open_ahead(self._opens[stroke.number], self._strokes[stroke.number])
 
     def areas(self, time: float) -> Floats:
-        """Area (strokes,) that each blade has swept in the body, m² (in the plane m)."""
+        """Compute area (strokes,) that each blade has swept in the body, m² (in the plane m)."""
         return np.array([swept_measure(*passed, time) for passed in self._passed])
 
     def fading(

@@ -5,10 +5,10 @@ millimetres inside this file and metres outside. A patch of skin is meshed in it
 of nearly equal size: the border is resampled at the element size and kept; inner points start on a
 hexagonal lattice and are moved to the mean of their neighbours in Delaunay's triangles.
 
-A skin comes from a file too: STL, OBJ, PLY, VTU, MSH and whatever else meshio reads. With a
-thickness it has layers of prisms below it, each split into three tetrahedra along the diagonals
-that start at the point with the smallest number, so that neighbours agree on the diagonal of the
-face between them (Dompierre et al. 1999).
+A skin comes from a file too: STL, OBJ, PLY, VTU, MSH and other formats of meshio. With a thickness
+it has layers of prisms below it. Each prism is split into three tetrahedra along the diagonals that
+start at the point with the smallest number. So neighbours agree on the diagonal of the face between
+them (Dompierre et al. 1999).
 """
 
 from collections.abc import Callable
@@ -106,7 +106,7 @@ def plane_mesh(outline: Floats, holes: list[Floats], size: float) -> tuple[Float
     Returns
     -------
     points : (n, 2) float array
-        First those of the outer border, in order, then those of the holes.
+        First the outer border, in order, then the holes.
     triangles : (m, 3) int array
         Anticlockwise.
     rim : int
@@ -159,7 +159,7 @@ def _next_finer(
 
 
 def inside(points: Floats, rings: list[Floats]) -> Bools:
-    """Whether points (n, 2) lie within the first ring and in none of the others."""
+    """Tell whether points (n, 2) lie within the first ring and in none of the others."""
     odd = np.zeros(len(points), dtype=bool)
     for ring in rings:
         for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
@@ -216,7 +216,7 @@ def _means(points: Floats, triangles: Ints) -> Floats:
 
 
 def _check_formula(points: Floats, triangles: Ints, rings: list[Floats], size: float) -> None:
-    """Every point is used, and the border of the triangles is that of the domain."""
+    """Check that every point is used, and that the triangles have the border of the domain."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     single, uses = np.unique(edges, axis=0, return_counts=True)
     border = single[uses == 1]
@@ -236,7 +236,7 @@ def _area(ring: Floats) -> float:
 
 
 def procedural_face() -> Patch:
-    """Skin of a face, 150 mm wide, 205 mm high, with openings for the eyes and the mouth."""
+    """Make skin of a face, 150 mm wide, 205 mm high, with openings for the eyes and the mouth."""
     holes = [_almond(side * 31.0, 26.5, 14.0, 5.0) for side in (1.0, -1.0)]
     holes.append(_almond(0.0, -45.0, 23.0, 2.2))
     return Patch(_egg() * _MM, _in_metres(_face_height), [hole * _MM for hole in holes])
@@ -286,7 +286,7 @@ def _face_height(x: Floats, y: Floats) -> Floats:
 
 
 def _nose(x: Floats, y: Floats) -> Floats:
-    """Ridge that rises from the root to the tip and falls off to the lip within a few mm."""
+    """Shape a ridge that rises from root to tip and falls off to the lip within a few mm."""
     root, tip, foot = 32.0, -9.0, -21.0
     rise = np.clip((root - y) / (root - tip), 0.0, 1.0) ** 1.3
     fall = np.clip((y - foot) / (tip - foot), 0.0, 1.0)
@@ -353,7 +353,7 @@ def skin_mesh(skin: Skin, folder: Path) -> SkinMesh:
 def skin_surface(skin: Skin, folder: Path, triangles: int) -> tuple[Floats, Ints]:
     """Close the surface of a skin with a thickness, made of about so many triangles.
 
-    That of a file is at least as fine as the file.
+    The mesh of a file is at least as fine as the file.
     """
     assert skin.thickness is not None
     points, cells, _ = _surface(skin, folder, triangles / 2)
@@ -403,7 +403,7 @@ def read_surface(path: Path) -> tuple[Floats, Ints]:
 
 
 def border_loops(triangles: Ints) -> list[Ints]:
-    """Points along each border of a surface, in the direction of its triangles."""
+    """Find points along each border of a surface, in the direction of its triangles."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     inner = {(int(b), int(a)) for a, b in edges}
     follows = {int(a): int(b) for a, b in edges if (int(a), int(b)) not in inner}
@@ -457,7 +457,7 @@ def _check_closed(points: Floats, triangles: Ints, where: str) -> None:
 
 
 def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """(n, 3) unit normals at the points, weighted by the area of the triangles around."""
+    """Return (n, 3) unit normals at the points, weighted by the area of the triangles around."""
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(points)
@@ -469,7 +469,7 @@ def vertex_normals(points: Floats, triangles: Ints) -> Floats:
 def thicken(
     points: Floats, triangles: Ints, thickness: float, layers: int = 1
 ) -> tuple[Floats, Ints]:
-    """Tetrahedra between a surface and its copy at a distance below it.
+    """Make tetrahedra between a surface and its copy at a distance below it.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """A simulated scene as arrays: body, strokes, surfaces, supports and hooks, and how these grip.
 
-What of a case file can be played, or why it cannot, is said by `stage_of`.
+`stage_of` tells which parts of a case file can be played, or why it cannot.
 """
 
 from collections.abc import Sequence
@@ -73,7 +73,7 @@ class Hook:
     duration: float
 
     def share(self, time: float) -> float:
-        """How much of the vector there is at a time: from 0 to 1, without a jump in velocity."""
+        """Tell how much of vector there is at a time: from 0 to 1, without a jump in velocity."""
         s = min(max((time - self.begin) / self.duration, 0.0), 1.0)
         return s * s * (3.0 - 2.0 * s)
 
@@ -114,7 +114,7 @@ class Stage:
         In the order of their numbers.
     damping : RayleighDamping
     visual, collision : (points, facets), optional
-        Surfaces beside that of the material, for solids.
+        Surfaces beside the material's own, for solids.
     tool_radius : float
         m.
     tool_force : float
@@ -161,7 +161,7 @@ class Stage:
 
 
 def gripped(phantom: PhantomMesh, hook: Hook) -> Ints:
-    """Dof nodes that a hook grips: those on its side within its radius, at least the nearest.
+    """Find dof nodes that a hook grips: those on its side within its radius, at least the nearest.
 
     The unknowns at nodes across the cut are among them: they carry the material up to the cut.
     """
@@ -173,7 +173,7 @@ def gripped(phantom: PhantomMesh, hook: Hook) -> Ints:
 
 
 def held_unknowns(phantom: PhantomMesh, nodes: Bools, facets: Bools) -> Bools:
-    """Dof nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
+    """Find dof nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
 
     The unknown of the material at a node is held. Another one there, of material beyond a cut, is
     held only if that material reaches a held facet: else a part that is cut free would hang on a
@@ -191,7 +191,7 @@ def held_unknowns(phantom: PhantomMesh, nodes: Bools, facets: Bools) -> Bools:
 
 
 def held_facets(mesh: SimplexMesh, nodes: Bools) -> Bools:
-    """(m, d + 1) whether the facet opposite to a corner is on the boundary, its nodes all held."""
+    """Tell whether facets (m, d + 1) are on the boundary with all nodes held."""
     cell, local = mesh.boundary_facets.T
     facet = nodes[mesh.cells[cell]]
     facet[np.arange(len(cell)), local] = True
@@ -256,7 +256,7 @@ class Grips:
         return MovingSupports(self._fixed, self._at)
 
     def force(self, time: float) -> Floats:
-        """Nodal forces (N, s) of the hooks that pull, and of the tool, N."""
+        """Compute nodal forces (N, s) of the hooks that pull, and of the tool, N."""
         force = np.zeros(self._values.shape) if self.tool is None else self.tool.copy()
         for hook, nodes, full in self._pulled:
             force[nodes] += hook.share(time) * full
@@ -283,7 +283,7 @@ def stage_of(scene: Scene, level: int = 0) -> Stage:
     Raises
     ------
     UnsupportedSceneError
-        If the scene asks for what is not played: statics, tractions, histories, exact values.
+        If the scene has parts that are not played: statics, tractions, histories, exact values.
     InputError
         If a mesh, a surface or a part of the boundary is bad.
     """
@@ -412,7 +412,7 @@ def _surface(scene: Scene, mesh: SimplexMesh, triangles: int | None) -> tuple[Fl
 
 
 def _fine_boundary(mesh: SimplexMesh, triangles: int) -> tuple[Floats, Ints]:
-    """Boundary of a solid, each of its triangles split in four until there are enough."""
+    """Compute boundary of a solid, each of its triangles split in four until there are enough."""
     surface = BodySurface(GrowingBody(mesh)).surface
     points, facets = surface.material.rows.copy(), surface.facets.rows.copy()
     while len(facets) < triangles:

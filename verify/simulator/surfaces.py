@@ -1,7 +1,7 @@
-"""Surfaces of a played body: that of the material itself, one to see, one to touch.
+"""Surfaces of a played body: of the material itself, one to see, one to touch.
 
-Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
-A tool touches each side of a cut; only facets whose boxes it comes near are looked at.
+Surfaces of a solid can be separate meshes. A plane body and a membrane are their own surface. A
+tool touches each side of a cut; only facets whose boxes it comes near are looked at.
 """
 
 from typing import NamedTuple
@@ -115,7 +115,7 @@ class Surfaces:
         return Picture(at, before, corner, on_cut, self._lines(before, corner[~on_cut]))
 
     def _lines(self, material: Floats, skin: Ints) -> Ints:
-        """Edges (l, 2) along which cuts meet the skin: its borders that are not on its rim.
+        """Find edges (l, 2) along which cuts meet the skin: its borders that are not on its rim.
 
         Vertices are doubled where, and only where, the skin is parted.
         """
@@ -131,7 +131,7 @@ class Surfaces:
 
 
 def _borders(triangles: Ints) -> Ints:
-    """Edges (l, 2) that belong to one triangle only."""
+    """Find edges (l, 2) that belong to one triangle only."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     found, count = np.unique(edges, axis=0, return_counts=True)
     return np.asarray(found[count == 1])
@@ -211,7 +211,7 @@ class SurfaceCollider:
         self.positions = positions
 
     def touched(self, start: ArrayLike, end: ArrayLike, radius: float) -> Contacts:
-        """Facets within the radius of a tool's axis from start to end (a capsule).
+        """Find the facets within the radius of a tool's axis from start to end (a capsule).
 
         Raises
         ------
@@ -238,8 +238,8 @@ def _touched(start, end, positions, facets, reach, found, distance, at):
 
     Writes their distances and the weights (q, 3) of the nearest points.
 
-    The nearest points of a segment and of a triangle that it does not pierce are an end of the
-    segment and a point of the triangle, or on an edge of it.
+    Take a triangle that a segment does not pierce. Their nearest points are an end of the segment
+    and a point of the triangle, or lie on an edge of the triangle.
     """
     corners, ends = np.empty((3, 3)), np.stack((start, end))
     weights, count = np.empty(3), 0
@@ -291,7 +291,7 @@ def _volume(a, b, c):
 
 @njit(cache=True)
 def _pierced(start, end, corners, weights):
-    """Distance of a segment from a facet that it pierces, that is 0, else ∞; weights there."""
+    """Return 0 and weights if a segment pierces a facet, else an infinite distance."""
     before = _volume(corners[0] - start, corners[1] - start, corners[2] - start)
     behind = _volume(corners[0] - end, corners[1] - end, corners[2] - end)
     if before == behind or (before != 0.0 and behind != 0.0 and (before > 0.0) == (behind > 0.0)):
@@ -310,7 +310,7 @@ def _pierced(start, end, corners, weights):
 
 @njit(cache=True)
 def _from_edge(p, q, corners, k, weights):
-    """Distance of a segment pq from an edge of a facet, and the weights of the point there.
+    """Compute distance of a segment pq from an edge of a facet, and the weights of the point there.
 
     Ericson, Real-Time Collision Detection, section 5.1.9.
     """

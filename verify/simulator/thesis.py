@@ -70,14 +70,14 @@ class FaceCount:
     strokes : int
         That the tool had begun.
     added : dict of str to int
-        By method; ``xfem played`` is counted on the membrane, semi-progressively, all others on
-        its plan: the blade is parallel to the line of sight, so that the same edges are crossed
-        at the same places.
+        By method; ``xfem played`` is counted on the membrane, semi-progressively, all others on its
+        plan. The blade is parallel to the line of sight, so that the same edges are crossed at the
+        same places.
     smallest : dict of str to float
-        Smallest volume of an element or a piece of one over that of its element.
+        Smallest volume of an element or a piece of one over the volume of its element.
     step : dict of str to float
-        Critical explicit step of the plan as a free sheet, masses lumped, over that of the uncut
-        one.
+        Critical explicit step of the plan as a free sheet, masses lumped, over the step of the
+        uncut sheet.
     thesis : dict of str to int
         The thesis' increments.
     """
@@ -113,7 +113,7 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
         Of Table 4.3, ascending, without 0.
     """
     stage = stage_of(load_scene("thesis/face_thousand_cuts"))
-    # the positive direction of the plan is that of the membrane: it is a graph over x and y
+    # plan and membrane have one positive direction: the membrane is a graph over x and y
     plan = SimplexMesh(stage.mesh.points[:, :2], stage.mesh.cells)
     uncut = _step_of_body(cut_by("uncut", plan, []))
     thesis = {int(row[0]): row for row in published_rows("4.3")}
@@ -140,7 +140,7 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
 
 
 def _growth(stage: Stage, rows: Sequence[int]) -> list[tuple[int, int, float]]:
-    """Elements split, nodes added and time when so many elements were split."""
+    """Measure elements split, nodes added and time when so many elements were split."""
     cutter = SemiProgressiveCutter(stage.mesh)
     for path in stage.strokes:
         cutter.begin(path)
@@ -160,7 +160,7 @@ def _growth(stage: Stage, rows: Sequence[int]) -> list[tuple[int, int, float]]:
 
 
 def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[Floats]:
-    """Plan (k, 2) of what each tip has come along, of the strokes that have begun."""
+    """Return a plan (k, 2) of the way of each tip, of the strokes that have begun."""
     tips = []
     for path in strokes:
         if path.times[0] >= time:
@@ -172,7 +172,7 @@ def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[Floats]:
 
 
 def _step_of_body(body: CutBody) -> float:
-    """Critical step 2/ω_max of a free sheet of Table 4.1 that has been cut, in s."""
+    """Compute the critical step 2/ω_max of a free sheet of Table 4.1 that has been cut, in s."""
     material = body.material(isotropic(1.0e4, 0.3, "plane stress"))
     pattern = block_pattern(body.resisting.cells, body.resisting.node_count)
     blocks = InternalForce(body.resisting, material, "linear").stiffness(pattern)
@@ -231,7 +231,7 @@ def hand(elements: int) -> Stage:
 
 
 def stroke_along(stage: Stage, place: float, begin: float, duration: float) -> ToolPath:
-    """Stroke from wrist to fingers, through both borders.
+    """Make the stroke from wrist to fingers, through both borders.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def cut_hand(stage: Stage, targets: Sequence[int], duration: float) -> list[CutH
 
 
 def _squeezed(paths: Sequence[ToolPath], end: float, duration: float) -> list[ToolPath]:
-    """Paths until a time, played within a duration."""
+    """Play paths until a time within a duration."""
     squeezed = []
     for path in paths:
         stop = min(float(path.times[-1]), end)
@@ -554,7 +554,7 @@ def real_time() -> RealTime:
     stage = hand(_TETRAHEDRA)
     more = [stroke_along(stage, place, begin, _STROKE) for place, begin in _STROKES]
     stage = replace(stage, strokes=[*stage.strokes, *more], duration=_DURATION)
-    volume, loose, inverted, gain = _soundness(stage)  # compiles what is timed below
+    volume, loose, inverted, gain = _soundness(stage)  # compiles the code timed below
     # each replay is the same work step by step: the median over them is what a step costs
     replays, walls = [], []
     for _ in range(_REPLAYS):
