@@ -1,4 +1,4 @@
-"""The README: its counts are those of the repository, its result is that of the page it links."""
+"""The README counts right, and its result stands on the page that it links."""
 
 import re
 
