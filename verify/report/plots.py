@@ -13,6 +13,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from verify.report.notation import RAISED, Drawing, printable
@@ -169,7 +170,7 @@ def _named(axes: Axes) -> None:
     """Name the curves at their ends, or in a legend if they are many or an area is among them."""
     handles, labels = axes.get_legend_handles_labels()
     curves = [(handle, label) for handle, label in zip(handles, labels, strict=True)
-              if hasattr(handle, "get_xydata")]  # fmt: skip
+              if isinstance(handle, Line2D)]  # fmt: skip
     if len(curves) < len(handles) or len(curves) > _FEW:
         legend(axes)
         return

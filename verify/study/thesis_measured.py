@@ -74,16 +74,17 @@ def sliver_systems(family: str, method: str) -> list[SliverSystem]:
 
 
 def exponent(steps: Sequence[SliverSystem]) -> float:
-    """Slope of log(critical step) over log(size) between two sizes, the step the least at one.
+    """Slope of log(critical step) over log(size) where the step falls to its least.
 
-    They are the smallest with as many unknowns as where the step is least: a slope from one mesh
-    to another is none.
+    It lies between the size of the least step and the next larger one, or the next smaller if there
+    is no larger. Beyond the least a method has moved the cut onto nodes: no slope leads there.
     """
-    least = min(steps, key=lambda step: step.ratio)
-    two = sorted((s for s in steps if s.unknowns == least.unknowns), key=lambda s: s.size)[:2]
-    if len(two) < 2:
+    rows = sorted(steps, key=lambda step: -step.size)
+    if len(rows) < 2:
         return float("nan")
-    return float(np.log(two[1].ratio / two[0].ratio) / np.log(two[1].size / two[0].size))
+    at = max(rows.index(min(rows, key=lambda step: step.ratio)), 1)
+    one, two = rows[at - 1], rows[at]
+    return float(np.log(two.ratio / one.ratio) / np.log(two.size / one.size))
 
 
 @dataclass(frozen=True)
