@@ -104,6 +104,14 @@ def test_a_pair_without_a_ratio_says_so_and_is_last():
     assert a[2][0] == "4, 1, 8"
 
 
+def test_of_one_scene_there_is_no_range():
+    one = ranking()
+    for pair in one["pairs"]:
+        pair.update(count=1, low=pair["ratio"], high=pair["ratio"])
+    (table,) = which_view(one)["errors"]
+    assert rows(table)[1][1] == ("1.40", "1 scene")
+
+
 def test_energy_has_its_ranks_and_what_was_left_out_once_for_all_metrics():
     standings = [Standing("b", 1, False, 1e-5, 9e-6, 1.1e-5, 2, "c"),
                  Standing("a", None, False, 1e-3, 1e-3, 1e-3, 1, "d")]  # fmt: skip

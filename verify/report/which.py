@@ -94,7 +94,9 @@ def _ratio(pair: Mapping[str, Any] | None, is_beside: bool) -> Cell:
         return Cell("–", "exact, or not told from none")
     middle, low, high = (number(pair[key], 3) for key in ("ratio", "low", "high"))
     count = pair["count"]
-    return Cell(f"{middle} ({low}–{high})", f"{count} scene{'s' * (count != 1)}")
+    if count == 1:
+        return Cell(middle, "1 scene")
+    return Cell(f"{middle} ({low}–{high})", f"{count} scenes")
 
 
 def _won(pairs: Sequence[Mapping[str, Any] | None]) -> Cell:
