@@ -29,7 +29,7 @@ SCRIPT = Path(__file__).parents[2] / ".ci/results"
 PUBLISHER = ModuleType("results")
 exec(compile(SCRIPT.read_text("utf-8"), str(SCRIPT), "exec"), PUBLISHER.__dict__)
 REMESHED, FUNCTIONS = "conforming mesh=remeshed", "getfem tip=functions"
-# factor of the error on those of `conforming`, seconds on the coarsest level
+# factor of the error on the errors of `conforming`, seconds on the coarsest level
 SOLVERS = {
     "xfem": (1.1, 1.0), "conforming": (1.0, 0.5), REMESHED: (0.9, 5.0), "kratos": (1.0, 2.0),
     "snapping": (2.0, 1.0), "ngsxfem": (1.2, 4.0), "getfem": (1.15, 3.0), FUNCTIONS: (0.5, 6.0),

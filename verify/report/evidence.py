@@ -43,7 +43,7 @@ class Evidence:
     hand : dict
         Steps of the real-time engine in the thesis study; empty if there are none.
     commands : dict of str to str
-        By run or study; what is not there has none.
+        By run or study; a missing entry has none.
     tips : frozenset of str
         Scenes of the positions study in which a cut ends inside the body.
     """
@@ -143,7 +143,7 @@ def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
 
 
 def benchmark_scenes(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
-    """Return the members of C1 to C8 by label; those of a scene at rest and in motion apart."""
+    """Return the members of C1 to C8 by label; a scene at rest and in motion counts as two."""
     scenes: dict[tuple[str, bool], list[CaseResult]] = {}
     for result in results:
         if found := _SCENE.match(result.case):

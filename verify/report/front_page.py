@@ -1,4 +1,4 @@
-"""The front page of the results, and that of the ranked run: answers and figures."""
+"""Front pages of the results and of the ranked run: answers and figures."""
 
 import re
 import shutil
@@ -160,7 +160,7 @@ def _pictures(folder: Path, drawn: dict[str, Drawing | None]) -> dict[str, list[
 
 
 def _answered(evidence: Evidence, own: Answer) -> list[str]:
-    """Return a question, its sentences, what is not shown, and folded the numbers."""
+    """Return a question, its sentences, the parts not shown, and folded the numbers."""
     lines = [f"## {own.question}", ""]
     if told := " ".join(one.text for one in own.found.values()):
         lines += [told, ""]
