@@ -307,7 +307,7 @@ def test_figures_name_at_most_six_curves_at_their_ends():
     drawn = figures(made())
     cost = drawn["What it costs"].body
     assert sum(f">{name}</text>" in cost for name in
-               ("XFEM", "conforming P1", "conforming P1 mesh=remeshed", "kratos", "snapping",
+               ("XFEM", "conforming P1", "mesh=remeshed", "kratos", "snapping",
                 "ngsxfem", "getfem", FUNCTIONS)) == 6  # fmt: skip
     assert ">kratos</text>" not in cost  # it has the curve of another, which is named
     assert drawn["Accuracy at rest"].alt.index("XFEM 1.1") > 0

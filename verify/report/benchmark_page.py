@@ -17,7 +17,7 @@ from verify.report.evidence import (
     pair_in,
 )
 from verify.report.notation import Drawing, number, solver_title
-from verify.report.plots import Palette, Series, end_named
+from verify.report.plots import Palette, Series, loglog
 from verify.report.rendering import Beside
 from verify.result import REFERENCE, CaseResult, SolveRecord, Status, repeated_totals
 
@@ -181,4 +181,4 @@ def time_plot(label: str, members: Sequence[CaseResult]) -> Drawing | None:
     grey = [s for s, name in zip(series, ordered, strict=True) if name not in named]
     palette = Palette.of(s.name for s in shown)
     title = f"{label}: relative L² error of the displacement"
-    return end_named(title, "seconds", shown, palette, grey)
+    return loglog(title, "seconds", shown, palette, grey=grey)

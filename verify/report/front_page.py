@@ -10,7 +10,7 @@ from verify.report.benchmark_page import discretisations, time_plot, title_of
 from verify.report.conclusions import STILL, Answer, drifts, steps_kept
 from verify.report.evidence import FURTHER, MEASURE, Beside, Evidence, benchmark_scenes, beside
 from verify.report.notation import Drawing, number, solver_title
-from verify.report.plots import Bar, Palette, Ranged, Series, bars, end_named, ranges
+from verify.report.plots import Bar, Palette, Ranged, Series, bars, loglog, ranges
 from verify.report.rendering import Beside as Pictures
 from verify.report.rendering import in_markdown
 
@@ -83,10 +83,10 @@ def figures(evidence: Evidence) -> dict[str, Drawing | None]:
     long_run = [Ranged(solver_title(n), v) for n, v in drifts(evidence).items() if v > 0.0]
     return {
         **{question: _ratios(evidence, kind) for question, kind in _RATIOS.items()},
-        "Explicit steps with slivers": end_named(
+        "Explicit steps with slivers": loglog(
             "Critical explicit step over the uncut body's", "distance ε of the cut from nodes",
             [Series(solver_title(name), steps_kept(evidence, name)) for name in _STEPS],
-            Palette(), descending=True),
+            Palette(), falling=True),
         "Long runs without drift": ranges(
             "Energy drift over the 10 000 steps of C7, and its limit", "relative", long_run,
             Palette(), STILL),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import Any
+from typing import Any, cast
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -20,7 +20,6 @@ from verify.report.notation import RAISED, Drawing, printable
 
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"
-_NAMES = 2.3  # inches right of the axes for names at the ends of curves
 _LEFT, _ASIDE = 0.52, 2.0  # inches left of the axes, and with those right of them for a legend
 _RC = {
     "svg.fonttype": "none", "svg.hashsalt": "report", "text.parse_math": False, "font.size": 9,
@@ -188,7 +187,8 @@ def _named(axes: Axes) -> None:
     ends = []
     for (handle, _), lines in zip(curves, names, strict=True):
         end = _end_of(handle.get_xydata())
-        ends.append((within.transform(end)[1] * height, end, lines, handle.get_color()))
+        colour = cast(Line2D, handle).get_color()
+        ends.append((within.transform(end)[1] * height, end, lines, colour))
     ends.sort(key=lambda one: one[0])
     sizes = [_LINE * len(lines) + _GAP for _, _, lines, _ in ends]
     places = _spread([at for at, *_ in ends], sizes, height)
@@ -315,20 +315,27 @@ class Bar:
 
 
 def loglog(
-    title: str, x_title: str, series: Sequence[Series], palette: Palette, falling: bool = False
-) -> Drawing | None:
+    title: str, x_title: str, series: Sequence[Series], palette: Palette, falling: bool = False,
+    grey: Sequence[Series] = (),
+) -> Drawing | None:  # fmt: skip
     """Return curves on logarithmic axes, or None if there is nothing positive.
 
-    Up to six are named at their ends, more in a legend. The abscissa falls to the right if asked.
+    Up to six are named at their ends, more in a legend; those in `grey` have no names. The abscissa
+    falls to the right if asked.
     """
     drawn = [(s, [place for place in s.places if _can_be_drawn(place)]) for s in series]
     drawn = [(s, places) for s, places in drawn if places]
     if not drawn:
         return None
     with panel(title) as (figure, axes):
-        _logarithmic(axes, x_title, [place for _, places in drawn for place in places])
+        nameless = [[place for place in s.places if _can_be_drawn(place)] for s in grey]
+        every = [*(places for _, places in drawn), *nameless]
+        _logarithmic(axes, x_title, [place for places in every for place in places])
         if falling:
             axes.invert_xaxis()
+        for places in filter(None, nameless):
+            axes.plot(*zip(*places, strict=True), color="#c2c2c2", linewidth=0.8, marker=".",
+                      markersize=3)  # fmt: skip
         said = [f"{title} against {x_title}."]
         for s, places in drawn:
             style = palette[s.name]
@@ -560,57 +567,3 @@ def _tick_text(value: float) -> str:
 def _range_text(row: Ranged) -> str:
     beyond = "" if row.low is None else f" ({row.low:.3g} to {row.high:.3g})"
     return f"{row.name} {row.value:.3g}{beyond}"
-
-
-def end_named(
-    title: str, x_title: str, series: Sequence[Series], palette: Palette,
-    others: Sequence[Series] = (), descending: bool = False,
-) -> Drawing | None:  # fmt: skip
-    """Return curves on logarithmic axes, each named at its end; `others` are grey, without names.
-
-    The x axis falls if `descending`. None if there is nothing positive.
-    """
-    kept = [(s, [p for p in s.places if _can_be_drawn(p)]) for s in series]
-    kept = [(s, places) for s, places in kept if places]
-    grey = [own for s in others if (own := [p for p in s.places if _can_be_drawn(p)])]
-    if not kept:
-        return None
-    with panel(title, 5.6, 3.2) as (figure, axes):
-        _place(axes, _NAMES)
-        _logarithmic(axes, x_title, [p for own in (*(k for _, k in kept), *grey) for p in own])
-        if descending:
-            axes.invert_xaxis()
-        for own in grey:
-            axes.plot(*zip(*own, strict=True), color="#c2c2c2", linewidth=0.8, marker=".",
-                      markersize=3)  # fmt: skip
-        for s, places in kept:
-            axes.plot(*zip(*places, strict=True), **{**palette[s.name].marked, "markersize": 4})
-        _name_ends(axes, [(s.name, places[-1], palette[s.name].colour) for s, places in kept])
-        said = "; ".join(
-            f"{s.name}: " + ", ".join(f"{y:.3g} at {x:.3g}" for x, y in places)
-            for s, places in kept
-        )
-        return drawing(figure, f"{title} against {x_title}. {said}.")
-
-
-def _name_ends(axes: Axes, ends: Sequence[tuple[str, tuple[float, float], str]]) -> None:
-    """Write names right of the axes at the height of their ends, apart from each other."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    step = 11.0 / 72 / (axes.get_position().height * figure.get_figheight())  # of 8 points
-    places = [axes.transAxes.inverted().transform(axes.transData.transform(e))[1]
-              for _, e, _ in ends]  # fmt: skip
-    order = sorted(range(len(ends)), key=lambda i: places[i])
-    heights = [max(0.0, places[order[0]])]
-    for i in order[1:]:
-        heights.append(max(places[i], heights[-1] + step))
-    above = max(0.0, heights[-1] - 1.0)
-    for k in range(len(heights) - 1, -1, -1):  # push down what stands above the axes
-        most = 1.0 if k == len(heights) - 1 else heights[k + 1] - step
-        heights[k] = min(heights[k], most) if above else heights[k]
-    for i, height in zip(order, heights, strict=True):
-        name, end, colour = ends[i]
-        axes.annotate(printable(name), end, (1.04, height), xycoords="data", fontsize=8,
-                      textcoords="axes fraction", va="center", color=colour, annotation_clip=False,
-                      arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4,
-                                  "shrinkA": 0, "shrinkB": 3})  # fmt: skip
