@@ -328,3 +328,15 @@ def test_bars_of_coverage_count_scenes(tmp_path):
     head = "\n".join(arena_head(made(), [], tmp_path))
     assert "snapping 7 of 8" in head
     assert "getfem 2 of 3" in head
+
+
+def test_no_folder_of_a_machine_is_published(tmp_path, monkeypatch):
+    """A run may have been made in another folder than the one that publishes it."""
+    monkeypatch.setitem(PUBLISHER.__dict__, "TARGET", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text("failed: /tmp/some/place/cases/benchmark/c8_slivers.toml: cuts; a/cases/b.toml")
+    PUBLISHER.tidy()
+    assert page.read_text() == "failed: cases/benchmark/c8_slivers.toml: cuts; a/cases/b.toml"
+    page.write_text("see /tmp/log")
+    with pytest.raises(SystemExit, match="names a folder of this machine"):
+        PUBLISHER.tidy()
