@@ -125,13 +125,14 @@ class FaceContact:
 
 def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int32]:
     """Return the smooth face (f,) of each facet; `pairs` (f, q, 2) say which facets touch."""
-    at = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)[1].reshape(pairs.shape[:2])
-    facets = np.repeat(np.arange(len(at)), at.shape[1])
+    count, of_each, _ = pairs.shape
+    _, at = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    facets = np.repeat(np.arange(count), of_each)
     touch = coo_array((np.ones(at.size), (facets, at.ravel()))).tocsr()
     one, other = (touch @ touch.T).nonzero()
     smooth = np.abs(np.sum(normals[one] * normals[other], axis=1)) > _SMOOTH
-    shape = (len(at), len(at))
-    joined = coo_array((np.ones(smooth.sum()), (one[smooth], other[smooth])), shape=shape)
+    ends = one[smooth], other[smooth]
+    joined = coo_array((np.ones(len(ends[0])), ends), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
 
 
