@@ -246,13 +246,13 @@ def _still(evidence: Evidence) -> Found | None:
     text = (
         f"Over the {number(count)} steps of C7 the energy of XFEM drifts by "
         f"{number(found['xfem'], 2)}, relative; {held} of the {len(found)} solvers that answered "
-        f"stay below {number(STILL)}."
+        f"stay below {number(STILL, 1)}."
     )
     numbers = ", ".join(f"{name} {number(drift, 2)}" for name, drift in found.items())
     return Found(
         text,
         numbers,
-        f"XFEM at most {number(STILL)}",
+        f"XFEM at most {number(STILL, 1)}",
         found["xfem"] <= STILL,
         "long" if "long" in evidence.commands else "arena",
     )
