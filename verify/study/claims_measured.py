@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import meshio
 import numpy as np
@@ -30,6 +31,7 @@ from verify.study.thesis_measured import sliver_systems
 from verify.system import critical_step, lowest_frequency, with_uncut_twin
 
 Array = NDArray[np.float64]
+Cut = tuple[Array, NDArray[np.int64], Array, Array]  # points, cells, point and normal of a plane
 _GRAVITY = 9.81
 _ELASTIC = {"young": 1.0e4, "poisson": 0.3, "density": 1000.0}
 _FAMILIES = ("slivers/plane_edges", "slivers/space_faces")
@@ -108,7 +110,9 @@ def _lame(young: float, poisson: float) -> tuple[float, float]:
     return 2.0 * shear * poisson / (1.0 - 2.0 * poisson), shear
 
 
-def _given(folder: Path, points: Array, cells: Array, at: Array, normal: Array) -> Scene:
+def _given(
+    folder: Path, points: Array, cells: NDArray[np.int64], at: Array, normal: Array
+) -> Scene:
     """Make a scene of a given mesh, cut through by the plane through a point."""
     dim = points.shape[1]
     kind = "triangle" if dim == 2 else "tetra"
@@ -129,15 +133,18 @@ def _given(folder: Path, points: Array, cells: Array, at: Array, normal: Array) 
     )  # fmt: skip
 
 
-def _steps(points: Array, cells: Array, at: Array, normal: Array, mass: str) -> tuple[float, float]:
+def _steps(
+    points: Array, cells: NDArray[np.int64], at: Array, normal: Array, mass: str
+) -> tuple[float, float]:
     """Critical steps of a given mesh, s: cut through by a plane, and whole."""
     with TemporaryDirectory() as folder:
         scene = _given(Path(folder), points, cells, at, normal)
-        pair = with_uncut_twin(variant_of("xfem").found().system, scene, 0, {"mass": mass})
+        system: Any = getattr(variant_of("xfem").found(), "system")  # noqa: B009
+        pair = with_uncut_twin(system, scene, 0, {"mass": mass})
     return critical_step(pair[0]), critical_step(pair[1])
 
 
-def element_step(points: Array, cells: Array) -> float:
+def element_step(points: Array, cells: NDArray[np.int64]) -> float:
     """Least critical step of the uncut elements alone, each with its mass lumped, s.
 
     Parameters
@@ -159,22 +166,22 @@ def element_step(points: Array, cells: Array) -> float:
     return float(least)
 
 
-def _simplices(count: int = 10) -> Iterator[tuple[Array, Array, Array, Array]]:
+def _simplices(count: int = 10) -> Iterator[Cut]:
     """Single triangles and tetrahedra, and planes through a random inner point of each."""
     random = np.random.default_rng(0)
     for dim in (2, 3):
         for _ in range(count):
             points = random.normal(size=(dim + 1, dim))
             inside = random.dirichlet(np.ones(dim + 1)) @ points
-            yield points, np.arange(dim + 1)[None], inside, random.normal(size=dim)
+            yield points, np.arange(dim + 1, dtype=np.int64)[None], inside, random.normal(size=dim)
 
 
-def _bodies(count: int = 6) -> Iterator[tuple[Array, Array, Array, Array]]:
+def _bodies(count: int = 6) -> Iterator[Cut]:
     """Squares and cubes with inner nodes moved by up to a sixth of an element, and planes."""
     random = np.random.default_rng(1)
     for dim in (2, 3):
         box = {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3}
-        given = {"geometry": box, "material": _ELASTIC} if dim == 3 else {}
+        given: dict[str, Any] = {"geometry": box, "material": _ELASTIC} if dim == 3 else {}
         supports = [held("bottom", [0.0] * dim)]
         grid = unit_scene("grid", mesh={"cells": [[4] * dim]}, supports=supports, **given)
         mesh, size = background_mesh(grid, 0)
@@ -183,7 +190,7 @@ def _bodies(count: int = 6) -> Iterator[tuple[Array, Array, Array, Array]]:
             moved = random.uniform(-1.0, 1.0, mesh.points.shape) * size / 6.0
             middle = random.uniform(0.3, 0.7, dim)
             points = mesh.points + inner[:, None] * moved
-            yield points, mesh.cells, middle, random.normal(size=dim)
+            yield points, np.asarray(mesh.cells), middle, random.normal(size=dim)
 
 
 def uncut_step() -> list[Number]:
@@ -335,10 +342,8 @@ def optimal_rates() -> list[Number]:
             metrics = [row[1][name] for row in rows]
             errors, widths = [m.value for m in metrics], [m.uncertainty for m in metrics]
             rate = observed_rate("xfem", name, sizes, errors, widths)
-            known = rate.order is not None
-            found.append(
-                within(rate.order, rate.uncertainty) if known else Number(None, note=rate.reason)
-            )
+            unknown = Number(None, note=rate.reason)
+            found.append(unknown if rate.order is None else within(rate.order, rate.uncertainty))
     return found
 
 
