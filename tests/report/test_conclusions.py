@@ -335,8 +335,11 @@ def test_no_folder_of_a_machine_is_published(tmp_path, monkeypatch):
     monkeypatch.setitem(PUBLISHER.__dict__, "TARGET", tmp_path)
     page = tmp_path / "page.md"
     page.write_text("failed: /tmp/some/place/cases/benchmark/c8_slivers.toml: cuts; a/cases/b.toml")
+    command = tmp_path / "command.md"
+    command.write_text("`verify study slivers -j 1 --out /tmp/some/where`")
     PUBLISHER.tidy()
     assert page.read_text() == "failed: cases/benchmark/c8_slivers.toml: cuts; a/cases/b.toml"
+    assert command.read_text() == "`verify study slivers -j 1`"
     page.write_text("see /tmp/log")
     with pytest.raises(SystemExit, match="names a folder of this machine"):
         PUBLISHER.tidy()
