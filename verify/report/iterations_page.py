@@ -72,7 +72,9 @@ def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
 
 def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
     """Compare the fewest and the most substeps at the largest work that both had."""
-    better, worse, level = [], [], []
+    better: list[str] = []
+    worse: list[str] = []
+    level: list[str] = []
     for case, own in _by_case(settings):
         errors = {
             (one["substeps"], one["iterations"] * one["substeps"]): one["whole_error"]

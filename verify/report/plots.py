@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import Any, cast
+from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -187,7 +187,7 @@ def _named(axes: Axes) -> None:
     ends = []
     for (handle, _), lines in zip(curves, names, strict=True):
         end = _end_of(handle.get_xydata())
-        colour = cast(Line2D, handle).get_color()
+        colour = handle.get_color()
         ends.append((within.transform(end)[1] * height, end, lines, colour))
     ends.sort(key=lambda one: one[0])
     sizes = [_LINE * len(lines) + _GAP for _, _, lines, _ in ends]
