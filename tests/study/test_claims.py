@@ -148,7 +148,7 @@ def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path
     study = ClaimsStudy(judged=judged, findings=[])
     write_study(tmp_path, "claims", study, "verify study claims")
     text = render_study(tmp_path, "claims", "markdown").read_text("utf-8")
-    counts = "Of 3 claims 1 hold, 0 hold in part, 1 do not hold and 1 cannot be told here."
+    counts = "Of 3 claims: 1 hold, 0 in part, 1 not, 1 cannot be told here."
     assert [line for line in text.splitlines() if line][:2] == [
         "# Claims from the literature, judged", counts
     ]  # fmt: skip
