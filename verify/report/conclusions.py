@@ -1,7 +1,7 @@
 """Sentences of the front page: templates with thresholds, held against the numbers of the runs.
 
-`QUESTIONS` lists the sentences, `answer` evaluates them. A threshold stands beside its reason and
-was chosen before its number was seen.
+`QUESTIONS` lists the sentences, `answer` evaluates them. A threshold stands beside its reason.
+Some were chosen when earlier results were known: docs/theory/history.md.
 """
 
 from collections.abc import Callable, Iterator, Sequence
