@@ -11,6 +11,7 @@ from types import ModuleType
 
 import pytest
 
+from verify.cli import build_parser
 from verify.errors import InputError
 from verify.report import conclusions
 from verify.report.benchmark_page import (
@@ -280,6 +281,18 @@ def test_ends_inside_looks_at_every_cut():
     assert ends_inside({"cuts": [{"expected": "through"}, {"expected": "inner"}]})
     assert not ends_inside({"cuts": [{"expected": "through"}, {}]})
     assert not ends_inside({})
+
+
+@pytest.mark.parametrize("foreign", [[], ["getfem", "kratos", "ngsxfem", "vbd"]])
+def test_the_command_line_knows_every_run_of_the_protocol(foreign, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(PUBLISHER, "installed", lambda: foreign)
+    monkeypatch.setattr(PUBLISHER, "verify", lambda *words, ends=(0,): asked.append(words))
+    made = PUBLISHER.run("2")
+    for words in asked:
+        build_parser().parse_args(words)  # leaves with a message where it does not know a word
+    assert set(made) <= set(PUBLISHER.PAGES)
+    assert {words[-1] for words in asked} == {str(PUBLISHER.RUNS / name) for name in made}
 
 
 def test_the_front_page_is_short_and_has_four_to_six_figures(tmp_path):
