@@ -9,7 +9,7 @@ import numpy as np
 
 from verify.files import write_whole
 from verify.report.evidence import (
-    FURTHER,
+    JUDGED,
     MEASURE,
     Evidence,
     benchmark_scenes,
@@ -58,7 +58,7 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
         "is better. C5 and C8 show the middle of their members. Grey: the other discretisations.",
         "", "\n".join(figures), "",
         "<details><summary>Commands</summary>", "",
-        *(f"- `{evidence.commands[name]}`" for name in ("arena", *FURTHER)
+        *(f"- `{evidence.commands[name]}`" for name in JUDGED
           if name in evidence.commands), "", "</details>",
     ]  # fmt: skip
     write_whole(folder / "index.md", "\n".join(lines) + "\n")

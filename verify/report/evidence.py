@@ -18,7 +18,7 @@ from verify.scene import list_cases, load_scenes
 
 MEASURE = "conforming"  # what all solvers are held against
 LONG_RUN = "benchmark/c7_spinning"
-FURTHER = ("benchmark", "long")  # runs of scenes that take hours, apart from the others
+JUDGED = ("arena", "long")  # runs: all scenes, and the long one alone, which is timed once
 
 _SCENE = re.compile(r"benchmark/c(\d)_")
 Row = dict[str, str]
@@ -73,8 +73,8 @@ class Evidence:
 def load_evidence(runs: Path, published: Path) -> Evidence:
     """Read what `runs` holds; studies that are not there, from their tables below `published`.
 
-    Nothing is compared: pairs, groups and coverage are left to who judges. Scenes that the run
-    ``arena`` is without may be in the runs of `FURTHER`.
+    Nothing is compared: pairs, groups and coverage are left to who judges. The run ``long``
+    adds the scenes that ``arena`` is without.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
     """
     results: dict[str, CaseResult] = {}
     commands, thesis = {"speed": "make bench"}, dict[str, Any]()
-    for name in ("arena", *FURTHER):
+    for name in JUDGED:
         if name == "arena" or (runs / name).is_dir():
             run = load_run(runs / name)
             new = [r for r in run.results if r.case not in results]

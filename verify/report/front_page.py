@@ -8,7 +8,7 @@ from pathlib import Path
 from verify.files import write_whole
 from verify.report.benchmark_page import discretisations, time_plot, title_of
 from verify.report.conclusions import STILL, Answer, drifts, steps_kept
-from verify.report.evidence import FURTHER, MEASURE, Beside, Evidence, benchmark_scenes, beside
+from verify.report.evidence import MEASURE, Beside, Evidence, benchmark_scenes, beside
 from verify.report.notation import Drawing, number, solver_title
 from verify.report.plots import Bar, Palette, Ranged, Series, bars, loglog, ranges
 from verify.report.rendering import Beside as Pictures
@@ -171,7 +171,6 @@ def _answered(evidence: Evidence, own: Answer) -> list[str]:
         lines += [f"- **{name}**: {one.numbers}. Needed: {one.needs}."
                   for name, one in own.found.items()]  # fmt: skip
         sources = dict.fromkeys(one.source for one in own.found.values())
-        named = [n for s in sources for n in ((s, *FURTHER[:1]) if s == "arena" else (s,))]
-        lines += [f"- `{evidence.commands[n]}`" for n in named if n in evidence.commands]
+        lines += [f"- `{evidence.commands[n]}`" for n in sources if n in evidence.commands]
         lines += ["", "</details>", ""]
     return lines
