@@ -5,10 +5,10 @@ import sys
 from collections.abc import Sequence
 from inspect import cleandoc
 from textwrap import indent
-from typing import Annotated, Literal
+from typing import Literal
 
 from verify import __version__
-from verify.cli.signatures import Arg, Member, Parser, add_commands, arguments_of, call
+from verify.cli.signatures import Member, Parser, add_commands, arguments_of, call
 from verify.cli.streams import printable_streams
 from verify.errors import InputError, RunStoppedError, UnsupportedSceneError
 from verify.files import DISK_FAILURES
@@ -99,9 +99,14 @@ def build_parser() -> Parser:
 
 
 def completion(
-    shell: Annotated[Literal["bash", "zsh"], Arg("the shell that shall read it")],
+    shell: Literal["bash", "zsh"],
 ) -> int:
     """Print a script that completes commands, options and cases in a shell.
+
+    Parameters
+    ----------
+    shell
+        the shell that shall read it
 
     Examples
     --------

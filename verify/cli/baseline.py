@@ -29,7 +29,7 @@ from verify.cli.streams import print_json
 if TYPE_CHECKING:
     from verify.baseline import Baseline, Row
 
-File = Annotated[Path, Arg("the baseline, to be committed", "FILE")]
+File = Annotated[Path, Arg("FILE", help="the baseline, to be committed")]
 FILE = Path("baseline.json")
 
 
@@ -69,13 +69,19 @@ def check(
     run: Run,
     *,
     file: File = FILE,
-    strict: Annotated[bool, Arg("what is undecided: exit code 5")] = False,
-    partial: Annotated[
-        bool, Arg("leave out cases of the file that the run was not asked for")
-    ] = False,
+    strict: bool = False,
+    partial: bool = False,
     as_json: AsJson = False,
 ) -> int:
-    """Compare a finished run with the file."""
+    """Compare a finished run with the file.
+
+    Parameters
+    ----------
+    strict
+        what is undecided: exit code 5
+    partial
+        leave out cases of the file that the run was not asked for
+    """
     from verify.baseline import check_run, exit_code_of, read_baseline, read_run
     from verify.result import Verdict
 
@@ -109,17 +115,17 @@ def update(
     run: Run,
     *,
     file: File = FILE,
-    only: Annotated[
-        Sequence[str],
-        Arg(
-            "what to move: CASE:METRIC or CASE:SOLVER/LEVEL/METRIC; repeat for several; "
-            "without it the difference is shown and nothing is moved",
-            "CASE:METRIC",
-        ),
-    ] = (),
+    only: Annotated[Sequence[str], Arg("CASE:METRIC")] = (),
     as_json: AsJson = False,
 ) -> int:
-    """Move own values that are named, never the independent ones."""
+    """Move own values that are named, never the independent ones.
+
+    Parameters
+    ----------
+    only
+        what to move: CASE:METRIC or CASE:SOLVER/LEVEL/METRIC; repeat for several; without it the
+        difference is shown and nothing is moved
+    """
     from verify.baseline import read_baseline, read_run, update_from, write_baseline
 
     after, moves = update_from(read_baseline(file), read_run(run), only)
@@ -153,12 +159,20 @@ def _apart(*values: float | None) -> str:
 
 
 def diff(
-    run: Annotated[Path, Arg("directory of a finished run", "OLD")],
-    other: Annotated[Path, Arg("directory of a finished run", "NEW")],
+    run: Annotated[Path, Arg("OLD")],
+    other: Annotated[Path, Arg("NEW")],
     *,
     as_json: AsJson = False,
 ) -> int:
-    """Show which verdicts differ between two runs."""
+    """Show which verdicts differ between two runs.
+
+    Parameters
+    ----------
+    run
+        directory of a finished run
+    other
+        directory of a finished run
+    """
     from verify.baseline import read_run, verdict_changes
     from verify.baseline.checking import any_worse, meaning_lines
 

@@ -64,13 +64,19 @@ def list_(*, as_json: AsJson = False) -> int:
 
 
 def clear(
-    cases: Annotated[
-        Sequence[str], Arg("name or pattern (default: all that is kept)", "CASE")
-    ] = (),
+    cases: Annotated[Sequence[str], Arg("CASE")] = (),
     *,
-    outdated: Annotated[bool, Arg("only those of another code or other versions")] = False,
+    outdated: bool = False,
 ) -> int:
-    """Remove references."""
+    """Remove references.
+
+    Parameters
+    ----------
+    cases
+        name or pattern (default: all that is kept)
+    outdated
+        only those of another code or other versions
+    """
     cache = _cache()
     chosen = [
         entry
@@ -87,10 +93,18 @@ def clear(
 
 
 def export(
-    bundle: Annotated[Path, Arg("zip file to write", "BUNDLE")],
-    cases: Annotated[Sequence[str], Arg("name, pattern or file of a case", "CASE")],
+    bundle: Annotated[Path, Arg("BUNDLE")],
+    cases: Annotated[Sequence[str], Arg("CASE")],
 ) -> int:
-    """Write the references of cases into one file, for runs without FEniCSx."""
+    """Write the references of cases into one file, for runs without FEniCSx.
+
+    Parameters
+    ----------
+    bundle
+        zip file to write
+    cases
+        name, pattern or file of a case
+    """
     from verify.runner import select_cases
     from verify.runner.references import write_bundle
 

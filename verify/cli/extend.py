@@ -17,27 +17,24 @@ def export(
     case: Cases,
     *,
     out: Out,
-    levels: Annotated[
-        Sequence[int],
-        Arg(
-            "only this mesh level, 0 is the coarsest; repeat for several (default: all)",
-            "K",
-            ("--level",),
-        ),
-    ] = (),
-    conforming: Annotated[
-        bool, Arg("also write meshes that conform to the cuts, with their nodes doubled")
-    ] = False,
-    template: Annotated[
-        Literal["python"] | None,
-        Arg(
-            "also write a program that answers the case, on a reader and writer that need "
-            "numpy alone (with --conforming)"
-        ),
-    ] = None,
-    as_json: Annotated[bool, Arg("print the files as JSON", flags=("--json",))] = False,
+    levels: Annotated[Sequence[int], Arg("K", ("--level",))] = (),
+    conforming: bool = False,
+    template: Literal["python"] | None = None,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Write a case as files for another program: meshes, cuts, supports, loads.
+
+    Parameters
+    ----------
+    levels
+        only this mesh level, 0 is the coarsest; repeat for several (default: all)
+    conforming
+        also write meshes that conform to the cuts, with their nodes doubled
+    template
+        also write a program that answers the case, on a reader and writer that need numpy alone
+        (with --conforming)
+    as_json
+        print the files as JSON
 
     Examples
     --------
@@ -72,44 +69,37 @@ def export(
     return 0
 
 
-AnswersDir = Annotated[
-    Path, Arg("directory with level-<k>/solution.json; of several cases in <case>/", "DIR")
-]
-ImportRun = Annotated[
-    Path,
-    Arg(
-        "run directory; one of an earlier import of the same cases keeps the other programs", "RUN"
-    ),
-]
-Beside = Annotated[
-    Sequence[str],
-    Arg(
-        "solver to run beside it; repeat for several (default: those that checks compare with, "
-        "where they are installed, and the reference)",
-        "NAME",
-    ),
-]
-JudgedAs = Annotated[
-    str | None,
-    Arg("checks that a case makes of this solver by its name are made of the program too", "NAME"),
-]
-
-
 def import_(
     case: Cases,
-    answers: AnswersDir,
+    answers: Annotated[Path, Arg("DIR")],
     *,
-    solver: Annotated[str, Arg("what the program is called in the report", "NAME")],
-    out: ImportRun,
-    beside: Beside = (),
-    judged_as: JudgedAs = None,
+    solver: Annotated[str, Arg("NAME")],
+    out: Annotated[Path, Arg("RUN")],
+    beside: Annotated[Sequence[str], Arg("NAME")] = (),
+    judged_as: Annotated[str | None, Arg("NAME")] = None,
     timeout: Timeout = 600.0,
     repetitions: Repetitions = 1,
     jobs: Jobs = 1,
     strict: Strict = False,
-    as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Compare and judge the answers of another program.
+
+    Parameters
+    ----------
+    answers
+        directory with level-<k>/solution.json; of several cases in <case>/
+    solver
+        what the program is called in the report
+    out
+        run directory; one of an earlier import of the same cases keeps the other programs
+    beside
+        solver to run beside it; repeat for several (default: those that checks compare with, where
+        they are installed, and the reference)
+    judged_as
+        checks that a case makes of this solver by its name are made of the program too
+    as_json
+        print the verdicts as JSON
 
     Examples
     --------
@@ -143,22 +133,25 @@ def import_(
 
 
 def conform(
-    solver: Annotated[
-        str, Arg("name of a solver, or module:Class", "'SOLVER [PARAMETER=VALUE …]'")
-    ],
+    solver: Annotated[str, Arg("'SOLVER [PARAMETER=VALUE …]'")],
     *,
-    parameters: Annotated[
-        Sequence[str],
-        Arg("parameter of the solver; repeat for several", "NAME=VALUE", ("--set",)),
-    ] = (),
-    checks: Annotated[
-        Sequence[str],
-        Arg("only this check; repeat for several (default: all)", "NAME", ("--check",)),
-    ] = (),
+    parameters: Annotated[Sequence[str], Arg("NAME=VALUE", ("--set",))] = (),
+    checks: Annotated[Sequence[str], Arg("NAME", ("--check",))] = (),
     timeout: Timeout = 120.0,
-    as_json: Annotated[bool, Arg("print the checks as JSON", flags=("--json",))] = False,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Check a solver on what holds for every right solver, before it is ranked.
+
+    Parameters
+    ----------
+    solver
+        name of a solver, or module:Class
+    parameters
+        parameter of the solver; repeat for several
+    checks
+        only this check; repeat for several (default: all)
+    as_json
+        print the checks as JSON
 
     Examples
     --------

@@ -25,11 +25,16 @@ _AS_IT_IS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": Fals
 
 def list_(
     *,
-    exact: Annotated[bool, Arg("list exact solutions instead")] = False,
+    exact: bool = False,
     expression: Matching = None,
     as_json: AsJson = False,
 ) -> int:
     """List the cases, or the exact solutions.
+
+    Parameters
+    ----------
+    exact
+        list exact solutions instead
 
     Examples
     --------
@@ -93,9 +98,14 @@ def _exact_solutions() -> list[dict[str, Any]]:
 def describe(
     case: Case,
     *,
-    as_json: Annotated[bool, Arg("print the case with all defaults", flags=("--json",))] = False,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Say in words what a case asks.
+
+    Parameters
+    ----------
+    as_json
+        print the case with all defaults
 
     Examples
     --------
@@ -222,10 +232,13 @@ def _judge(scene: "Scene") -> str:
     return f"conforming reference, P{levels.degree}, {levels.levels} levels, with its uncertainty"
 
 
-def check(
-    files: Annotated[Sequence[str], Arg("case file", "FILE")], *, as_json: AsJson = False
-) -> int:
+def check(files: Annotated[Sequence[str], Arg("FILE")], *, as_json: AsJson = False) -> int:
     """Validate case files without running them.
+
+    Parameters
+    ----------
+    files
+        case file
 
     Examples
     --------
@@ -310,17 +323,20 @@ def schema() -> int:
 
 
 def report(
-    directory: Annotated[Path, Arg("directory of a run or of studies", "DIR")],
+    directory: Annotated[Path, Arg("DIR")],
     *,
     form: Annotated[
-        Literal["html", "markdown", "summary", "pdf"],
-        Arg(
-            "a page (default); Markdown with pictures beside it; or PDF, which needs Chromium",
-            flags=("--format",),
-        ),
+        Literal["html", "markdown", "summary", "pdf"], Arg(flags=("--format",))
     ] = "html",
 ) -> int:
     """Render the report of a run or of studies again, without computing anything.
+
+    Parameters
+    ----------
+    directory
+        directory of a run or of studies
+    form
+        a page (default); Markdown with pictures beside it; or PDF, which needs Chromium
 
     Examples
     --------
@@ -347,27 +363,26 @@ def report(
 def paraview(
     run: Run,
     *,
-    out: Annotated[
-        Path | None, Arg("directory to write into (default: the folder paraview in the run)", "DIR")
-    ] = None,
-    solvers: Annotated[
-        Sequence[str],
-        Arg(
-            "only of this solver; repeat for several (default: all, and the reference)",
-            "NAME",
-            ("--solver",),
-        ),
-    ] = (),
-    level: Annotated[
-        int | None,
-        Arg("mesh level, 0 is the coarsest (default: the finest of each solver)", "K"),
-    ] = None,
-    reference: Annotated[
-        bool, Arg("add the displacement of the reference and the error against it")
-    ] = False,
-    as_json: Annotated[bool, Arg("print the files as JSON", flags=("--json",))] = False,
+    out: Annotated[Path | None, Arg("DIR")] = None,
+    solvers: Annotated[Sequence[str], Arg("NAME", ("--solver",))] = (),
+    level: Annotated[int | None, Arg("K")] = None,
+    reference: bool = False,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Write the solutions of a run for ParaView: displacement, strain, stress over time.
+
+    Parameters
+    ----------
+    out
+        directory to write into (default: the folder paraview in the run)
+    solvers
+        only of this solver; repeat for several (default: all, and the reference)
+    level
+        mesh level, 0 is the coarsest (default: the finest of each solver)
+    reference
+        add the displacement of the reference and the error against it
+    as_json
+        print the files as JSON
 
     Examples
     --------
@@ -386,16 +401,15 @@ def paraview(
 
 def doctor(
     *,
-    compiling: Annotated[
-        bool,
-        Arg(
-            "compile all kernels now, in two processes, and say what each module took",
-            flags=("--compile",),
-        ),
-    ] = False,
+    compiling: Annotated[bool, Arg(flags=("--compile",))] = False,
     as_json: AsJson = False,
 ) -> int:
     """Say what of the software that the solvers stand on is here, works, or is missing.
+
+    Parameters
+    ----------
+    compiling
+        compile all kernels now, in two processes, and say what each module took
 
     Examples
     --------

@@ -25,34 +25,35 @@ if TYPE_CHECKING:
 def play(
     case: Case,
     *,
-    out: Annotated[
-        Path | None,
-        Arg(
-            "draw off-screen into this file: .gif, .mp4 (needs ffmpeg), or .png (the last frame)",
-            "FILE",
-        ),
-    ] = None,
-    window: Annotated[bool, Arg("open a window")] = False,
-    stroke: Annotated[Path, Arg("window: where strokes of the mouse are written", "TOML")] = Path(
-        "stroke.toml"
-    ),
-    frames: Annotated[int, Arg("frames drawn", "N")] = 48,
-    zoom: Annotated[
-        float,
-        Arg("look at the wound, F times as near (default: 1, the whole body)", "F", read=positive),
-    ] = 1.0,
-    records: Annotated[Path | None, Arg("write what every step cost and did", "CSV")] = None,
-    tolerance: Annotated[
-        float | None,
-        Arg(
-            "residual that iterations may leave of each step's load (default: 1e-10)",
-            "R",
-            read=positive,
-        ),
-    ] = None,
-    as_json: Annotated[bool, Arg("print the summary as JSON", flags=("--json",))] = False,
+    out: Annotated[Path | None, Arg("FILE")] = None,
+    window: bool = False,
+    stroke: Annotated[Path, Arg("TOML")] = Path("stroke.toml"),
+    frames: Annotated[int, Arg("N")] = 48,
+    zoom: Annotated[float, Arg("F", read=positive)] = 1.0,
+    records: Annotated[Path | None, Arg("CSV")] = None,
+    tolerance: Annotated[float | None, Arg("R", read=positive)] = None,
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
 ) -> int:
     """Play a cutting scene as a simulator would, and show or draw it.
+
+    Parameters
+    ----------
+    out
+        draw off-screen into this file: .gif, .mp4 (needs ffmpeg), or .png (the last frame)
+    window
+        open a window
+    stroke
+        window: where strokes of the mouse are written
+    frames
+        frames drawn
+    zoom
+        look at the wound, F times as near (default: 1, the whole body)
+    records
+        write what every step cost and did
+    tolerance
+        residual that iterations may leave of each step's load (default: 1e-10)
+    as_json
+        print the summary as JSON
 
     Examples
     --------

@@ -33,100 +33,82 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """Options of ``verify run``."""
+    """Options of ``verify run``.
 
-    expression: Annotated[
-        str | None,
-        Arg(
-            "words with and, or, not, parentheses, looked for in name, title and tags",
-            "EXPR",
-            ("-k",),
-        ),
-    ] = None
-    out: Annotated[Path, Arg("run directory", "DIR")] = Path("verify-results")
-    quick: Annotated[bool, Arg("only cases tagged quick", exclusive=True)] = False
-    heavy: Annotated[bool, Arg("also cases tagged heavy", exclusive=True)] = False
+    Attributes
+    ----------
+    expression
+        words with and, or, not, parentheses, looked for in name, title and tags
+    out
+        run directory
+    quick
+        only cases tagged quick
+    heavy
+        also cases tagged heavy
+    memory
+        resident memory above which a solve is killed (default: 80 %% of the machine's, shared by
+        the processes)
+    within
+        time for the reference of each case: larger elements and fewer levels than the case asks
+        for, if more is expected; verdicts are then by a coarser reference
+    solvers
+        solver to compare, or module:Class; with parameters it is a row of its own; repeat for
+        several (default: those that the case names)
+    judge
+        solver that is judged; repeat for several (default: each that is asked and does not refuse
+        the case); the others are compared and ranked only
+    parameters
+        parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several
+    cluster
+        solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file
+    ranks
+        MPI ranks of each reference, here or on its worker
+    references
+        judge by the references in this file (`verify cache export`); solve none
+    no_cache
+        solve references again, and keep none
+    conform
+        check every solver with the suite of `verify conform` before ranking (default: if more than
+        two are ranked)
+    no_report
+        leave the report to `verify report DIR`
+    as_json
+        print the verdicts as JSON
+    """
+
+    expression: Annotated[str | None, Arg("EXPR", ("-k",))] = None
+    out: Annotated[Path, Arg("DIR")] = Path("verify-results")
+    quick: Annotated[bool, Arg(exclusive=True)] = False
+    heavy: Annotated[bool, Arg(exclusive=True)] = False
     jobs: Jobs = 1
     timeout: Timeout = 600.0
-    memory: Annotated[
-        float | None,
-        Arg(
-            "resident memory above which a solve is killed "
-            "(default: 80 %% of the machine's, shared by the processes)",
-            "GB",
-            read=positive,
-        ),
-    ] = None
-    within: Annotated[
-        float | None,
-        Arg(
-            "time for the reference of each case: larger elements and fewer levels than the case "
-            "asks for, if more is expected; verdicts are then by a coarser reference",
-            "S",
-            read=positive,
-        ),
-    ] = None
-    solvers: Annotated[
-        Sequence[str],
-        Arg(
-            "solver to compare, or module:Class; with parameters it is a row of its "
-            "own; repeat for several (default: those that the case names)",
-            "'NAME [PARAMETER=VALUE …]'",
-            ("--solver",),
-        ),
-    ] = ()
-    judge: Annotated[
-        Sequence[str],
-        Arg(
-            "solver that is judged; repeat for several (default: each that is asked and does "
-            "not refuse the case); the others are compared and ranked only",
-            "NAME",
-        ),
-    ] = ()
-    parameters: Annotated[
-        Sequence[str],
-        Arg(
-            "parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several",
-            "SOLVER.NAME=VALUE",
-            ("--set",),
-        ),
-    ] = ()
+    memory: Annotated[float | None, Arg("GB", read=positive)] = None
+    within: Annotated[float | None, Arg("S", read=positive)] = None
+    solvers: Annotated[Sequence[str], Arg("'NAME [PARAMETER=VALUE …]'", ("--solver",))] = ()
+    judge: Annotated[Sequence[str], Arg("NAME")] = ()
+    parameters: Annotated[Sequence[str], Arg("SOLVER.NAME=VALUE", ("--set",))] = ()
     repetitions: Repetitions = 3
     strict: Strict = False
-    cluster: Annotated[
-        str | None,
-        Arg(
-            "solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file",
-            "ADDRESS",
-        ),
-    ] = None
-    ranks: Annotated[
-        int, Arg("MPI ranks of each reference, here or on its worker", "N", read=count)
-    ] = 1
-    references: Annotated[
-        Path | None,
-        Arg("judge by the references in this file (`verify cache export`); solve none", "BUNDLE"),
-    ] = None
-    no_cache: Annotated[bool, Arg("solve references again, and keep none")] = False
-    conform: Annotated[
-        bool | None,
-        Arg(
-            "check every solver with the suite of `verify conform` before ranking "
-            "(default: if more than two are ranked)"
-        ),
-    ] = None
-    no_report: Annotated[bool, Arg("leave the report to `verify report DIR`")] = False
-    as_json: Annotated[bool, Arg("print the verdicts as JSON", flags=("--json",))] = False
+    cluster: Annotated[str | None, Arg("ADDRESS")] = None
+    ranks: Annotated[int, Arg("N", read=count)] = 1
+    references: Annotated[Path | None, Arg("BUNDLE")] = None
+    no_cache: bool = False
+    conform: bool | None = None
+    no_report: bool = False
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False
 
 
 def run(
-    cases: Annotated[
-        Sequence[str], Arg("name, folder, pattern or file of a case (default: all)", "CASE")
-    ] = (),
+    cases: Annotated[Sequence[str], Arg("CASE")] = (),
     *,
     asked: RunOptions,
 ) -> int:
     """Solve, compare and judge cases, and render the report.
+
+    Parameters
+    ----------
+    cases
+        name, folder, pattern or file of a case (default: all)
 
     Examples
     --------

@@ -1,15 +1,17 @@
 """A command line made of functions: signatures are its arguments, docstrings its help.
 
 A function is a command. Its parameters are arguments, those after ``*`` are options, and the first
-paragraph of its docstring says what it does; what follows is printed below its options. The fields
-of a dataclass stand for as many arguments. A module with `ACTIONS` is a command with commands below
-it, and is described by its own docstring.
+paragraph of its docstring says what it does. The section "Parameters" of the docstring says what
+each argument is, and what follows is printed below the options. The fields of a dataclass stand for
+as many arguments. A module with `ACTIONS` is a command with commands below it, and is described by
+its own docstring.
 """
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from difflib import get_close_matches
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
@@ -20,6 +22,8 @@ from verify.errors import instead
 
 Command = Callable[..., int]
 Member = Command | ModuleType
+_SECTION = re.compile(r"(?:Parameters|Attributes)\n-+\n(.*?)(?:\n\n|\Z)", re.DOTALL)
+_ENTRY = re.compile(r"^(\w+)\n((?: {4}.*\n?)+)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -28,8 +32,6 @@ class Arg:
 
     Attributes
     ----------
-    help : str
-        A default is added to it, unless it speaks of one.
     metavar : str, optional
     flags : tuple of str
         Of an option; none: ``--name``.
@@ -39,14 +41,16 @@ class Arg:
         Of an option with several words; without it an option for a sequence is repeated.
     exclusive : bool
         Whether it stands beside no other such option of its command.
+    help : str
+        A default is added to it, unless it speaks of one. Without it that of the docstring counts.
     """
 
-    help: str
     metavar: str | None = None
     flags: tuple[str, ...] = ()
     read: Callable[[str], Any] | None = None
     nargs: int | str | None = None
     exclusive: bool = False
+    help: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,16 +86,18 @@ def positive(text: str) -> float:
 
 
 # what several commands have, in the same words
-Case = Annotated[str, Arg("name of a case, or a case file", "CASE")]
-Cases = Annotated[str, Arg("name of a case, of a folder of cases, or a case file", "CASE")]
-Run = Annotated[Path, Arg("directory of a finished run", "RUN")]
-Out = Annotated[Path, Arg("directory to write into", "DIR")]
-AsJson = Annotated[bool, Arg("print JSON", flags=("--json",))]
-Matching = Annotated[str | None, Arg("only matching cases", "EXPR", ("-k",))]
-Jobs = Annotated[int, Arg("processes at the same time", "N", ("-j", "--jobs"), count)]
-Strict = Annotated[bool, Arg("undecided verdicts, refusals, warnings: exit code 5")]
-Timeout = Annotated[float, Arg("wall seconds after which a solve is killed", "S", read=positive)]
-Repetitions = Annotated[int, Arg("timed repetitions of each solve", "N", read=count)]
+Case = Annotated[str, Arg("CASE", help="name of a case, or a case file")]
+Cases = Annotated[str, Arg("CASE", help="name of a case, of a folder of cases, or a case file")]
+Run = Annotated[Path, Arg("RUN", help="directory of a finished run")]
+Out = Annotated[Path, Arg("DIR", help="directory to write into")]
+AsJson = Annotated[bool, Arg(flags=("--json",), help="print JSON")]
+Matching = Annotated[str | None, Arg("EXPR", ("-k",), help="only matching cases")]
+Jobs = Annotated[int, Arg("N", ("-j", "--jobs"), count, help="processes at the same time")]
+Strict = Annotated[bool, Arg(help="undecided verdicts, refusals, warnings: exit code 5")]
+Timeout = Annotated[
+    float, Arg("S", read=positive, help="wall seconds after which a solve is killed")
+]
+Repetitions = Annotated[int, Arg("N", read=count, help="timed repetitions of each solve")]
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
@@ -159,7 +165,7 @@ def _add_actions(command: argparse.ArgumentParser, actions: Actions) -> None:
     for function in actions.functions:
         _add_command(below, function)
     if actions.default:
-        defaults = {p.name: p.default for p in _parameters(actions.default)}
+        defaults = {p.name: p.default for p, _ in _parameters(actions.default)}
         command.set_defaults(command=actions.default, **defaults)
 
 
@@ -170,13 +176,12 @@ def _add_command(below: Any, member: Member) -> argparse.ArgumentParser:
         _name(member),
         help=(line[0].lower() + line[1:]).removesuffix("."),
         description=line,
-        epilog=epilog.replace("Examples\n--------", "examples:"),
+        epilog=_SECTION.sub("", epilog).replace("Examples\n--------", "examples:"),
     )
     if not isinstance(member, ModuleType):
         command.set_defaults(command=member)
         place: Any = command
-        for parameter in _parameters(member):
-            said: Arg = parameter.annotation.__metadata__[-1]
+        for parameter, said in _parameters(member):
             if said.exclusive and place is command:
                 place = command.add_mutually_exclusive_group()
             _add_argument(place if said.exclusive else command, parameter, said)
@@ -187,12 +192,16 @@ def _name(member: Member) -> str:
     return member.__name__.rpartition(".")[2].rstrip("_")
 
 
-def _parameters(target: Callable[..., Any]) -> Iterator[Parameter]:
-    for parameter in signature(target).parameters.values():
+def _parameters(target: Callable[..., Any]) -> Iterator[tuple[Parameter, Arg]]:
+    """Yield the arguments of a command, and what its type does not say of each."""
+    listed = _SECTION.search(cleandoc(target.__doc__ or ""))
+    words = dict(_ENTRY.findall(listed[1])) if listed else {}
+    for name, parameter in signature(target).parameters.items():
         if _has_fields(parameter):
             yield from _parameters(parameter.annotation)
         else:
-            yield parameter
+            (said,) = getattr(parameter.annotation, "__metadata__", (Arg(),))
+            yield parameter, replace(said, help=said.help or " ".join(words[name].split()))
 
 
 def _has_fields(parameter: Parameter) -> bool:
@@ -203,7 +212,8 @@ def _add_argument(command: Any, parameter: Parameter, said: Arg) -> None:
     """Add an argument as its type, its default and `said` describe it."""
     required = parameter.default is Parameter.empty
     default: Any = None if required else parameter.default
-    kind = get_args(parameter.annotation)[0]
+    annotated = get_origin(parameter.annotation) is Annotated
+    kind = get_args(parameter.annotation)[0] if annotated else parameter.annotation
     plain = get_origin(kind) in (None, Literal)
     inner = kind if plain else next(one for one in get_args(kind) if one is not NoneType)
     several = get_origin(kind) is Sequence

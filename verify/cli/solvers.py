@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from verify.cli.signatures import Actions, Arg, AsJson
 from verify.cli.streams import print_json
 
-Name = Annotated[str, Arg("name of the solver", "NAME")]
+Name = Annotated[str, Arg("NAME", help="name of the solver")]
 
 
 def list_(*, as_json: AsJson = False) -> int:
@@ -49,12 +49,15 @@ def list_(*, as_json: AsJson = False) -> int:
 def install(
     name: Name,
     *,
-    python: Annotated[
-        str | None,
-        Arg("interpreter to use; of a package of the system, the one that has it", "PYTHON"),
-    ] = None,
+    python: Annotated[str | None, Arg("PYTHON")] = None,
 ) -> int:
-    """Install one from its locked packages."""
+    """Install one from its locked packages.
+
+    Parameters
+    ----------
+    python
+        interpreter to use; of a package of the system, the one that has it
+    """
     from verify.foreign import install
 
     state = install(name, python)

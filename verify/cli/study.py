@@ -36,52 +36,54 @@ if TYPE_CHECKING:
 
 SLIVERS = ("slivers/*", "benchmark/c8_*")
 _SOLVER = "'NAME [PARAMETER=VALUE …]'"
-Quick = Annotated[bool, Arg("less of it, in under a minute")]
-Tolerance = Annotated[float, Arg("relative error that is good enough", "T", read=positive)]
+Quick = Annotated[bool, Arg(help="less of it, in under a minute")]
+Tolerance = Annotated[float, Arg("T", read=positive, help="relative error that is good enough")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """Where a study writes, and how it says what it found."""
+    """Where a study writes, and how it says what it found.
+
+    Attributes
+    ----------
+    as_json
+        print the findings as JSON
+    """
 
     out: Out
-    as_json: Annotated[bool, Arg("print the findings as JSON", flags=("--json",))] = False
+    as_json: Annotated[bool, Arg(flags=("--json",))] = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """What a study of measured scenes runs."""
+    """What a study of measured scenes runs.
 
-    solvers: Annotated[
-        Sequence[str],
-        Arg(
-            "solver, with parameters of its solves; repeat for several "
-            "(default: xfem and conforming)",
-            _SOLVER,
-            ("--solver",),
-        ),
-    ] = ()
-    processes: Annotated[
-        int | None,
-        Arg(
-            "processes side by side (default: all cores; nothing measured is a time)",
-            "N",
-            ("-j", "--jobs"),
-            count,
-        ),
-    ] = None
+    Attributes
+    ----------
+    solvers
+        solver, with parameters of its solves; repeat for several (default: xfem and conforming)
+    processes
+        processes side by side (default: all cores; nothing measured is a time)
+    """
+
+    solvers: Annotated[Sequence[str], Arg(_SOLVER, ("--solver",))] = ()
+    processes: Annotated[int | None, Arg("N", ("-j", "--jobs"), count)] = None
     quick: Quick = False
 
 
 def slivers(
-    cases: Annotated[
-        Sequence[str], Arg("names, patterns or files; none: cases/slivers and C8", "CASE")
-    ] = (),
+    cases: Annotated[Sequence[str], Arg("CASE")] = (),
     *,
     measured: Measured,
     answer: Answer,
 ) -> int:
-    """Errors, conditioning and explicit steps of any solver, over families of scenes."""
+    """Errors, conditioning and explicit steps of any solver, over families of scenes.
+
+    Parameters
+    ----------
+    cases
+        names, patterns or files; none: cases/slivers and C8
+    """
     from verify.study.slivers import sliver_study
 
     def study(making: "Making") -> "Study":
@@ -91,14 +93,18 @@ def slivers(
 
 
 def energy(
-    cases: Annotated[
-        Sequence[str], Arg("names, patterns or files; none: those tagged energy", "CASE")
-    ] = (),
+    cases: Annotated[Sequence[str], Arg("CASE")] = (),
     *,
     measured: Measured,
     answer: Answer,
 ) -> int:
-    """What any solver keeps of energy and momenta, over cases that move."""
+    """What any solver keeps of energy and momenta, over cases that move.
+
+    Parameters
+    ----------
+    cases
+        names, patterns or files; none: those tagged energy
+    """
     from verify.study.measured_scenes import energy_study
 
     def study(making: "Making") -> "Study":
@@ -123,11 +129,17 @@ def claims(*, answer: Answer) -> int:
 
 def calibration(
     *,
-    seed: Annotated[int, Arg("of the scenes", "N", read=seed)] = 30,
+    seed: Annotated[int, Arg("N", read=seed)] = 30,
     quick: Quick = False,
     answer: Answer,
 ) -> int:
-    """Stated uncertainty of the reference against its true error."""
+    """Stated uncertainty of the reference against its true error.
+
+    Parameters
+    ----------
+    seed
+        of the scenes
+    """
     from verify.study.calibration import calibration_study
 
     return _written("calibration", answer, lambda making: calibration_study(making, quick, seed))
@@ -136,23 +148,24 @@ def calibration(
 def cost(
     case: Case,
     *,
-    steps: Annotated[int, Arg("steps of the cut", "N", read=count)] = 4,
-    solvers: Annotated[
-        Sequence[str],
-        Arg(
-            "solver to compare; repeat for several (default: xfem and conforming, which "
-            "remeshes at every step)",
-            "NAME",
-            ("--solver",),
-        ),
-    ] = (),
-    metric: Annotated[
-        Literal["displacement_l2", "energy_norm", "jump_l2"], Arg("the error that is held equal")
-    ] = "energy_norm",
+    steps: Annotated[int, Arg("N", read=count)] = 4,
+    solvers: Annotated[Sequence[str], Arg("NAME", ("--solver",))] = (),
+    metric: Literal["displacement_l2", "energy_norm", "jump_l2"] = "energy_norm",
     repetitions: Repetitions = 5,
     answer: Answer,
 ) -> int:
-    """Work against precision while the first cut of a case grows, at equal accuracy."""
+    """Work against precision while the first cut of a case grows, at equal accuracy.
+
+    Parameters
+    ----------
+    steps
+        steps of the cut
+    solvers
+        solver to compare; repeat for several (default: xfem and conforming, which remeshes at every
+        step)
+    metric
+        the error that is held equal
+    """
     from verify.result import folder_of_case
     from verify.runner.checking import check_solver_name
     from verify.scene import load_scene
@@ -178,25 +191,27 @@ def cost(
 def budget(
     case: Case,
     *,
-    level: Annotated[
-        int | None, Arg("mesh level that is taken apart (default: finest)", "K")
-    ] = None,
+    level: Annotated[int | None, Arg("K")] = None,
     tolerance: Tolerance = 0.05,
-    metric: Annotated[
-        str | None,
-        Arg(
-            "displacement_l2, energy_norm (in motion their means, displacement_l2_mean, "
-            "energy_norm_mean) or a quantity of the case (default: the first of these)"
-        ),
-    ] = None,
-    repetitions: Annotated[
-        int | None,
-        Arg("timed repetitions of each solve (default: 5; with --quick 2)", "N", read=count),
-    ] = None,
-    quick: Annotated[bool, Arg("the two coarsest mesh levels, fewer models")] = False,
+    metric: str | None = None,
+    repetitions: Annotated[int | None, Arg("N", read=count)] = None,
+    quick: bool = False,
     answer: Answer,
 ) -> int:
-    """Where the error of the XFEM answer comes from, and the cheapest adequate model."""
+    """Where the error of the XFEM answer comes from, and the cheapest adequate model.
+
+    Parameters
+    ----------
+    level
+        mesh level that is taken apart (default: finest)
+    metric
+        displacement_l2, energy_norm (in motion their means, displacement_l2_mean, energy_norm_mean)
+        or a quantity of the case (default: the first of these)
+    repetitions
+        timed repetitions of each solve (default: 5; with --quick 2)
+    quick
+        the two coarsest mesh levels, fewer models
+    """
     from verify.result import folder_of_case
     from verify.scene import load_scene
     from verify.study.budget import budget_study
@@ -232,37 +247,39 @@ def budget(
 
 
 def iterations(
-    cases: Annotated[
-        Sequence[str], Arg("names, patterns or files of cases that move or come to rest", "CASE")
-    ],
+    cases: Annotated[Sequence[str], Arg("CASE")],
     *,
-    solver: Annotated[str, Arg("solver, with parameters of its solves", _SOLVER)] = "vbd",
-    truth: Annotated[
-        str | None,
-        Arg("who solves the same steps (default: the solver with step=solved)", _SOLVER),
-    ] = None,
-    iterations: Annotated[
-        Sequence[int], Arg("values of the parameter 'iterations'", "N", read=count, nargs="+")
-    ] = (10, 40, 160),
-    substeps: Annotated[
-        Sequence[int], Arg("values of the parameter 'substeps'", "N", read=count, nargs="+")
-    ] = (1, 4),
-    most: Annotated[
-        int | None,
-        Arg(
-            "leave out settings with more iterations than this in a step of the case",
-            "N",
-            read=count,
-        ),
-    ] = None,
-    names: Annotated[Sequence[str], Arg("what the solver calls them", "PARAMETER", nargs=2)] = (
+    solver: Annotated[str, Arg(_SOLVER)] = "vbd",
+    truth: Annotated[str | None, Arg(_SOLVER)] = None,
+    iterations: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (10, 40, 160),
+    substeps: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (1, 4),
+    most: Annotated[int | None, Arg("N", read=count)] = None,
+    names: Annotated[Sequence[str], Arg("PARAMETER", nargs=2)] = (
         "iterations",
         "substeps",
     ),
     tolerance: Tolerance = 0.01,
     answer: Answer,
 ) -> int:
-    """A solver in steps that stop by a count: its error over iterations and substeps."""
+    """A solver in steps that stop by a count: its error over iterations and substeps.
+
+    Parameters
+    ----------
+    cases
+        names, patterns or files of cases that move or come to rest
+    solver
+        solver, with parameters of its solves
+    truth
+        who solves the same steps (default: the solver with step=solved)
+    iterations
+        values of the parameter 'iterations'
+    substeps
+        values of the parameter 'substeps'
+    most
+        leave out settings with more iterations than this in a step of the case
+    names
+        what the solver calls them
+    """
     from verify.runner.selection import select_cases
     from verify.study.iterations import Grid, iterations_study
     from verify.study.measured_scenes import variant_of
@@ -277,27 +294,26 @@ def iterations(
 
 
 def positions(
-    cases: Annotated[
-        Sequence[str], Arg("names, patterns or files; none: six scenes of the study", "CASE")
-    ] = (),
+    cases: Annotated[Sequence[str], Arg("CASE")] = (),
     *,
-    solvers: Annotated[
-        Sequence[str],
-        Arg(
-            "solver, with parameters of its solves; repeat for several (default: xfem and "
-            "conforming)",
-            _SOLVER,
-            ("--solver",),
-        ),
-    ] = (),
-    positions: Annotated[int, Arg("meshes of each scene, up to 16", "N", read=count)] = 16,
-    level: Annotated[
-        int | None,
-        Arg("mesh level that is solved (default: that of the study, else the coarsest)", "K"),
-    ] = None,
+    solvers: Annotated[Sequence[str], Arg(_SOLVER, ("--solver",))] = (),
+    positions: Annotated[int, Arg("N", read=count)] = 16,
+    level: Annotated[int | None, Arg("K")] = None,
     answer: Answer,
 ) -> int:
-    """How much of a difference of two solvers is where the cut passes the mesh."""
+    """How much of a difference of two solvers is where the cut passes the mesh.
+
+    Parameters
+    ----------
+    cases
+        names, patterns or files; none: six scenes of the study
+    solvers
+        solver, with parameters of its solves; repeat for several (default: xfem and conforming)
+    positions
+        meshes of each scene, up to 16
+    level
+        mesh level that is solved (default: that of the study, else the coarsest)
+    """
     from verify.runner.selection import select_cases
     from verify.scene.mesh_position import POSITIONS
     from verify.study.measured_scenes import variant_of
