@@ -18,7 +18,19 @@ def rows_of(program):
         [sys.executable, PROGRAMS / program], capture_output=True, text=True, check=True
     )
     print(ran.stdout)
-    return {line.split()[0]: line for line in ran.stdout.splitlines() if "|" in line}
+    rows = (line for line in ran.stdout.splitlines() if "|" in line or "page" in line)
+    return {line.split()[0]: line for line in rows}
+
+
+@pytest.mark.heavy
+def test_a_reader_of_c2_hits_the_first_route():
+    """Each within both intervals; the page names two whose half-widths look too narrow."""
+    rows = rows_of("c2_from_the_page.py")
+    assert len(rows) == 15
+    assert not any("DOES NOT AGREE" in row for row in rows.values())
+    assert {name for name in rows if "within both" in rows[name]} <= {
+        "K_II_flat_start", "K_I_steep_start", "K_II_steep_start", "K_II_steep_end",
+    }  # fmt: skip
 
 
 @pytest.mark.heavy
