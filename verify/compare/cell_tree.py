@@ -5,6 +5,7 @@ can fall into one bin. Boxes over runs of cells in Morton order adapt to the gra
 built without recursion. Kernels find in it the cell that holds a point or is nearest to it.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -379,8 +380,8 @@ def _holding_in_numpy(
                 same = rows[agreed & (depth > tolerance)]
                 found[same] = before[same]
             rows = every[found < 0]
-        for begin in range(0, len(rows), _AT_ONCE):
-            row, cell = _boxes_around(points, rows[begin : begin + _AT_ONCE], searched, tolerance)
+        near = near_points(points, tolerance)
+        for row, cell in pairs_met(searched, corners, rows, near):
             depth, there = fitting(row, cell)
             there &= depth >= -tolerance
             row, cell, depth = row[there], cell[there], depth[there]
@@ -393,32 +394,46 @@ def _holding_in_numpy(
             found[row[order]] = cell[order]  # the last of each point stays
 
 
-def _boxes_around(
-    points: Floats, row: Ints, searched: SearchedCells, tolerance: float | Floats
-) -> tuple[Ints, Ints]:
-    """Give all pairs (n,) of a point of `row` and a cell whose box is as near, by axis."""
-    lower, upper, cells, corners, _, _ = searched
-    leaves, within_reach = len(lower) // 2, np.broadcast_to(tolerance, len(points))
+Meets = Callable[[Ints, Floats, Floats, Ints], NDArray[np.bool_]]
 
-    def within(low: Floats, high: Floats, box: Ints) -> NDArray[np.bool_]:
-        near, reach = np.ones(len(row), dtype=bool), within_reach[row]
+
+def pairs_met(
+    tree: CellTree | SearchedCells, corners: Floats, rows: Ints, meets: Meets
+) -> Iterator[tuple[Ints, Ints]]:
+    """Yield all pairs (n,) of one of `rows` and a cell whose box it meets, some rows at a time.
+
+    `corners` (m, k, d) are those of the cells. ``meets(row, low, high, box)`` tells of n rows
+    whether they meet the boxes of these numbers (n,), from ``low[box]`` to ``high[box]``.
+    """
+    leaves, boxes = len(tree.lower) // 2, (corners.min(axis=1), corners.max(axis=1))
+    for begin in range(0, len(rows), _AT_ONCE):
+        row = rows[begin : begin + _AT_ONCE]
+        node = np.ones(len(row), dtype=np.int64)
+        while True:
+            met = meets(row, tree.lower, tree.upper, node)
+            row, node = row[met], node[met]
+            if not len(node) or node[0] >= leaves:
+                break
+            row, node = row.repeat(2), (2 * node[:, None] + (0, 1)).ravel()
+        cell = tree.cells.reshape(leaves, -1)[node - leaves]
+        row, cell = row.repeat(cell.shape[1]), cell.ravel()
+        row, cell = row[cell >= 0], cell[cell >= 0]
+        met = meets(row, *boxes, cell)
+        yield row[met], cell[met]
+
+
+def near_points(points: Floats, within: float | Floats) -> Meets:
+    """Tell of points whether boxes are `within` a distance, one or (n,), of them by axis."""
+    within = np.broadcast_to(within, len(points))
+
+    def meets(row: Ints, low: Floats, high: Floats, box: Ints) -> NDArray[np.bool_]:
+        near, reach = np.ones(len(row), dtype=bool), within[row]
         for a in range(points.shape[1]):  # column by column: five times as fast
             x = points[row, a]
             near &= (x >= low[box, a] - reach) & (x <= high[box, a] + reach)
         return near
 
-    node = np.ones(len(row), dtype=np.int64)
-    while True:
-        near = within(lower, upper, node)
-        row, node = row[near], node[near]
-        if not len(node) or node[0] >= leaves:
-            break
-        row, node = row.repeat(2), (2 * node[:, None] + (0, 1)).ravel()
-    cell = cells.reshape(leaves, -1)[node - leaves]
-    row, cell = row.repeat(cell.shape[1]), cell.ravel()
-    row, cell = row[cell >= 0], cell[cell >= 0]
-    near = within(corners.min(axis=1), corners.max(axis=1), cell)
-    return row[near], cell[near]
+    return meets
 
 
 @njit(cache=True)
@@ -480,8 +495,8 @@ def _triangles_in_numpy(
         # the nearest corner bounds the distance
         reach = np.full(len(points), tolerance)
         reach[rows] += cKDTree(searched.corners[fit].reshape(-1, 3)).query(points[rows])[0]
-        for begin in range(0, len(rows), _AT_ONCE):
-            row, cell = _boxes_around(points, rows[begin : begin + _AT_ONCE], searched, reach)
+        near_enough = near_points(points, reach)
+        for row, cell in pairs_met(searched, searched.corners, rows, near_enough):
             row, cell = row[fit[cell]], cell[fit[cell]]
             away, depth = _triangle_distances(points[row], searched, across, cell)
             np.minimum.at(distance, row, away)

@@ -16,10 +16,8 @@ from scipy.sparse import coo_array, csr_array, diags_array, issparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from verify.compare.cell_tree import axes_of
 from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
-from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
@@ -101,77 +99,29 @@ def kinetic(
     nodes, own = solution.cells, density * cells_of(solution).volume
     if cells is not None:
         nodes, own = nodes[cells], own[cells]
-    place, share = simplex_rule(k, 2 if solution.order == 1 else 4)
-    hats = shape_functions(place, k, solution.order)
-    mass = own[:, None] * share
-    weights, total = mass @ hats, float(mass.sum())
-    axes, turns = axes_of(d), 3 if d == 3 else 1
+    at, share = simplex_rule(k, 2 if solution.order == 1 else 4)
+    hats, mass = shape_functions(at, k, solution.order), np.outer(share, own).ravel()
+    total, rows = float(mass.sum()), []
     moved = solution.points + solution.displacement[steps]
-    sums, centres = np.zeros((len(moved), 3 + d + 2 * turns)), np.empty((len(moved), d))
-    for row, x, v in zip(range(len(moved)), moved, solution.velocity[steps], strict=True):
-        centres[row] = np.tensordot(weights, x[nodes], 2) / max(total, 1e-300)
-        if not COMPILED:
-            sums[row] = _motion_in_numpy(hats @ x[nodes], hats @ v[nodes], mass, centres[row])
-            continue
-        v = np.ascontiguousarray(v)
-        _add_motion(x, v, nodes, hats, mass, centres[row], axes, sums[row])
-    energy, scales, linear, angular, spin = np.split(sums, np.cumsum([1, 2, d, turns]), axis=1)
+    for fields in zip(moved, solution.velocity[steps], strict=True):
+        place, speed = (
+            np.tensordot(hats, one[nodes], (1, 1)).reshape(-1, d).T.copy() for one in fields
+        )
+        centre = place @ mass / max(total, 1e-300)
+        arm, moment = place - centre[:, None], mass * speed
+        size, reach = np.sqrt((speed**2).sum(axis=0)), np.sqrt((arm**2).sum(axis=0))
+        turns = [
+            about[a] @ moment[b] - about[b] @ moment[a]
+            for about in (place, arm)
+            for a, b in (((1, 2), (2, 0), (0, 1)) if d == 3 else ((0, 1),))
+        ]
+        sizes = 0.5 * mass @ size**2, mass @ size, mass @ (reach * size)
+        rows.append([*centre, *sizes, *moment.sum(axis=1), *turns])
+    ends = np.cumsum([d, 1, 2, d, len(turns) // 2])
+    centres, energy, scales, linear, angular, spin = np.split(np.array(rows), ends, axis=1)
     return Kinetic(
         total, centres, energy[:, 0], linear, angular, spin, *scales.max(axis=0).tolist()
     )
-
-
-def _motion_in_numpy(place: Array, speed: Array, mass: Array, centre: Array) -> list[float]:
-    """Give the sums of `_add_motion`, of place and speed (m, q, d) at the points of cells."""
-    d = len(centre)
-
-    def total(values: Array) -> float:
-        return float((mass * values).sum())
-
-    size, arm = np.linalg.norm(speed, axis=2), np.linalg.norm(place - centre, axis=2)
-    turns = [
-        total(about[..., a] * speed[..., b] - about[..., b] * speed[..., a])
-        for about in (place, place - centre)
-        for a, b in (((1, 2), (2, 0), (0, 1)) if d == 3 else ((0, 1),))
-    ]
-    linear = [total(speed[..., a]) for a in range(d)]
-    return [0.5 * total(size**2), total(size), total(arm * size), *linear, *turns]
-
-
-@njit(cache=True)
-def _add_motion(x, v, nodes, hats, mass, centre, axes, sums):
-    """Add up over the points of cells: energy, both scales, linear, angular momentum, spin."""
-    d, of_cell = len(axes), np.empty(len(sums))
-    place, speed = np.empty(3), np.empty(3)
-    for m in range(len(nodes)):
-        of_cell[:] = 0.0
-        for q in range(len(hats)):
-            size2 = arm2 = 0.0
-            for a in axes:
-                place[a] = speed[a] = 0.0
-                for k in range(nodes.shape[1]):
-                    place[a] += hats[q, k] * x[nodes[m, k], a]
-                    speed[a] += hats[q, k] * v[nodes[m, k], a]
-                size2 += speed[a] ** 2
-                arm2 += (place[a] - centre[a]) ** 2
-                of_cell[3 + a] += mass[m, q] * speed[a]
-            size = np.sqrt(size2)
-            of_cell[0] += 0.5 * mass[m, q] * size2
-            of_cell[1] += mass[m, q] * size
-            of_cell[2] += mass[m, q] * np.sqrt(arm2) * size
-            at = 3 + d
-            for about in range(2):
-                if about:
-                    for a in axes:
-                        place[a] -= centre[a]
-                if d == 3:
-                    of_cell[at] += mass[m, q] * (place[1] * speed[2] - place[2] * speed[1])
-                    of_cell[at + 1] += mass[m, q] * (place[2] * speed[0] - place[0] * speed[2])
-                    at += 2
-                of_cell[at] += mass[m, q] * (place[0] * speed[1] - place[1] * speed[0])
-                at += 1
-        for i in range(len(sums)):
-            sums[i] += of_cell[i]
 
 
 def shape_functions(place: Array, k: int, order: int) -> Array:

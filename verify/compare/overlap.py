@@ -12,12 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from verify.compare.cell_tree import CellTree, build_cell_tree, holding_cells
+from verify.compare.cell_tree import (
+    CellTree,
+    build_cell_tree,
+    holding_cells,
+    near_points,
+    pairs_met,
+)
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.overlap_kernels import facet_distances, first_exits, nearest_before
 from verify.compare.simplices import Simplices, facet_nodes, facet_normals, simplices
 from verify.errors import UnsupportedSceneError
+from verify.geometry.simplices import distances
 from verify.solution import Solution
 
 Ints = NDArray[np.int64]
@@ -234,6 +241,7 @@ class OverlapSearch:
         self._field = SolutionField(solution)
         self._faces = faces_of(solution, self._field)
         self._size = self._field.scale
+        self._volume = _turn(self._field.shape.corners)
 
     def at(self, step: int = -1) -> Overlap:
         """Measure the overlap at an output time, by its number."""
@@ -243,7 +251,7 @@ class OverlapSearch:
         places, faces = self.solution.points + u, self._faces
         faces = faces.take(~is_glued(faces, self.solution, self._field.with_nodal(u)))
         corners = self.solution.cells[faces.behind, : self.solution.dimension + 1]
-        lost = _turn(self.solution.points[corners]) * _turn(places[corners]) <= 0.0
+        lost = self._volume[faces.behind] * _turn(places[corners]) <= 0.0
         turned = int(np.sum(lost & faces.on_cut))
         faces = faces.take(~lost)
         cut = faces.on_cut
@@ -272,7 +280,7 @@ class OverlapSearch:
         self, faces: Faces, cells: DeformedCells, places: Array
     ) -> tuple[Array, Array, NDArray[np.int64]]:
         """Return penetration (n,) of points of faces, shares (n, d) of corners, and facets (n,)."""
-        corners = np.ascontiguousarray(places[faces.nodes])
+        corners = places[faces.nodes]
         normals = facet_normals(corners)
         height = _smallest_height(corners)
         whole = (height > _SMALL * self._size) & np.isfinite(normals).all(axis=1)
@@ -294,11 +302,10 @@ class OverlapSearch:
         if not len(which):
             return np.zeros(0), shares, which
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
-        bounds = tree.lower, tree.upper, tree.cells, corners, normals
-        along, leaving = first_exits(outside, -normals[which], *bounds)
+        along, leaving = first_exits(outside, -normals[which], tree, corners, normals)
         depth = np.where(np.isfinite(along), along - step, 0.0)
         out = self._ways_out(faces, cells, held, outside)
-        depth = np.minimum(depth, facet_distances(points, out, corners, normals))
+        depth[out >= 0] = np.minimum(depth, distances(points, corners[out]))[out >= 0]
         # a point of the body's outside counts where it went in through a face of a cut
         cut = faces.on_cut
         depth[~(cut[which] | cut[leaving])] = 0.0
@@ -318,13 +325,9 @@ class OverlapSearch:
         # barycentric: height over a facet, over the height of the opposite corner
         shares = height * np.linalg.norm(shape.gradients[held], axis=2)
         places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
-        corners = np.ascontiguousarray(self.solution.points[faces.nodes])
+        corners = self.solution.points[faces.nodes]
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
-        found: NDArray[np.int64] = nearest_before(
-            np.ascontiguousarray(places), tree.lower, tree.upper, tree.cells, corners,
-            np.nan_to_num(facet_normals(corners)),
-        )  # fmt: skip
-        return found
+        return nearest_before(places, tree, corners, np.nan_to_num(facet_normals(corners)))
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
         searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
@@ -339,3 +342,57 @@ def _smallest_height(corners: Array) -> Array:
         return np.asarray(longest)
     twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     return np.asarray(twice / np.maximum(longest, 1e-300))
+
+
+# A ray through an edge must not slip between two facets.
+_EDGE = 1e-9
+
+
+def first_exits(
+    points: Array, ways: Array, tree: CellTree, facets: Array, normals: Array
+) -> tuple[Array, Ints]:
+    """Compute distance (n,) to the first facet through which a ray leaves material, and which (n,).
+
+    Facets (f, d, d) through which it enters are passed; infinite and −1 where it leaves nothing.
+    `ways` (n, d) and `normals` (f, d), which point out of the material, have length one.
+    """
+    distance, which = np.full(len(points), np.inf), np.full(len(points), -1)
+    slopes = np.where(ways == 0.0, 1e-300, ways)
+    bases = np.concatenate([facets[:, 1:] - facets[:, :1], normals[:, None]], axis=1)
+
+    def on_ray(row: Ints, low: Array, high: Array, box: Ints) -> NDArray[np.bool_]:
+        with np.errstate(over="ignore"):
+            ends = [(end[box] - points[row]) / slopes[row] for end in (low, high)]
+            first = np.minimum(*ends).max(axis=1, initial=0.0)
+            last = np.maximum(*ends).min(axis=1)
+            return np.asarray(first <= last + 1e-9 * (first + np.abs(last)))
+
+    for row, facet in pairs_met(tree, facets, np.arange(len(points)), on_ray):
+        rise = np.einsum("nd,nd->n", normals[facet], ways[row])
+        row, facet, rise = row[rise > 0.0], facet[rise > 0.0], rise[rise > 0.0]
+        off = facets[facet, 0] - points[row]
+        t = np.einsum("nd,nd->n", normals[facet], off) / rise
+        hit = (t[:, None] * ways[row] - off)[..., None]
+        shares = np.linalg.solve(np.swapaxes(bases[facet], 1, 2), hit)[:, :-1, 0]
+        met = (t >= 0.0) & (shares >= -_EDGE).all(axis=1) & (shares.sum(axis=1) <= 1.0 + _EDGE)
+        order = np.flatnonzero(met)[np.argsort(-t[met], kind="stable")]
+        distance[row[order]], which[row[order]] = t[order], facet[order]  # the last stays
+    return distance, which
+
+
+def nearest_before(points: Array, tree: CellTree, facets: Array, normals: Array) -> Ints:
+    """Find the nearest facet (n,) that has a point on its inner side; −1 where none has."""
+    found, best = np.full(len(points), -1), np.full(len(points), np.inf)
+    farthest = float(np.ptp(np.vstack([points, *facets]), axis=0).sum())
+    reach = cKDTree(facets.mean(axis=1)).query(points)[0] + 1e-6 * farthest
+    rows = np.arange(len(points))
+    while len(rows):
+        for row, facet in pairs_met(tree, facets, rows, near_points(points, reach)):
+            before = np.einsum("nd,nd->n", normals[facet], points[row] - facets[facet, 0]) < 0.0
+            row, facet = row[before], facet[before]
+            away = distances(points[row], facets[facet])
+            order = np.argsort(-away, kind="stable")
+            best[row[order]], found[row[order]] = away[order], facet[order]  # the last stays
+        rows = rows[(best[rows] > reach[rows]) & (reach[rows] < farthest)]
+        reach[rows] *= 2.0
+    return found

@@ -239,7 +239,7 @@ def nearest_parts(points: Array, parts: Array) -> tuple[Array, Ints]:
     step = max(1, _AT_ONCE // len(parts))
     for start in range(0, len(points), step):
         here = slice(start, start + step)
-        away = _distances(points[here, None], parts)
+        away = distances(points[here, None], parts)
         number[here] = away.argmin(axis=1)
         distance[here] = away.min(axis=1)
     return distance, number
@@ -268,22 +268,20 @@ def distance_to_pieces(points: Array, pieces: Sequence[HasFeet]) -> Array:
     return np.asarray(np.min(away, axis=0), dtype=float)
 
 
-def _distances(points: Array, parts: Array) -> Array:
-    """Distances (n, m) of points (n, 1, d) to segments or triangles."""
+def distances(points: Array, parts: Array) -> Array:
+    """Distances of points (..., d) to segments or triangles (m, k, d), broadcast to (..., m)."""
     edges = [(0, 1)] if parts.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]
-    away = np.full((len(points), len(parts)), np.inf)
+    away: Array = np.asarray(np.inf)
     for i, j in edges:
-        start, end = parts[:, i], parts[:, j]
-        share = shares(points, start, end)[..., None]
-        off = np.linalg.norm(points - start - share * (end - start), axis=2)
-        away = np.minimum(away, off)
+        foot = feet(points, parts[:, i], parts[:, j])
+        away = np.minimum(away, np.linalg.norm(points - foot, axis=-1))
     if len(edges) == 3:
         normal = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
         above = np.ones(away.shape, dtype=bool)
         for i, j in edges:
             inward = np.cross(normal, parts[:, j] - parts[:, i])
-            above &= np.sum((points - parts[:, i]) * inward, axis=2) >= 0.0
-        height = np.abs(np.sum((points - parts[:, 0]) * normal, axis=2))
+            above &= np.sum((points - parts[:, i]) * inward, axis=-1) >= 0.0
+        height = np.abs(np.sum((points - parts[:, 0]) * normal, axis=-1))
         height /= np.linalg.norm(normal, axis=1)
         away = np.where(above, np.minimum(away, height), away)
     return away

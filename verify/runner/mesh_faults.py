@@ -297,9 +297,7 @@ class _Skin:
         Two bodies that overlap have an edge of one inside a cell of the other, or one holds the
         other. Of a membrane all edges are tested, in space the edges of the skin.
         """
-        # commands that only read cases shall not load numba
-        from verify.compare.cell_tree import build_cell_tree, morton_order
-        from verify.compare.overlap_kernels import cells_run_through
+        from verify.compare.cell_tree import build_cell_tree, morton_order, pairs_met
 
         rims = self.cells if self.membrane else self.facets
         k = rims.shape[1]
@@ -314,11 +312,25 @@ class _Skin:
         corners = self.points[self.cells]
         normals, offsets = self._half_spaces(corners)
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=self.membrane)
-        found = cells_run_through(
-            starts[order], ends[order], own[order],
-            tree.lower, tree.upper, tree.cells, normals, offsets,
-        )  # fmt: skip
-        return np.unique(found[found >= 0])
+
+        def by_boxes(row: Ints, low: Array, high: Array, box: Ints) -> NDArray[np.bool_]:
+            least, most = np.minimum(starts, ends)[row], np.maximum(starts, ends)[row]
+            return np.asarray(((least <= high[box]) & (most >= low[box])).all(axis=1))
+
+        found = [own[:0]]
+        for row, cell in pairs_met(tree, corners, order, by_boxes):
+            first, last = (
+                np.einsum("nkd,nd->nk", normals[cell], place[row]) - offsets[cell]
+                for place in (starts, ends)
+            )
+            # the part of a segment inside of all half-spaces (Cyrus and Beck, 1978)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = first / (first - last)
+            into = np.where(first < 0.0, share, 0.0).max(axis=1)
+            out = np.where((first >= 0.0) & (last < 0.0), share, 1.0).min(axis=1)
+            apart = ((first <= 0.0) & (last <= 0.0)).any(axis=1)
+            found.append(cell[~apart & (into < out) & (cell != own[row])])
+        return np.unique(np.concatenate(found))
 
     def _half_spaces(self, corners: Array) -> tuple[Array, Array]:
         """Return normals (m, k, d) and offsets (m, k) of cells smaller by `_CLOSE`."""
