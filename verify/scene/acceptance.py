@@ -56,11 +56,17 @@ class StrainEnergyQuantity(Strict):
 
 
 class DisplacementQuantity(Strict):
-    """A displacement component at a point of the body, m."""
+    """A displacement component at a point of the body, m.
+
+    Attributes
+    ----------
+    point
+        material coordinates, m; not on a cut
+    """
 
     kind: Literal["displacement"]
     name: Line
-    point: Vector = Field(description="material coordinates, m; not on a cut")
+    point: Vector
     component: Literal["x", "y", "z"]
     time: Time = None
 
@@ -74,42 +80,46 @@ class MaximumDisplacementQuantity(Strict):
 
 
 class OpeningQuantity(Strict):
-    """The displacement jump (positive minus negative side) at a point of a cut, m."""
+    """The displacement jump (positive minus negative side) at a point of a cut, m.
+
+    Attributes
+    ----------
+    at
+        2D: position as a fraction of the cut's length
+    point
+        3D: a point of the cut, m
+    """
 
     kind: Literal["opening"]
     name: Line
     cut: str = "cut"
-    at: float | None = Field(
-        default=None,
-        strict=True,
-        ge=0.0,
-        le=1.0,
-        description="2D: position as a fraction of the cut's length",
-    )
-    point: Point3 | None = Field(default=None, description="3D: a point of the cut, m")
+    at: float | None = Field(default=None, strict=True, ge=0.0, le=1.0)
+    point: Point3 | None = None
     component: Literal["normal", "tangential"] = "normal"
     time: Time = None
 
 
 class PartQuantity(Strict):
-    """A number of a separated part: of the connected piece of material that holds a point."""
+    """A number of a separated part: of the connected piece of material that holds a point.
+
+    Attributes
+    ----------
+    point
+        material coordinates of a point of it, m; not on a cut; default: of all
+    of
+        inertia and angular_momentum about its own centre; mass and inertia of it undeformed
+    component
+        of inertia and momenta; in 2D inertia and spin are about z
+    """
 
     kind: Literal["part"]
     name: Line
-    point: Vector | None = Field(
-        default=None,
-        description="material coordinates of a point of it, m; not on a cut; default: of all",
-    )
+    point: Vector | None = None
     of: Literal[
         "mass", "inertia", "linear_momentum", "angular_momentum", "kinetic_energy",
         "strain_energy",
-    ] = Field(
-        description="inertia and angular_momentum about its own centre; mass and inertia of it "
-        "undeformed"
-    )  # fmt: skip
-    component: Literal["x", "y", "z"] | None = Field(
-        default=None, description="of inertia and momenta; in 2D inertia and spin are about z"
-    )
+    ]  # fmt: skip
+    component: Literal["x", "y", "z"] | None = None
     time: Time = None
 
     rules: ClassVar[Rules] = (
@@ -123,9 +133,17 @@ class PartQuantity(Strict):
 
 
 class _ResultantQuantity(Strict):
+    """A component of a force or of a moment.
+
+    Attributes
+    ----------
+    component
+        in 2D a moment is about z
+    """
+
     name: Line
     of: Literal["force", "moment"] = "force"
-    component: Literal["x", "y", "z"] = Field(description="in 2D a moment is about z")
+    component: Literal["x", "y", "z"]
     time: Time = None
 
     def direction(self, dimension: int) -> NDArray[np.float64]:
@@ -134,11 +152,19 @@ class _ResultantQuantity(Strict):
 
 
 class ReactionQuantity(_ResultantQuantity):
-    """Force or moment of a support on the body, N or N m (2D: per metre of thickness)."""
+    """Force or moment of a support on the body, N or N m (2D: per metre of thickness).
+
+    Attributes
+    ----------
+    where
+        the part that a support of the case holds, as it says it
+    centre
+        that a moment is about, m
+    """
 
     kind: Literal["reaction"]
-    where: Line = Field(description="the part that a support of the case holds, as it says it")
-    centre: Vector | None = Field(default=None, description="that a moment is about, m")
+    where: Line
+    centre: Vector | None = None
 
     rules: ClassVar[Rules] = (
         ("centre", lambda p: (p.of == "moment") != (p.centre is not None),
@@ -152,11 +178,19 @@ class ReactionQuantity(_ResultantQuantity):
 
 
 class SectionQuantity(_ResultantQuantity):
-    """Force or moment in a section: of what lies beyond it on the rest (2D: per metre)."""
+    """Force or moment in a section: of what lies beyond it on the rest (2D: per metre).
+
+    Attributes
+    ----------
+    point
+        of the plane, m; a moment is about it
+    normal
+        points beyond it; tension along it is positive
+    """
 
     kind: Literal["section"]
-    point: Vector = Field(description="of the plane, m; a moment is about it")
-    normal: Vector = Field(description="points beyond it; tension along it is positive")
+    point: Vector
+    normal: Vector
 
     rules: ClassVar[Rules] = (
         ("normal", lambda p: not any(p.normal), "is zero"),
@@ -171,30 +205,42 @@ class SectionQuantity(_ResultantQuantity):
 
 
 class StressQuantity(Strict):
-    """Mean of a stress component over a small ball of the body, Pa."""
+    """Mean of a stress component over a small ball of the body, Pa.
+
+    Attributes
+    ----------
+    point
+        centre of the ball, m
+    radius
+        m; the ball lies in the body and on one side of all cuts
+    """
 
     kind: Literal["stress"]
     name: Line
-    point: Vector = Field(description="centre of the ball, m")
-    radius: Positive = Field(description="m; the ball lies in the body and on one side of all cuts")
+    point: Vector
+    radius: Positive
     component: Literal["xx", "yy", "zz", "xy", "xz", "yz"]
     time: Time = None
 
 
 class FractureQuantity(Strict):
-    """A quantity at an end of a plane cut, or at a point of a front."""
+    """A quantity at an end of a plane cut, or at a point of a front.
+
+    Attributes
+    ----------
+    end
+        2D, and at a blade: which end of the cut
+    point
+        3D: a point of the front of a disc or polygon, m
+    time
+        dynamic: an output time, s; default the last
+    """
 
     name: Line
     cut: str = "cut"
-    end: Literal["start", "end"] | None = Field(
-        default=None, description="2D, and at a blade: which end of the cut"
-    )
-    point: Point3 | None = Field(
-        default=None, description="3D: a point of the front of a disc or polygon, m"
-    )
-    time: NonNegative | None = Field(
-        default=None, description="dynamic: an output time, s; default the last"
-    )
+    end: Literal["start", "end"] | None = None
+    point: Point3 | None = None
+    time: NonNegative | None = None
 
     @property
     def column(self) -> int:
@@ -214,14 +260,19 @@ class EnergyReleaseQuantity(FractureQuantity):
 
 
 class StressIntensityQuantity(FractureQuantity):
-    """A factor at an end of a plane cut, a point of a front, or of mode III at a blade, Pa √m."""
+    """A factor at an end of a plane cut, a point of a front, or of mode III at a blade, Pa √m.
+
+    Attributes
+    ----------
+    mode
+        III in 3D only
+    radius
+        mode III: how far behind the blade of a tool path in space the cut is read, m
+    """
 
     kind: Literal["stress_intensity"]
-    mode: Literal["I", "II", "III"] = Field(default="I", description="III in 3D only")
-    radius: Positive | None = Field(
-        default=None,
-        description="mode III: how far behind the blade of a tool path in space the cut is read, m",
-    )
+    mode: Literal["I", "II", "III"] = "I"
+    radius: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda p: p.at_blade != (p.radius is not None),
@@ -247,15 +298,19 @@ Quantity = Annotated[
 
 
 class _Check(Strict):
-    solver: str | None = Field(
-        default=None,
-        description="the one solver that is judged; default: each that is asked and does not "
-        "refuse the case",
-    )
-    metric: str = Field(
-        description="displacement_l2, energy_norm, jump_l2 (relative errors), strain_energy, "
-        "overlap_depth (m), or the name of a quantity"
-    )
+    """What every check says: whose metric it is.
+
+    Attributes
+    ----------
+    solver
+        the one solver that is judged; default: each that is asked and does not refuse the case
+    metric
+        displacement_l2, energy_norm, jump_l2 (relative errors), strain_energy, overlap_depth (m),
+        or the name of a quantity
+    """
+
+    solver: str | None = None
+    metric: str
 
     @field_validator("solver", "to", mode="after", check_fields=False)
     @classmethod
@@ -269,12 +324,18 @@ class _Check(Strict):
 
 
 class RateCheck(_Check):
-    """The observed order of an error over the mesh levels."""
+    """The observed order of an error over the mesh levels.
+
+    Attributes
+    ----------
+    within
+        tolerance of `equals`
+    """
 
     check: Literal["rate"]
     at_least: Finite | None = None
     equals: Finite | None = None
-    within: Positive | None = Field(default=None, description="tolerance of `equals`")
+    within: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", none_or_both("at_least", "equals"),
@@ -295,16 +356,22 @@ class RatioCheck(_Check):
 
     Without a `solver` it is asked of all but the one compared with. In a case with a parameter it
     may be the error over the same solver's in another `row`.
+
+    Attributes
+    ----------
+    to
+        the solver compared with
+    row
+        value of the case's parameter in the row compared with, instead of a solver
+    within
+        |ratio − 1| must not exceed it
     """
 
     check: Literal["ratio"]
-    to: str = Field(default="conforming", description="the solver compared with")
-    row: Finite | None = Field(
-        default=None,
-        description="value of the case's parameter in the row compared with, instead of a solver",
-    )
+    to: str = "conforming"
+    row: Finite | None = None
     at_most: Positive | None = None
-    within: Positive | None = Field(default=None, description="|ratio − 1| must not exceed it")
+    within: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", none_or_both("at_most", "within"), "a ratio check has either at_most or within"),
@@ -319,12 +386,18 @@ class RatioCheck(_Check):
 
 
 class ValueCheck(_Check):
-    """A quantity against a stated value (exact, or independent of this project)."""
+    """A quantity against a stated value (exact, or independent of this project).
+
+    Attributes
+    ----------
+    source
+        where the value comes from
+    """
 
     check: Literal["value"]
     equals: Finite
     relative_tolerance: Positive
-    source: Line = Field(description="where the value comes from")
+    source: Line
 
 
 class BladeCheck(_Check):
@@ -343,12 +416,18 @@ Acceptance = Annotated[
 
 
 class KnownFinding(Strict):
-    """A check that a solver is known to fail: shown as failed, not counted in the exit code."""
+    """A check that a solver is known to fail: shown as failed, not counted in the exit code.
+
+    Attributes
+    ----------
+    reason
+        why it fails, in one sentence
+    """
 
     solver: str
     check: Literal["rate", "error", "ratio", "value", "excess"]
     metric: str
-    reason: Line = Field(description="why it fails, in one sentence")
+    reason: Line
 
     def concerns(
         self, check: RateCheck | BoundCheck | RatioCheck | ValueCheck | BladeCheck

@@ -36,12 +36,16 @@ _TURN = 64  # points on a full circle in space, without a given spacing
 
 
 class CutShape(Strict):
-    """What every kind of cut answers."""
+    """What every kind of cut answers.
+
+    Attributes
+    ----------
+    toughness
+        of a tool_path: energy that cutting takes, J/m²
+    """
 
     name: Line = "cut"
-    toughness: Positive | None = Field(
-        default=None, description="of a tool_path: energy that cutting takes, J/m²"
-    )
+    toughness: Positive | None = None
 
     on_the_way: ClassVar[bool] = False  # whether a tool makes it, place by place
     faceted: ClassVar[bool] = False  # whether its facets are the cut itself, however few
@@ -89,9 +93,15 @@ class CutShape(Strict):
 
 
 class _Fixed(CutShape):
-    """A cut that opens at once."""
+    """A cut that opens at once.
 
-    opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
+    Attributes
+    ----------
+    opens_at
+        time at which it opens, s
+    """
+
+    opens_at: NonNegative = 0.0
 
     def passed_at(self, points: Array) -> Array:
         """Return the times (n,) at which it opens at points (n, d) of it, s."""
@@ -99,11 +109,16 @@ class _Fixed(CutShape):
 
 
 class _PlaneCut(_Fixed):
-    expected: Literal["through", "edge", "inner"] | None = Field(
-        default=None,
-        description="how it meets the body: checked if given (through: both ends outside or on "
-        "the boundary; edge: one end; inner: none)",
-    )
+    """A cut in the plane.
+
+    Attributes
+    ----------
+    expected
+        how it meets the body: checked if given (through: both ends outside or on the boundary;
+        edge: one end; inner: none)
+    """
+
+    expected: Literal["through", "edge", "inner"] | None = None
 
     dimension: ClassVar[int] = 2
 
@@ -119,10 +134,16 @@ class _PlaneCut(_Fixed):
 
 
 class PolylineCut(_PlaneCut):
-    """A polyline in the plane; what lies left of its direction is its positive side."""
+    """A polyline in the plane; what lies left of its direction is its positive side.
+
+    Attributes
+    ----------
+    points
+        points in order, m
+    """
 
     kind: Literal["polyline"]
-    points: list[Point2] = Field(min_length=2, description="points in order, m")
+    points: list[Point2] = Field(min_length=2)
 
     faceted: ClassVar[bool] = True
     rules: ClassVar[Rules] = (
@@ -139,15 +160,25 @@ class PolylineCut(_PlaneCut):
 
 
 class ArcCut(_PlaneCut):
-    """A circular arc in the plane, counter-clockwise; its centre is on the positive side."""
+    """A circular arc in the plane, counter-clockwise; its centre is on the positive side.
+
+    Attributes
+    ----------
+    centre
+        m
+    radius
+        m
+    start
+        angle of the first end, degrees
+    sweep
+        angle covered, degrees
+    """
 
     kind: Literal["arc"]
-    centre: Point2 = Field(description="m")
-    radius: Positive = Field(description="m")
-    start: Finite = Field(default=0.0, description="angle of the first end, degrees")
-    sweep: float = Field(
-        strict=True, default=360.0, gt=0.0, le=360.0, description="angle covered, degrees"
-    )
+    centre: Point2
+    radius: Positive
+    start: Finite = 0.0
+    sweep: float = Field(strict=True, default=360.0, gt=0.0, le=360.0)
 
     @property
     def closed(self) -> bool:
@@ -171,20 +202,31 @@ class ArcCut(_PlaneCut):
 
 
 class _SpatialCut(_Fixed):
-    expected: Literal["through", "edge", "inner"] | None = Field(
-        default=None,
-        description="how it meets the body: checked if given (through: its rim is nowhere inside "
-        "the body; edge: partly; inner: everywhere)",
-    )
+    """A cut in space.
+
+    Attributes
+    ----------
+    expected
+        how it meets the body: checked if given (through: its rim is nowhere inside the body; edge:
+        partly; inner: everywhere)
+    """
+
+    expected: Literal["through", "edge", "inner"] | None = None
 
     dimension: ClassVar[int] = 3
 
 
 class PolygonCut(_SpatialCut):
-    """A plane polygon in space; its normal follows the right-hand rule."""
+    """A plane polygon in space; its normal follows the right-hand rule.
+
+    Attributes
+    ----------
+    points
+        corners in order, m
+    """
 
     kind: Literal["polygon"]
-    points: list[Point3] = Field(min_length=3, description="corners in order, m")
+    points: list[Point3] = Field(min_length=3)
 
     faceted: ClassVar[bool] = True
     rules: ClassVar[Rules] = (("", lambda c: _defect_of_corners(c.points), "{}"),)
@@ -215,18 +257,28 @@ class PolygonCut(_SpatialCut):
 
 
 class DiscCut(_SpatialCut):
-    """A plane disc or ellipse in space."""
+    """A plane disc or ellipse in space.
+
+    Attributes
+    ----------
+    centre
+        m
+    normal
+        to the positive side; of any length
+    radius
+        of a circle, m
+    radii
+        semi-axes of an ellipse, m, the first along `axis`
+    axis
+        direction of the first semi-axis, projected onto the plane
+    """
 
     kind: Literal["disc"]
-    centre: Point3 = Field(description="m")
-    normal: Point3 = Field(description="to the positive side; of any length")
-    radius: Positive | None = Field(default=None, description="of a circle, m")
-    radii: tuple[Positive, Positive] | None = Field(
-        default=None, description="semi-axes of an ellipse, m, the first along `axis`"
-    )
-    axis: Point3 | None = Field(
-        default=None, description="direction of the first semi-axis, projected onto the plane"
-    )
+    centre: Point3
+    normal: Point3
+    radius: Positive | None = None
+    radii: tuple[Positive, Positive] | None = None
+    axis: Point3 | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda c: not np.linalg.norm(c.normal), "the normal of the disc is zero"),
@@ -258,20 +310,34 @@ class DiscCut(_SpatialCut):
 
 
 class CylinderCut(_SpatialCut):
-    """A part of a cylinder's mantle; its axis is on the positive side."""
+    """A part of a cylinder's mantle; its axis is on the positive side.
+
+    Attributes
+    ----------
+    base
+        point of the axis at the lower end, m
+    axis
+        direction of the axis, from the base; of any length
+    radius
+        m
+    height
+        along the axis, m
+    towards
+        direction of the angle 0, projected; needed for a sector
+    start
+        angle at which the sector starts, degrees
+    sweep
+        angle covered, degrees
+    """
 
     kind: Literal["cylinder"]
-    base: Point3 = Field(description="point of the axis at the lower end, m")
-    axis: Point3 = Field(description="direction of the axis, from the base; of any length")
-    radius: Positive = Field(description="m")
-    height: Positive = Field(description="along the axis, m")
-    towards: Point3 | None = Field(
-        default=None, description="direction of the angle 0, projected; needed for a sector"
-    )
-    start: Finite = Field(default=0.0, description="angle at which the sector starts, degrees")
-    sweep: float = Field(
-        strict=True, default=360.0, gt=0.0, le=360.0, description="angle covered, degrees"
-    )
+    base: Point3
+    axis: Point3
+    radius: Positive
+    height: Positive
+    towards: Point3 | None = None
+    start: Finite = 0.0
+    sweep: float = Field(strict=True, default=360.0, gt=0.0, le=360.0)
 
     rules: ClassVar[Rules] = (
         ("", lambda c: not np.linalg.norm(c.axis), "the axis of the cylinder is zero"),
@@ -306,21 +372,25 @@ class CylinderCut(_SpatialCut):
 
 
 class SphereCut(_SpatialCut):
-    """A sphere or a cap of one; its centre is on the positive side."""
+    """A sphere or a cap of one; its centre is on the positive side.
+
+    Attributes
+    ----------
+    centre
+        m
+    radius
+        m
+    towards
+        direction of the cap's pole; of any length
+    opening
+        angle between the pole and the cap's rim, degrees; 180: the whole sphere
+    """
 
     kind: Literal["sphere"]
-    centre: Point3 = Field(description="m")
-    radius: Positive = Field(description="m")
-    towards: Point3 = Field(
-        default=(0.0, 0.0, 1.0), description="direction of the cap's pole; of any length"
-    )
-    opening: float = Field(
-        strict=True,
-        default=180.0,
-        gt=0.0,
-        le=180.0,
-        description="angle between the pole and the cap's rim, degrees; 180: the whole sphere",
-    )
+    centre: Point3
+    radius: Positive
+    towards: Point3 = (0.0, 0.0, 1.0)
+    opening: float = Field(strict=True, default=180.0, gt=0.0, le=180.0)
 
     rules: ClassVar[Rules] = (
         ("", lambda c: not np.linalg.norm(c.towards), "the direction of the cap's pole is zero"),
@@ -365,13 +435,19 @@ class SphereCut(_SpatialCut):
 
 
 class SweptCut(_SpatialCut):
-    """A polyline in space, swept along a vector; points × along is on its positive side."""
+    """A polyline in space, swept along a vector; points × along is on its positive side.
+
+    Attributes
+    ----------
+    points
+        points in order, m; the last equal to the first closes it
+    along
+        from the polyline to the opposite rim, m
+    """
 
     kind: Literal["swept"]
-    points: list[Point3] = Field(
-        min_length=2, description="points in order, m; the last equal to the first closes it"
-    )
-    along: Point3 = Field(description="from the polyline to the opposite rim, m")
+    points: list[Point3] = Field(min_length=2)
+    along: Point3
 
     faceted: ClassVar[bool] = True
     rules: ClassVar[Rules] = (

@@ -99,11 +99,19 @@ class _PlaneBody(_Body):
 
 
 class Rectangle(_PlaneBody):
-    """An axis-parallel rectangle; its parts are ``left``, ``right``, ``bottom``, ``top``."""
+    """An axis-parallel rectangle; its parts are ``left``, ``right``, ``bottom``, ``top``.
+
+    Attributes
+    ----------
+    lower
+        lower left corner, m
+    upper
+        upper right corner, m
+    """
 
     kind: Literal["rectangle"]
-    lower: Point2 = Field(description="lower left corner, m")
-    upper: Point2 = Field(description="upper right corner, m")
+    lower: Point2
+    upper: Point2
 
     rules: ClassVar[Rules] = (
         ("", lambda b: not np.greater(b.upper, b.lower).all() and (b.upper, b.lower),
@@ -121,13 +129,19 @@ class Rectangle(_PlaneBody):
 
 
 class Polygon(_PlaneBody):
-    """A simple polygon; edge i goes from corner i to corner i + 1 and bears the i-th name."""
+    """A simple polygon; edge i goes from corner i to corner i + 1 and bears the i-th name.
+
+    Attributes
+    ----------
+    corners
+        corners in order, m
+    names
+        a name per edge; default edge0, edge1, …
+    """
 
     kind: Literal["polygon"]
-    corners: list[Point2] = Field(min_length=3, description="corners in order, m")
-    names: list[str] | None = Field(
-        default=None, description="a name per edge; default edge0, edge1, …"
-    )
+    corners: list[Point2] = Field(min_length=3)
+    names: list[str] | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda b: b.names is not None and len(b.names) != len(b.corners)
@@ -148,11 +162,18 @@ class Box(_Body):
     """An axis-parallel box.
 
     Its parts are ``left``/``right`` (x), ``front``/``back`` (y) and ``bottom``/``top`` (z).
+
+    Attributes
+    ----------
+    lower
+        lowest corner, m
+    upper
+        highest corner, m
     """
 
     kind: Literal["box"]
-    lower: Point3 = Field(description="lowest corner, m")
-    upper: Point3 = Field(description="highest corner, m")
+    lower: Point3
+    upper: Point3
 
     dimension: ClassVar[int] = 3
     rules: ClassVar[Rules] = (
@@ -181,20 +202,28 @@ class Box(_Body):
 
 
 class MeshFile(_Body):
-    """A mesh file; its parts are inequalities, or its groups: ``group:NAME``."""
+    """A mesh file; its parts are inequalities, or its groups: ``group:NAME``.
+
+    Attributes
+    ----------
+    file
+        mesh file, relative to the case file
+    dimension_
+        space dimension
+    cells
+        surface: triangles in space, a membrane
+    scale
+        metres per unit of the file: 1e-3 for millimetres
+    weld
+        nodes of the file that are as close become one, m
+    """
 
     kind: Literal["file"]
-    file: Path = Field(description="mesh file, relative to the case file")
-    dimension_: Literal[2, 3] = Field(default=2, alias="dimension", description="space dimension")
-    cells: Literal["volume", "surface"] = Field(
-        default="volume", description="surface: triangles in space, a membrane"
-    )
-    scale: Positive = Field(
-        default=1.0, description="metres per unit of the file: 1e-3 for millimetres"
-    )
-    weld: Positive | None = Field(
-        default=None, description="nodes of the file that are as close become one, m"
-    )
+    file: Path
+    dimension_: Literal[2, 3] = Field(default=2, alias="dimension")
+    cells: Literal["volume", "surface"] = "volume"
+    scale: Positive = 1.0
+    weld: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda b: b.cells == "surface" and b.dimension == 2,
@@ -241,20 +270,27 @@ class Skin(_Body):
 
     Coordinates of ``shape``: z out of the body; a face has x to its left and y up, a hand y
     along its fingers; the origin is in the middle. The geometry brings its own mesh.
+
+    Attributes
+    ----------
+    shape
+        which patch; or file
+    elements
+        of a shape: about how many elements are wanted
+    file
+        triangulated surface (STL, OBJ, PLY, VTU …), taken as it is
+    thickness
+        m; tetrahedra below the surface. Without it: a membrane
+    layers
+        with a thickness: layers of elements
     """
 
     kind: Literal["skin"]
-    shape: Literal["face", "hand"] | None = Field(default=None, description="which patch; or file")
-    elements: Count | None = Field(
-        default=None, description="of a shape: about how many elements are wanted"
-    )
-    file: Path | None = Field(
-        default=None, description="triangulated surface (STL, OBJ, PLY, VTU …), taken as it is"
-    )
-    thickness: Positive | None = Field(
-        default=None, description="m; tetrahedra below the surface. Without it: a membrane"
-    )
-    layers: Count = Field(default=1, description="with a thickness: layers of elements")
+    shape: Literal["face", "hand"] | None = None
+    elements: Count | None = None
+    file: Path | None = None
+    thickness: Positive | None = None
+    layers: Count = 1
 
     dimension: ClassVar[int] = 3
     rules: ClassVar[Rules] = (
@@ -279,29 +315,30 @@ CellCounts = tuple[Count, ...]
 
 
 class MeshLevels(Strict):
-    """The background meshes on which the solvers are compared, coarse to fine."""
+    """The background meshes on which the solvers are compared, coarse to fine.
 
-    pattern: Literal["structured", "unstructured", "given"] = Field(
-        default="structured",
-        description="structured: squares split along the rising diagonal (rectangles only); "
-        "given: the mesh file of the geometry, as it is or refined",
-    )
-    sizes: Annotated[list[Positive], Field(min_length=1)] | None = Field(
-        default=None, description="element sizes h, m"
-    )
-    cells: Annotated[list[CellCounts], Field(min_length=1)] | None = Field(
-        default=None, description="structured: numbers of cells per direction"
-    )
-    refine: int = Field(
-        strict=True, default=0, ge=0, le=6,
-        description="given: how often the mesh of the file is refined uniformly, each a level "
-        "more; a curved boundary stays as the file has it",
-    )  # fmt: skip
-    position: int = Field(
-        strict=True, default=0, ge=0, lt=POSITIONS,
-        description="structured: 0 as asked, else another mesh of nearly equal size: one element "
-        "more or less along each axis, falling diagonals, moved inner nodes",
-    )  # fmt: skip
+    Attributes
+    ----------
+    pattern
+        structured: squares split along the rising diagonal (rectangles only); given: the mesh file
+        of the geometry, as it is or refined
+    sizes
+        element sizes h, m
+    cells
+        structured: numbers of cells per direction
+    refine
+        given: how often the mesh of the file is refined uniformly, each a level more; a curved
+        boundary stays as the file has it
+    position
+        structured: 0 as asked, else another mesh of nearly equal size: one element more or less
+        along each axis, falling diagonals, moved inner nodes
+    """
+
+    pattern: Literal["structured", "unstructured", "given"] = "structured"
+    sizes: Annotated[list[Positive], Field(min_length=1)] | None = None
+    cells: Annotated[list[CellCounts], Field(min_length=1)] | None = None
+    refine: int = Field(strict=True, default=0, ge=0, le=6)  # fmt: skip
+    position: int = Field(strict=True, default=0, ge=0, lt=POSITIONS)  # fmt: skip
 
     rules: ClassVar[Rules] = (
         ("", lambda m: m.pattern == "given" and (m.sizes or m.cells),
@@ -338,31 +375,32 @@ class MeshLevels(Strict):
 
 
 class ReferenceLevels(Strict):
-    """The reference that judges when there is no exact solution, or beside it."""
+    """The reference that judges when there is no exact solution, or beside it.
 
-    kind: Literal["exact", "conforming"] | None = Field(
-        default=None, description="default: exact where the scene has an exact solution"
-    )
-    size: Positive | None = Field(
-        default=None, description="far element size of the coarsest level, m (default: chosen)"
-    )
-    levels: int = Field(
-        strict=True, default=3, ge=3, le=8, description="number of levels, each halving h"
-    )
-    max_levels: int | None = Field(
-        strict=True,
-        default=None,
-        ge=3,
-        le=8,
-        description="further levels are solved, up to that many, until the uncertainty is below "
-        "a tenth of every error that it judges (default: `levels`)",
-    )
-    degree: Literal[1, 2] = Field(default=2, description="polynomial order")
-    time_step: Positive | None = Field(
-        default=None,
-        description="dynamic: largest step of the coarsest level, s, which every level halves "
-        "(default: that of the analysis)",
-    )
+    Attributes
+    ----------
+    kind
+        default: exact where the scene has an exact solution
+    size
+        far element size of the coarsest level, m (default: chosen)
+    levels
+        number of levels, each halving h
+    max_levels
+        further levels are solved, up to that many, until the uncertainty is below a tenth of every
+        error that it judges (default: `levels`)
+    degree
+        polynomial order
+    time_step
+        dynamic: largest step of the coarsest level, s, which every level halves (default: that of
+        the analysis)
+    """
+
+    kind: Literal["exact", "conforming"] | None = None
+    size: Positive | None = None
+    levels: int = Field(strict=True, default=3, ge=3, le=8)
+    max_levels: int | None = Field(strict=True, default=None, ge=3, le=8)
+    degree: Literal[1, 2] = 2
+    time_step: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda r: r.max_levels is not None and r.max_levels < r.levels

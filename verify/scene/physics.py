@@ -45,17 +45,24 @@ class Moduli(NamedTuple):
 
 
 class MaterialRegion(Strict):
-    """A region of another material; keys that it does not give are as in ``[material]``."""
+    """A region of another material; keys that it does not give are as in ``[material]``.
 
-    where: str = Field(
-        description="an inequality in x, y, z, or 'group:NAME' of a mesh file; of regions that "
-        "overlap, the last"
-    )
-    young: Positive | None = Field(default=None, description="Young's modulus E, Pa")
-    poisson: float | None = Field(
-        default=None, strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio"
-    )
-    density: Positive | None = Field(default=None, description="density, kg/m³")
+    Attributes
+    ----------
+    where
+        an inequality in x, y, z, or 'group:NAME' of a mesh file; of regions that overlap, the last
+    young
+        Young's modulus E, Pa
+    poisson
+        Poisson's ratio
+    density
+        density, kg/m³
+    """
+
+    where: str
+    young: Positive | None = None
+    poisson: float | None = Field(default=None, strict=True, gt=-1.0, lt=0.5)
+    density: Positive | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda r: r.young is None and r.poisson is None and r.density is None,
@@ -72,23 +79,34 @@ class MaterialRegion(Strict):
 
 
 class Material(Strict):
-    """Isotropic elasticity: one material, or others in regions of the body."""
+    """Isotropic elasticity: one material, or others in regions of the body.
 
-    young: Positive = Field(description="Young's modulus E, Pa")
-    poisson: float = Field(strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio")
-    density: Positive | None = Field(default=None, description="density, kg/m³")
-    plane: Literal["strain", "stress"] | None = Field(
-        default=None, description="2D only: plane strain or plane stress"
-    )
-    thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
-    model: Literal["hooke", "neo_hookean", "stable_neo_hookean"] = Field(
-        default="hooke",
-        description="energy, of these moduli at rest: Hooke's of the strain, at finite rotation of "
-        "U − I; neo-Hookean with ln J, or without it (finite where cells are inside out)",
-    )
-    regions: list[MaterialRegion] = Field(
-        default_factory=list, description="other materials; what no region covers is this one"
-    )
+    Attributes
+    ----------
+    young
+        Young's modulus E, Pa
+    poisson
+        Poisson's ratio
+    density
+        density, kg/m³
+    plane
+        2D only: plane strain or plane stress
+    thickness
+        membranes only: thickness, m
+    model
+        energy, of these moduli at rest: Hooke's of the strain, at finite rotation of U − I;
+        neo-Hookean with ln J, or without it (finite where cells are inside out)
+    regions
+        other materials; what no region covers is this one
+    """
+
+    young: Positive
+    poisson: float = Field(strict=True, gt=-1.0, lt=0.5)
+    density: Positive | None = None
+    plane: Literal["strain", "stress"] | None = None
+    thickness: Positive | None = None
+    model: Literal["hooke", "neo_hookean", "stable_neo_hookean"] = "hooke"
+    regions: list[MaterialRegion] = Field(default_factory=list)
 
     @property
     def is_uniform(self) -> bool:
@@ -218,11 +236,21 @@ def field_rates(components: Sequence[float | str], points: Array, time: float) -
 
 
 class Rotation(Strict):
-    """A finite rotation about a point or an axis."""
+    """A finite rotation about a point or an axis.
 
-    angle: Finite = Field(description="degrees, anticlockwise seen from the tip of the axis")
-    centre: Vector = Field(description="a point that it leaves where it is, m")
-    axis: Point3 | None = Field(default=None, description="3D: its direction; of any length")
+    Attributes
+    ----------
+    angle
+        degrees, anticlockwise seen from the tip of the axis
+    centre
+        a point that it leaves where it is, m
+    axis
+        3D: its direction; of any length
+    """
+
+    angle: Finite
+    centre: Vector
+    axis: Point3 | None = None
 
     def matrix(self, factor: float = 1.0) -> Array:
         """Rotation matrix (d, d) of the angle times a factor."""
@@ -243,19 +271,22 @@ class Rotation(Strict):
 
 
 class Support(Strict):
-    """Prescribed displacement on a part of the boundary."""
+    """Prescribed displacement on a part of the boundary.
+
+    Attributes
+    ----------
+    displacement
+        m, one number or formula in x, y, z, t per component held; or 'exact' (see [exact])
+    components
+        which components are held; default all
+    rotation
+        turn the part, then move it by `displacement`
+    """
 
     where: str = Field(description=_WHERE)
-    displacement: Components | Literal["exact"] = Field(
-        description="m, one number or formula in x, y, z, t per component held; or 'exact' (see "
-        "[exact])"
-    )
-    components: list[Literal["x", "y", "z"]] | None = Field(
-        default=None, description="which components are held; default all"
-    )
-    rotation: Rotation | None = Field(
-        default=None, description="turn the part, then move it by `displacement`"
-    )
+    displacement: Components | Literal["exact"]
+    components: list[Literal["x", "y", "z"]] | None = None
+    rotation: Rotation | None = None
     history: History | None = None
 
     rules: ClassVar[Rules] = (
@@ -381,34 +412,48 @@ class _Load(Strict):
 
 
 class Gravity(_Load):
-    """Acceleration acting on the density."""
+    """Acceleration acting on the density.
+
+    Attributes
+    ----------
+    acceleration
+        m/s²
+    """
 
     kind: Literal["gravity"]
-    acceleration: Vector = Field(description="m/s²")
+    acceleration: Vector
 
     key: ClassVar[str] = "acceleration"
 
 
 class BodyForce(_Load):
-    """Force per volume, or the exact solution's."""
+    """Force per volume, or the exact solution's.
+
+    Attributes
+    ----------
+    force
+        N/m³, a number or a formula in x, y, z, t per component; or 'exact'
+    """
 
     kind: Literal["body_force"]
-    force: Components | Literal["exact"] = Field(
-        description="N/m³, a number or a formula in x, y, z, t per component; or 'exact'"
-    )
+    force: Components | Literal["exact"]
     history: History | None = None
 
     key: ClassVar[str] = "force"
 
 
 class Traction(_Load):
-    """Force per area on a part of the boundary (dead load)."""
+    """Force per area on a part of the boundary (dead load).
+
+    Attributes
+    ----------
+    traction
+        Pa, a number or a formula in x, y, z, t per component; or 'exact'
+    """
 
     kind: Literal["traction"]
     where: str = Field(description=_WHERE)
-    traction: Components | Literal["exact"] = Field(
-        description="Pa, a number or a formula in x, y, z, t per component; or 'exact'"
-    )
+    traction: Components | Literal["exact"]
     history: History | None = None
 
     key: ClassVar[str] = "traction"
@@ -418,19 +463,22 @@ class CutFaces(_Load):
     """A load on both faces of a cut that is in balance, per area of the undeformed faces.
 
     It is a dead load: its direction stays what it is when the faces turn.
+
+    Attributes
+    ----------
+    cut
+        name of the cut
+    pressure
+        Pa, pushes the faces apart; a number or a formula in x, y, z
+    traction
+        Pa, on the face of the positive side; the other bears the opposite; a number or a formula in
+        x, y, z per component
     """
 
     kind: Literal["cut_faces"]
-    cut: str = Field(default="cut", description="name of the cut")
-    pressure: Finite | Formula | None = Field(
-        default=None,
-        description="Pa, pushes the faces apart; a number or a formula in x, y, z",
-    )
-    traction: Components | None = Field(
-        default=None,
-        description="Pa, on the face of the positive side; the other bears the opposite; a number "
-        "or a formula in x, y, z per component",
-    )
+    cut: str = "cut"
+    pressure: Finite | Formula | None = None
+    traction: Components | None = None
     history: History | None = None
 
     rules: ClassVar[Rules] = (
@@ -477,12 +525,18 @@ Load = Annotated[Gravity | BodyForce | Traction | CutFaces, Field(discriminator=
 
 
 class Exact(Strict):
-    """An exact solution by name; it can prescribe supports and loads, and judge results."""
+    """An exact solution by name; it can prescribe supports and loads, and judge results.
 
-    solution: str = Field(description="name; `verify list --exact` shows them")
-    parameters: dict[str, Finite | list[Finite] | list[list[Finite]]] = Field(
-        default_factory=dict, description="parameters of that solution, SI units"
-    )
+    Attributes
+    ----------
+    solution
+        name; `verify list --exact` shows them
+    parameters
+        parameters of that solution, SI units
+    """
+
+    solution: str
+    parameters: dict[str, Finite | list[Finite] | list[list[Finite]]] = Field(default_factory=dict)
 
 
 def _one_name(given: Any) -> Any:
@@ -498,27 +552,32 @@ Kinematics = Annotated[
 
 
 class Analysis(Strict):
-    """The analysis: statics or dynamics, kinematics, times."""
+    """The analysis: statics or dynamics, kinematics, times.
+
+    Attributes
+    ----------
+    kinematics
+        corotational, also called finite_rotation: large rotations
+    duration
+        dynamic: end time, s
+    time_step
+        dynamic: largest step, s
+    outputs
+        dynamic: number of output times, 0 and the end among them (default 11)
+    damping
+        Rayleigh: mass (1/s) and stiffness (s) factors
+    opening
+        what a tool_path opens is held by forces that fade as it is swept, or free at once when it
+        is passed: of the reference and all own solvers
+    """
 
     kind: Literal["static", "dynamic"] = "static"
-    kinematics: Kinematics = Field(
-        default="linear", description="corotational, also called finite_rotation: large rotations"
-    )
-    duration: Positive | None = Field(default=None, description="dynamic: end time, s")
-    time_step: Positive | None = Field(default=None, description="dynamic: largest step, s")
-    outputs: Count | None = Field(
-        default=None,
-        ge=2,
-        description="dynamic: number of output times, 0 and the end among them (default 11)",
-    )
-    damping: tuple[NonNegative, NonNegative] = Field(
-        default=(0.0, 0.0), description="Rayleigh: mass (1/s) and stiffness (s) factors"
-    )
-    opening: Literal["late", "swept"] = Field(
-        default="swept",
-        description="what a tool_path opens is held by forces that fade as it is swept, or free "
-        "at once when it is passed: of the reference and all own solvers",
-    )
+    kinematics: Kinematics = "linear"
+    duration: Positive | None = None
+    time_step: Positive | None = None
+    outputs: Count | None = Field(default=None, ge=2)
+    damping: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    opening: Literal["late", "swept"] = "swept"
 
     rules: ClassVar[Rules] = (
         ("", lambda a: a.kind == "dynamic" and a.duration is None,

@@ -5,8 +5,10 @@ is about, what breaks it, and the text of the message. A message names the key, 
 nearest valid word there.
 """
 
+import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
+from inspect import cleandoc
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -50,6 +52,7 @@ Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 Formula = Annotated[str, Field(min_length=1, max_length=1000)]
 Components = Annotated[list[Finite | Formula], Field(min_length=1, max_length=3)]
 
+_DESCRIPTION = re.compile(r"^(\w+)\n((?: {4}.*\n?)+)", re.MULTILINE)
 #: key that the rule is about (empty: the part as a whole), what breaks it, and the message
 Rule = tuple[str, Callable[..., Any], str]
 Rules = tuple[Rule, ...]
@@ -91,6 +94,15 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     rules: ClassVar[Rules] = ()
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        """Take the descriptions of keys, for the schema, from the docstring of a table."""
+        super().__init_subclass__(**more)
+        text, _, listed = cleandoc(cls.__doc__ or "").partition("\n\nAttributes\n----------\n")
+        cls.__doc__ = text or None
+        for key, said in _DESCRIPTION.findall(listed):
+            described = Field(description=" ".join(said.split()))
+            cls.__annotations__[key] = Annotated[cls.__annotations__[key], described]
 
     @model_validator(mode="after")
     def _keeps_its_rules(self) -> Self:

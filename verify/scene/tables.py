@@ -43,27 +43,36 @@ class AtRest(Strict):
 
 
 class Equilibrium(Strict):
-    """Static equilibrium, at rest. Supports and loads have the first factor of their history."""
+    """Static equilibrium, at rest. Supports and loads have the first factor of their history.
+
+    Attributes
+    ----------
+    cuts
+        whether the cuts that open at the time 0 are open in it; closed: it is the equilibrium of
+        the uncut body
+    """
 
     kind: Literal["equilibrium"]
-    cuts: Literal["closed", "open"] = Field(
-        default="closed",
-        description="whether the cuts that open at the time 0 are open in it; closed: it is the "
-        "equilibrium of the uncut body",
-    )
+    cuts: Literal["closed", "open"] = "closed"
 
 
 class Moving(Strict):
-    """Undeformed, and moving as a rigid body."""
+    """Undeformed, and moving as a rigid body.
+
+    Attributes
+    ----------
+    velocity
+        translation, m/s; default none
+    spin
+        angular velocity, rad/s: a number in 2D, a vector in 3D
+    centre
+        point about which it spins, m; default the origin
+    """
 
     kind: Literal["moving"]
-    velocity: Vector | None = Field(default=None, description="translation, m/s; default none")
-    spin: Finite | Point3 | None = Field(
-        default=None, description="angular velocity, rad/s: a number in 2D, a vector in 3D"
-    )
-    centre: Vector | None = Field(
-        default=None, description="point about which it spins, m; default the origin"
-    )
+    velocity: Vector | None = None
+    spin: Finite | Point3 | None = None
+    centre: Vector | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda m: m.velocity is None and m.spin is None,
@@ -84,15 +93,19 @@ class Moving(Strict):
 
 
 class InitialField(Strict):
-    """Displacement and velocity by formulas, or of the exact solution at the time 0."""
+    """Displacement and velocity by formulas, or of the exact solution at the time 0.
+
+    Attributes
+    ----------
+    displacement
+        m, a number or a formula in x, y, z per component; or 'exact'
+    velocity
+        m/s, a number or a formula in x, y, z per component; or 'exact'
+    """
 
     kind: Literal["field"]
-    displacement: Components | Literal["exact"] | None = Field(
-        default=None, description="m, a number or a formula in x, y, z per component; or 'exact'"
-    )
-    velocity: Components | Literal["exact"] | None = Field(
-        default=None, description="m/s, a number or a formula in x, y, z per component; or 'exact'"
-    )
+    displacement: Components | Literal["exact"] | None = None
+    velocity: Components | Literal["exact"] | None = None
 
     rules: ClassVar[Rules] = (
         ("", lambda f: f.displacement is None and f.velocity is None,
@@ -171,13 +184,16 @@ class Row:
 
 
 class Contact(Strict):
-    """Contact of the faces of cuts: unilateral, without friction, of small sliding."""
+    """Contact of the faces of cuts: unilateral, without friction, of small sliding.
 
-    expected: Literal["none", "overlap", "closed"] = Field(
-        default="none",
-        description="none: an overlap of faces of cuts is warned of; overlap: the case means it; "
-        "closed: faces press on each other and do not overlap",
-    )
+    Attributes
+    ----------
+    expected
+        none: an overlap of faces of cuts is warned of; overlap: the case means it; closed: faces
+        press on each other and do not overlap
+    """
+
+    expected: Literal["none", "overlap", "closed"] = "none"
 
     @property
     def closed(self) -> bool:
@@ -186,20 +202,21 @@ class Contact(Strict):
 
 
 class Adequacy(Strict):
-    """Cheaper or richer models that are measured beside the verdict, which they do not move."""
+    """Cheaper or richer models that are measured beside the verdict, which they do not move.
 
-    kinematics: bool = Field(
-        default=False, description="linear kinematics against finite rotation, whichever is asked"
-    )
-    material: bool = Field(
-        default=False,
-        description="Hooke's law at finite rotation against neo-Hookean material, whichever is "
-        "asked",
-    )
-    motion: bool = Field(
-        default=False,
-        description="dynamic: the static answer under the last loads against the motion's end",
-    )
+    Attributes
+    ----------
+    kinematics
+        linear kinematics against finite rotation, whichever is asked
+    material
+        Hooke's law at finite rotation against neo-Hookean material, whichever is asked
+    motion
+        dynamic: the static answer under the last loads against the motion's end
+    """
+
+    kinematics: bool = False
+    material: bool = False
+    motion: bool = False
 
     @property
     def models(self) -> list[str]:
@@ -208,16 +225,36 @@ class Adequacy(Strict):
 
 
 class Pull(Strict):
-    """A hook in the material beside a cut, moved or loaded from some time on."""
+    """A hook in the material beside a cut, moved or loaded from some time on.
 
-    at: Vector = Field(description="where it grips, in the uncut body, m")
-    radius: Positive = Field(description="how far around it grips, m")
-    cut: str = Field(default="cut", description="name of the cut at whose edge it pulls")
-    side: Literal["positive", "negative"] = Field(description="on which side of the cut it grips")
-    displacement: Vector | None = Field(default=None, description="to where it moves, m; or force")
-    force: Vector | None = Field(default=None, description="to what it grows, N; or displacement")
-    begin: NonNegative = Field(description="s")
-    duration: Positive = Field(description="over which it grows, smoothly, s")
+    Attributes
+    ----------
+    at
+        where it grips, in the uncut body, m
+    radius
+        how far around it grips, m
+    cut
+        name of the cut at whose edge it pulls
+    side
+        on which side of the cut it grips
+    displacement
+        to where it moves, m; or force
+    force
+        to what it grows, N; or displacement
+    begin
+        s
+    duration
+        over which it grows, smoothly, s
+    """
+
+    at: Vector
+    radius: Positive
+    cut: str = "cut"
+    side: Literal["positive", "negative"]
+    displacement: Vector | None = None
+    force: Vector | None = None
+    begin: NonNegative
+    duration: Positive
 
     rules: ClassVar[Rules] = (
         ("", none_or_both("displacement", "force"), "a pull has either a displacement or a force"),
@@ -227,20 +264,26 @@ class Pull(Strict):
 
 
 class Replay(Strict):
-    """What `verify play` needs to know beyond the scene; of it only pulls are loads."""
+    """What `verify play` needs to know beyond the scene; of it only pulls are loads.
+
+    Attributes
+    ----------
+    visual
+        solids: about how many triangles the visual surface has; without it the surface of the
+        elements is shown
+    collision
+        solids: the same for the surface that tools touch
+    tool_radius
+        of the blade, for contact, m
+    tool_force
+        with which the blade drags the material that it touches, N
+    """
 
     pulls: list[Pull] = Field(default_factory=list)
-    visual: Count | None = Field(
-        default=None, description="solids: about how many triangles the visual surface has; "
-        "without it the surface of the elements is shown",
-    )  # fmt: skip
-    collision: Count | None = Field(
-        default=None, description="solids: the same for the surface that tools touch"
-    )
-    tool_radius: NonNegative = Field(default=0.0, description="of the blade, for contact, m")
-    tool_force: NonNegative = Field(
-        default=0.0, description="with which the blade drags the material that it touches, N"
-    )
+    visual: Count | None = None  # fmt: skip
+    collision: Count | None = None
+    tool_radius: NonNegative = 0.0
+    tool_force: NonNegative = 0.0
 
 
 def _strain_energy_only() -> list[Quantity]:
@@ -252,12 +295,24 @@ def _at_rest() -> Initial:
 
 
 class SceneTables(Strict):
-    """Tables of a case as they stand in its file; `Scene` is those that fit one another."""
+    """Tables of a case as they stand in its file; `Scene` is those that fit one another.
 
-    schema_: Literal[1] = Field(default=1, alias="schema", description="version of this schema")
-    title: Line = Field(description="one line")
-    requirement: Line = Field(description="what shall hold, in one sentence")
-    tags: list[Line] = Field(default_factory=list, description="e.g. demo, quick, heavy")
+    Attributes
+    ----------
+    schema_
+        version of this schema
+    title
+        one line
+    requirement
+        what shall hold, in one sentence
+    tags
+        e.g. demo, quick, heavy
+    """
+
+    schema_: Literal[1] = Field(default=1, alias="schema")
+    title: Line
+    requirement: Line
+    tags: list[Line] = Field(default_factory=list)
     geometry: Geometry
     mesh: MeshLevels
     material: Material

@@ -43,23 +43,30 @@ class ToolPathCut(CutShape):
 
     The positive side is left of the path in the plane; in space it is where (direction of motion)
     × (direction of the blade) points.
+
+    Attributes
+    ----------
+    points
+        points of the tip in order, m
+    times
+        when the tip is at each point, s, before 0 too; or a speed
+    speed
+        of the tip, m/s; or times
+    starts_at
+        with a speed: when the tip is at its first point, s; before 0 too
+    depth
+        3D: length of the blade, m
+    direction
+        3D: where the blade points from the tip; one direction, or one per point
     """
 
     kind: Literal["tool_path"]
-    points: list[Vector] = Field(min_length=2, description="points of the tip in order, m")
-    times: list[Finite] | None = Field(
-        default=None, description="when the tip is at each point, s, before 0 too; or a speed"
-    )
-    speed: Positive | None = Field(default=None, description="of the tip, m/s; or times")
-    starts_at: Finite = Field(
-        default=0.0,
-        description="with a speed: when the tip is at its first point, s; before 0 too",
-    )
-    depth: Positive | None = Field(default=None, description="3D: length of the blade, m")
-    direction: Point3 | Directions | None = Field(
-        default=None,
-        description="3D: where the blade points from the tip; one direction, or one per point",
-    )
+    points: list[Vector] = Field(min_length=2)
+    times: list[Finite] | None = None
+    speed: Positive | None = None
+    starts_at: Finite = 0.0
+    depth: Positive | None = None
+    direction: Point3 | Directions | None = None
     expected: Literal["through", "edge", "inner"] | None = None
 
     on_the_way: ClassVar[bool] = True
