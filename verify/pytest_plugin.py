@@ -23,7 +23,7 @@ import pytest
 
 if TYPE_CHECKING:
     from verify.result import CaseResult, SolveRecord, VerdictRecord
-    from verify.runner import Options
+    from verify.runner.selection import Options
     from verify.scene import Scene
 
 _OWN_FILES = "*.verify.toml"
@@ -109,8 +109,8 @@ class _Runs:
         return dict(zip(names, verdicts, strict=True)).get(name)
 
     def _options(self, scene: "Scene") -> "Options":
-        from verify.runner import Options
         from verify.runner.fingerprint import cache_folder
+        from verify.runner.selection import Options
 
         named = {name for c in scene.acceptance for name in (c.solver, c.compared)}
         # the default would run the conforming solver too, for the report that nobody reads here;
@@ -126,7 +126,8 @@ class _Runs:
         )
 
     def _run(self, source: str) -> "CaseResult":
-        from verify.runner import run_cases, select_cases
+        from verify.runner.run import run_cases
+        from verify.runner.selection import select_cases
         from verify.scene import load_scene
 
         scene = load_scene(source)

@@ -9,7 +9,9 @@ import pytest
 from verify.errors import RunStoppedError
 from verify.report import rendering
 from verify.report.rendering import render
-from verify.runner import Options, comparing, run_cases
+from verify.runner import comparing
+from verify.runner.run import run_cases
+from verify.runner.selection import Options
 from verify.scene import load_scene
 
 

@@ -19,8 +19,9 @@ from verify.result import (
     Verdict,
     VerdictRecord,
 )
-from verify.runner import exit_code, judging
+from verify.runner import judging
 from verify.runner.directory import MEASURED
+from verify.runner.run import exit_code
 from verify.runner.solve import solve_job
 from verify.scene import load_scene, scene_content
 from verify.solution import Solution

@@ -6,7 +6,7 @@ import pytest
 from test_case_file_faults import WHOLE
 
 from verify.errors import InputError
-from verify.runner import select_cases
+from verify.runner.selection import select_cases
 from verify.scene import load_scene, load_scenes, restore_scene, scene_content
 
 FAMILY = WHOLE.replace("young = 1e4", 'young = "1e4 * (1 + epsilon)"')

@@ -105,8 +105,8 @@ def export(
     cases
         name, pattern or file of a case
     """
-    from verify.runner import select_cases
     from verify.runner.references import write_bundle
+    from verify.runner.selection import select_cases
 
     scenes = select_cases(cases, None, "heavy")
     if not scenes:

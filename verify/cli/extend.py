@@ -47,7 +47,7 @@ def export(
     """  # fmt: skip
     from verify.exchange import export_case
     from verify.foreign.records import write_template
-    from verify.runner import select_cases
+    from verify.runner.selection import select_cases
 
     scenes = select_cases([case], weight="heavy")
     files = []
@@ -115,9 +115,9 @@ def import_(
     from verify.exchange import answers_of
     from verify.exchange.comparison import compare_answers
     from verify.report.rendering import render
-    from verify.runner import Options, select_cases
     from verify.runner.checking import check_solver_name
     from verify.runner.fingerprint import cache_folder
+    from verify.runner.selection import Options, select_cases
 
     for name in beside:
         check_solver_name(name, "--beside")

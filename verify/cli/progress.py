@@ -4,12 +4,11 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import Protocol, TextIO
+from typing import TextIO
 
 from verify.cli.streams import unfiltered
 from verify.printable import one_line
 from verify.result import COMPILING, FORECAST, LOG, CaseResult, SolveRecord, Status
-from verify.runner import Progress
 from verify.runner.comparing import comparison_label
 
 _FIRST, _LONGEST = 2.0, 60.0  # s of silence before the first line, and before any other
@@ -73,26 +72,10 @@ def waiting_reported(stream: TextIO, what: str) -> Iterator[None]:
         waiting.close()
 
 
-class ClosableProgress(Progress, Protocol):
-    """A progress display for other work than solves too, which can leave the screen."""
-
-    def doing(self, what: str) -> None:
-        """Note the work that begins, before or after the solves."""
-        ...
-
-    def say(self, text: str) -> None:
-        """Write a line."""
-        ...
-
-    def close(self) -> None:
-        """Stop drawing."""
-        ...
-
-
 @contextmanager
-def progress_on(stream: TextIO, expected: str = "") -> Iterator[ClosableProgress]:
+def progress_on(stream: TextIO, expected: str = "") -> Iterator["Lines"]:
     """Give bars if `stream` is a terminal, else lines; write `expected` as the work begins."""
-    display: ClosableProgress = (_Bars if stream.isatty() else _Lines)(stream, expected)
+    display = (_Bars if stream.isatty() else Lines)(stream, expected)
     try:
         yield display
     finally:
@@ -118,41 +101,66 @@ def _case_text(result: CaseResult) -> str:
     return f"{result.case}: {result.verdict if result.verdicts else 'not judged'}{warned}"
 
 
-class _Lines:
-    """One line per finished solve and case, and for waits."""
+class Lines:
+    """Progress of a run and of work beside it: a line per finished solve and case, and for waits."""
 
     def __init__(self, stream: TextIO, expected: str) -> None:
         self.expected, self.done, self.total = expected, 0, 0
         self.running: dict[str, float] = {}
-        self.waiting = Waiting(stream, lambda: _oldest(self.running))
-        self.say = self.waiting.say
+        self._open(stream)
 
     def doing(self, what: str) -> None:
+        """Note the work that begins, before or after the solves."""
         self.running = {what: monotonic()}
+        self._show()
 
     def planned(self, solves: int, cases: int) -> None:
-        if self.total:  # more or fewer than it seemed
-            self.total = solves
-            return
-        self.total, self.running = solves, {}
-        if self.expected:
-            self.say(self.expected)
-        self.say(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
+        """Note how much there is to do; as of `verify.runner.work.Progress`, like what follows."""
+        if not self.total:
+            self.running = {}
+            if self.expected:
+                self.say(self.expected)
+            self._begin(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
+        self.total = solves  # more or fewer than it seemed
+        self._show(total=solves + cases)
 
     def started(self, label: str) -> None:
+        """Note what begins."""
         self.running[label] = monotonic()
+        self._show()
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
+        """Say how a solve ended."""
         self.done += 1
         self.running.pop(label, None)
-        self.say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
+        self._say_solve(_solve_text(label, record, reused), record)
+        self._show(advance=1)
 
     def judged(self, result: CaseResult) -> None:
+        """Say how a case was judged."""
         self.running.pop(comparison_label(result.case), None)
         self.say(_case_text(result))
+        self._show(advance=1)
+
+    def say(self, text: str) -> None:
+        """Write a line."""
+        self._waiting.say(text)
 
     def close(self) -> None:
-        self.waiting.close()
+        """Say and draw no more."""
+        self._waiting.close()
+
+    def _open(self, stream: TextIO) -> None:
+        self._waiting = Waiting(stream, lambda: _oldest(self.running))
+
+    def _begin(self, text: str) -> None:
+        self.say(text)
+
+    def _say_solve(self, text: str, record: SolveRecord) -> None:
+        self.say(f"[{self.done}/{self.total}] {text}")
+
+    def _show(self, **change: int) -> None:
+        """Draw what has changed: nothing, but for bars."""
 
 
 def _oldest(running: dict[str, float]) -> str:
@@ -165,52 +173,24 @@ def _oldest(running: dict[str, float]) -> str:
     return f"{label} ({monotonic() - under_way[label]:.0f} s{more})"
 
 
-class _Bars:
+class _Bars(Lines):
     """A bar over the solves, with the one that runs now; failures above it."""
 
-    def __init__(self, stream: TextIO, expected: str) -> None:
+    def _open(self, stream: TextIO) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-        from rich.progress import Progress as RichProgress
-
-        columns = (
-            BarColumn(bar_width=30),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.description}", markup=False),
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
         )
-        self.bars = RichProgress(*columns, console=Console(file=unfiltered(stream)), transient=True)
-        self.expected = expected
-        self.running: dict[str, float] = {}
+
+        text = TextColumn("{task.description}", markup=False)
+        columns = (BarColumn(bar_width=30), MofNCompleteColumn(), TimeElapsedColumn(), text)
+        self.bars = Progress(*columns, console=Console(file=unfiltered(stream)), transient=True)
         self.task = self.bars.add_task("", total=None)
         self.bars.start()
-
-    def doing(self, what: str) -> None:
-        self.running = {what: monotonic()}
-        self._describe()
-
-    def planned(self, solves: int, cases: int) -> None:
-        if self.bars.tasks[self.task].total is None:
-            self.running = {}
-            if self.expected:
-                self.say(self.expected)
-        self.bars.update(self.task, total=solves + cases)
-        self._describe()
-
-    def started(self, label: str) -> None:
-        self.running[label] = monotonic()
-        self._describe()
-
-    def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
-        self.running.pop(label, None)
-        if record.status is not Status.SOLVED or "not end within" in record.notes.get(FORECAST, ""):
-            self.say(_solve_text(label, record, reused))
-        self._describe(1)
-
-    def judged(self, result: CaseResult) -> None:
-        self.running.pop(comparison_label(result.case), None)
-        self.say(_case_text(result))
-        self._describe(1)
 
     def close(self) -> None:
         self.bars.stop()
@@ -218,7 +198,14 @@ class _Bars:
     def say(self, text: str) -> None:
         self.bars.console.print(text, markup=False, highlight=False)
 
-    def _describe(self, advance: int = 0) -> None:
+    def _begin(self, text: str) -> None:
+        """Say nothing: the bar does."""
+
+    def _say_solve(self, text: str, record: SolveRecord) -> None:
+        if record.status is not Status.SOLVED or "not end within" in record.notes.get(FORECAST, ""):
+            self.say(text)
+
+    def _show(self, **change: int) -> None:
         oldest = min(self.running, key=lambda label: self.running[label], default="")
         more = f" (+{len(self.running) - 1})" if len(self.running) > 1 else ""
-        self.bars.update(self.task, description=f"{oldest}{more}", advance=advance)
+        self.bars.update(self.task, description=f"{oldest}{more}", **change)

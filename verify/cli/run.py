@@ -26,8 +26,8 @@ from verify.errors import InputError, RunStoppedError
 
 if TYPE_CHECKING:
     from verify.result import CaseResult
-    from verify.runner import Options
     from verify.runner.run import RunSummary
+    from verify.runner.selection import Options
     from verify.scene import Scene
 
 
@@ -140,8 +140,8 @@ def run(
             raise ModuleNotFoundError("No module named 'numba'", name="numba")
         start_server()  # it loads while this process does
     from verify.cli.run_text import costs_of, run_line, suites_line
-    from verify.runner import select_cases
     from verify.runner.run import NOTHING_RAN
+    from verify.runner.selection import select_cases
 
     names, parameters = _solvers_of(asked)
     weight = "quick" if asked.quick else "heavy" if asked.heavy else "normal"
@@ -173,7 +173,7 @@ def say_results(
     """Print what came out of judged cases; return the exit code."""
     from verify.cli.run_text import verdict_lines
     from verify.report.answers import answers
-    from verify.runner import exit_code
+    from verify.runner.run import exit_code
 
     code = exit_code(results, strict)
     if as_json:
@@ -211,8 +211,8 @@ def _solvers_of(asked: RunOptions) -> tuple[list[str], dict[str, dict[str, Any]]
 def _options(
     asked: RunOptions, names: list[str], parameters: dict[str, dict[str, Any]]
 ) -> "Options":
-    from verify.runner import Options
     from verify.runner.fingerprint import cache_folder
+    from verify.runner.selection import Options
     from verify.solvers.interface import one_name
 
     return Options(
@@ -237,7 +237,7 @@ def _solved(
     """Solve, rank and render; return the exit code of a run that was stopped."""
     from verify.cli.progress import progress_on
     from verify.cli.ranking import rank_run
-    from verify.runner import run_cases
+    from verify.runner.run import run_cases
 
     beside = not asked.no_report and options.jobs > 1 and len(scenes) > 1
     with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:

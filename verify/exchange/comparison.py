@@ -14,7 +14,6 @@ from verify.errors import InputError
 from verify.exchange.export import Answers
 from verify.files import read_json
 from verify.result import CaseResult, SolveRecord, Status
-from verify.runner import Options, Progress, run_cases
 from verify.runner.directory import (
     Job,
     RunDirectory,
@@ -23,6 +22,9 @@ from verify.runner.directory import (
     store_record,
 )
 from verify.runner.fingerprint import digest_of, file_digest
+from verify.runner.run import run_cases
+from verify.runner.selection import Options
+from verify.runner.work import Progress
 from verify.scene import Scene
 from verify.solution import Solution, write_solution
 from verify.solvers import solver_names

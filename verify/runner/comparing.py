@@ -6,9 +6,8 @@ costs one solve its verdicts, and no other. One process draws all judged cases, 
 what draws takes longer to import than most cases to be drawn.
 """
 
-import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,56 +23,28 @@ LEAST_SECONDS = 60.0
 
 
 class Comparison:
-    """The comparison of the solves in `folders` with the truth.
+    """The comparison of solves with the truth.
 
     Parameters
     ----------
     scene : Scene
-    key : str
-        What identifies the comparison.
-    judge_only : sequence of str
-        Solvers that are judged; empty: all.
-    folders : sequence of Path
-        Of the solves.
-    models : mapping of str to sequence of Path
-        Of the reference's solves of other models.
     folder : Path
         Of the case.
-    root : Path
-        Run directory.
-    origin : dict
-        Provenance of the run.
+    question : dict
+        What `verify.runner.judging` is asked: the ``key`` that identifies the comparison, the
+        solvers that are judged (``judge_only``; none: all), the run directory (``root``), folders
+        in it of the solves and of those of other ``models``, and the ``provenance`` of the run.
     timeout, memory : float
         Limits, s and bytes.
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        key: str,
-        judge_only: Sequence[str],
-        folders: Sequence[Path],
-        models: Mapping[str, Sequence[Path]],
-        folder: Path,
-        root: Path,
-        origin: dict[str, Any],
-        timeout: float,
-        memory: float,
+        self, scene: Scene, folder: Path, question: dict[str, Any], timeout: float, memory: float
     ) -> None:
-        self.scene, self._folder, self._folders = scene, folder, list(folders)
-        self._timeout, self._memory = max(timeout, LEAST_SECONDS), memory
+        self._scene, self._folder = scene, folder
+        self._limits = max(timeout, LEAST_SECONDS), memory
         self._unfit: dict[str, str] = {}
-        self._question: dict[str, Any] = {
-            "key": key,
-            "judge_only": list(judge_only),
-            "folders": [os.path.relpath(one, root) for one in folders],
-            "models": {
-                name: [os.path.relpath(one, root) for one in own] for name, own in models.items()
-            },
-            "root": str(root.resolve()),
-            "provenance": origin,
-            "unfit": self._unfit,
-        }
+        self._question = {**question, "unfit": self._unfit}
         self._child = self._started()
 
     def poll(self) -> CaseResult | None:
@@ -94,10 +65,10 @@ class Comparison:
         question = self._folder / "judge.json"
         write_json(self._question, question)
         log = self._folder / "judge-log.txt"
-        return Child("verify.runner.judging", question, log, self._timeout, self._memory, own=True)
+        return Child("verify.runner.judging", question, log, *self._limits, own=True)
 
     def _without_result(self, ending: Ending) -> CaseResult | None:
-        _, why = death(self._child.log, ending, self._timeout, self._memory)
+        _, why = death(self._child.log, ending, *self._limits)
         try:
             at = (self._folder / JUDGING).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
@@ -108,8 +79,9 @@ class Comparison:
             return None
         reason, origin = f"{COMPARISON_FAILED}: {why}", self._question["provenance"]
         judged = self._question["judge_only"]
-        solves = [load_record(folder) for folder in self._folders]
-        result = result_without_verdicts(self.scene, solves, reason, origin, judged)
+        root = Path(self._question["root"])
+        solves = [load_record(root / folder) for folder in self._question["folders"]]
+        result = result_without_verdicts(self._scene, solves, reason, origin, judged)
         write_json(result.content(), self._folder / "result.json")
         return result
 
@@ -146,15 +118,10 @@ class Drawings:
     """
 
     def __init__(
-        self,
-        folder: Path | None,
-        cases: Sequence[str],
-        directory: RunDirectory,
-        timeout: float,
-        memory: float,
+        self, folder: Path | None, cases: Sequence[str], directory: RunDirectory, *limits: float
     ) -> None:
         self._folder, self._cases, self._directory = folder, list(cases), directory
-        self._timeout, self._memory = max(timeout, LEAST_SECONDS), memory
+        self._timeout, self._memory = max(limits[0], LEAST_SECONDS), limits[1]
         self.waiting: list[str] = []
         self.running: list[Path] = []  # the question that is being answered
         self._child: Child | None = None
@@ -162,8 +129,8 @@ class Drawings:
     def prepare(self) -> None:
         """Have the process that draws load what it needs."""
         if self._folder is not None and self._child is None:
-            log, limits = self._folder / "log.txt", (self._timeout, self._memory)
-            self._child = Child("verify.report.rendering", self._folder, log, *limits, own=True)
+            places = self._folder, self._folder / "log.txt", self._timeout, self._memory
+            self._child = Child("verify.report.rendering", *places, own=True)
 
     def ask(self, case: str) -> None:
         """Have a judged case drawn when there is room."""

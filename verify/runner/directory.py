@@ -223,13 +223,11 @@ def stored_record(job: Job) -> SolveRecord | None:
     try:
         content = read_json(job.folder / "record.json")
         record = _stored(content, job.folder)
-        files = content["files"]
-        whole = files and all(file_digest(job.folder / n) == d for n, d in files.items())
-    except (InputError, OSError, KeyError, TypeError, AttributeError):
+        check_files(job.folder)
+    except InputError:
         return None
-    if content.get("key") == job.key and record.status is Status.SOLVED and whole:
-        return record
-    return None
+    own = content.get("key") == job.key and record.status is Status.SOLVED
+    return record if own and content.get("files") else None
 
 
 def solution_files(folder: Path) -> list[Path]:

@@ -19,34 +19,10 @@ from verify.processes import memory_limit
 from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.fingerprint import code_of_solver
-from verify.scene import MeshFile, mesh_path, restore_scene
+from verify.scene import MeshFile, restore_scene
 from verify.solvers.interface import is_built_in
 
 _CONNECT_SECONDS, _LOOK_SECONDS = 15.0, 1.0
-
-
-class LocalEngine:
-    """Child processes of this one.
-
-    Parameters
-    ----------
-    width : int
-        Processes at the same time.
-    timeout : float
-        Wall seconds of each.
-    memory : float
-        Bytes of resident memory of each.
-    """
-
-    def __init__(self, width: int, timeout: float, memory: float) -> None:
-        self.width, self._timeout, self._memory = width, timeout, memory
-
-    def start(self, job: dict[str, Any], folder: Path) -> Child:
-        """Start the solve that ``job.json`` in `folder` describes, whose content is `job`."""
-        return solving(job, folder, self._timeout, self._memory)
-
-    def close(self) -> None:
-        """Do nothing: all processes have ended or were killed."""
 
 
 def solving(
@@ -107,16 +83,10 @@ class ClusterEngine:
     def start(self, job: dict[str, Any], folder: Path) -> "RemoteSolve":
         """Submit a solve."""
         scene = restore_scene(job["scene"])
-        mesh = mesh_path(scene).read_bytes() if isinstance(scene.geometry, MeshFile) else None
-        future = self._client.submit(
-            solve_remotely,
-            job,
-            mesh,
-            code_of_solver(job["solver"]),
-            self._timeout,
-            self._memory,
-            pure=False,
-        )
+        body = scene.geometry
+        mesh = body.path.read_bytes() if isinstance(body, MeshFile) else None
+        code, limits = code_of_solver(job["solver"]), (self._timeout, self._memory)
+        future = self._client.submit(solve_remotely, job, mesh, code, *limits, pure=False)
         return RemoteSolve(future, folder)
 
     def close(self) -> None:

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 from verify.files import read_json, write_whole
 from verify.provenance import DISTRIBUTIONS, versions
-from verify.scene import MeshFile, Scene, mesh_path
+from verify.scene import MeshFile, Scene
 from verify.solvers.interface import module_of, program_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -41,8 +41,7 @@ _OFFERED = ("solvers", "xfem", "accelerated", "methods", "exchange")
 
 def digest_of(content: Any) -> str:
     """Return a short hash of plain values."""
-    text = json.dumps(content, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+    return bytes_digest(json.dumps(content, sort_keys=True).encode())
 
 
 def bytes_digest(data: bytes) -> str:
@@ -76,7 +75,7 @@ def physics_digest(scene: Scene) -> str:
         # its default was another: what was stored under no word is what opened late
         content.append({"opening": scene.analysis.opening})
     if isinstance(scene.geometry, MeshFile):
-        content.append(file_digest(mesh_path(scene)))
+        content.append(file_digest(scene.geometry.path))
     if scene.exact is not None:
         content += _registered_source(scene.exact.solution)
     return digest_of(content)
@@ -169,11 +168,11 @@ class Sources:
         outside = {name.partition(".")[0] for m in found for name in self._source(m).imports}
         content = [
             {name: self._source(name).digest for name in sorted(found)},
-            {path.relative_to(self.root).as_posix(): _sha(path) for path in self._data(found)},
+            {one.relative_to(self.root).as_posix(): file_digest(one) for one in self._data(found)},
             _versions(outside),
         ]
         self._remember()
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+        return digest_of(content)
 
     def closure(self, *modules: str) -> set[str]:
         """Return the modules that modules depend on, themselves included.
@@ -273,7 +272,7 @@ def _parsed(text: bytes, package: str) -> Source:
         if isinstance(node, _WITH_DOCSTRING) and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
     imports = sorted(set(_imports(tree, package)))
-    return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:24], imports)
+    return Source(bytes_digest(ast.dump(tree).encode()), imports)
 
 
 def _imports(tree: ast.AST, package: str) -> Iterator[str]:
@@ -310,10 +309,6 @@ def _data_files(folder: Path) -> Iterator[Path]:
                 yield from _data_files(path)
         elif path.suffix not in (".py", ".pyc"):
             yield path
-
-
-def _sha(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:24]
 
 
 def _versions(names: Iterable[str]) -> dict[str, str]:

@@ -34,7 +34,6 @@ from verify.scene import Scene
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 ALL_PASS = 0
 VERDICT_FAILED = 1
-BAD_INPUT = 2
 SOLVER_FAILED = 3
 NOTHING_RAN = 4
 ONLY_WARNINGS = 5

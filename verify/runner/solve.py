@@ -89,7 +89,7 @@ def _leave_traceback() -> None:
 
 
 def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict[str, Any]:
-    from verify.provenance import compile_times
+    from verify.provenance import calibration_note, compile_times
     from verify.scene import restore_scene
     from verify.solution import checked_solution, write_solution
     from verify.solvers import find_solver
@@ -124,7 +124,8 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         "peak_memory": peak_memory(),  # of the solve: eigenvalues come after it
         "notes": {
             **solution.notes,
-            **(_beside(solver, scene, job, solution.unknowns or 0) if timed else {}),
+            **({"calibration": calibration_note()} if timed else {}),
+            **(_critical_step(solver, scene, job, solution.unknowns or 0) if timed else {}),
             **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
     }
@@ -152,16 +153,6 @@ def _conforms(solution: Any, scene: Any, level: int) -> bool:
     lower, upper = np.asarray(scene.geometry.lower), np.asarray(scene.geometry.upper)
     layers = (corners - lower) / (upper - lower) * counts
     return bool(np.abs(layers - np.rint(layers)).max() > 1e-9)
-
-
-def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
-    """Note the speed of the machine and the critical step, measured after a solve."""
-    from verify.provenance import calibration_note
-
-    return {
-        "calibration": calibration_note(),
-        **_critical_step(solver, scene, job, unknowns),
-    }
 
 
 def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:

@@ -27,7 +27,7 @@ from verify.runner.directory import (
     store_record,
     stored_record,
 )
-from verify.runner.engines import ClusterEngine, LocalEngine, RemoteSolve
+from verify.runner.engines import ClusterEngine, RemoteSolve, solving
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.plan import (
     CasePlan,
@@ -149,7 +149,7 @@ class Work:
         self.memory = memory_limit(options.memory, side_by_side)
         limits = options.timeout, self.memory
         self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
-        self.engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
+        self.cluster = cluster
 
     def until_done(self, check: Callable[[], None]) -> list[CaseResult]:
         """Run everything; kill what runs if that fails, or if `check`, called in turn, raises."""
@@ -178,7 +178,8 @@ class Work:
             for comparison in self.comparing:
                 comparison.kill()
             self.drawings.kill()
-            self.engine.close()
+            if self.cluster is not None:
+                self.cluster.close()
         return [self.results[name] for name in self.plans]
 
     def _say_plan(self) -> None:
@@ -201,13 +202,17 @@ class Work:
         """Whether something can be started: solves run where the engine is, all else here."""
         if self._has_room_here():
             return True
-        beside = 0 if self.options.cluster else len(self.comparing) + len(self.drawings.running)
-        return bool(self.waiting) and len(self.running) + beside < self.engine.width
+        if self.cluster is not None:
+            return bool(self.waiting) and len(self.running) < self.cluster.width
+        return bool(self.waiting) and self._here() < self.options.jobs
 
     def _has_room_here(self) -> bool:
-        here = len(self.comparing) + len(self.drawings.running)
-        here += 0 if self.options.cluster else len(self.running)
-        return bool(self.to_judge or self.drawings.waiting) and here < self.options.jobs
+        return bool(self.to_judge or self.drawings.waiting) and self._here() < self.options.jobs
+
+    def _here(self) -> int:
+        """Count the processes that run here."""
+        solves = 0 if self.options.cluster else len(self.running)
+        return solves + len(self.comparing) + len(self.drawings.running)
 
     def _prepare(self, plan: CasePlan) -> None:
         folder = self.directory.case_folder(plan.scene.name)
@@ -241,16 +246,16 @@ class Work:
             "level": job.level,
             "repetitions": job.repetitions,
             "parameters": job.parameters,
-            "ranks": self._ranks(job),
+            "ranks": self.options.ranks if job.solver == REFERENCE else 1,
             "tell_levels": not (job.level or job.model),
         }
         write_json(content, job.folder / "job.json")
-        self.running[self.engine.start(content, job.folder)] = job
+        if self.cluster is not None:
+            solve: Running = self.cluster.start(content, job.folder)
+        else:
+            solve = solving(content, job.folder, self.options.timeout, self.memory)
+        self.running[solve] = job
         self.progress.started(job.label)
-
-    def _ranks(self, job: Job) -> int:
-        """MPI ranks of a solve: several for references, else one."""
-        return self.options.ranks if job.solver == REFERENCE else 1
 
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""
@@ -310,8 +315,11 @@ class Work:
         if note := self._contention():
             record.notes["timing"] = note
         if record.status in (Status.FAILED, Status.TIMEOUT, Status.MEMORY):
-            record.notes[LOG] = os.path.relpath(child.log, self.directory.root)
+            record.notes[LOG] = self._relative(child.log)
         return record
+
+    def _relative(self, path: Path) -> str:
+        return os.path.relpath(path, self.directory.root)
 
     def _contention(self) -> str:
         if self.options.cluster:
@@ -382,22 +390,20 @@ class Work:
             self._case_done(result)
             return
         self.drawings.prepare()
-        comparison = Comparison(
-            plan.scene,
-            key,
-            judge_only,
-            folders,
-            {
-                model: [j.folder for j in plan.models if j.model == model]
-                for model in plan.other_scenes
-            },
-            folder,
-            self.directory.root,
-            self.origin,
-            self.options.timeout,
-            self.memory,
-        )
-        self.comparing.append(comparison)
+        models = {
+            model: [self._relative(one.folder) for one in plan.models if one.model == model]
+            for model in plan.other_scenes
+        }
+        question = {
+            "key": key,
+            "judge_only": list(judge_only),
+            "folders": list(map(self._relative, folders)),
+            "models": models,
+            "root": str(self.directory.root.resolve()),
+            "provenance": self.origin,
+        }
+        limits = self.options.timeout, self.memory
+        self.comparing.append(Comparison(plan.scene, folder, question, *limits))
         self.progress.started(comparison_label(case))
 
     def _case_done(self, result: CaseResult) -> None:

@@ -83,8 +83,8 @@ def load_scene(source: str | Path) -> Scene:
         several rows and none is named.
     """
     scenes = load_scenes(source)
-    if len(scenes) > 1:
-        rows = f"it has {len(scenes)} rows; name one, e.g. '{source}{_label(scenes[0])}'"
+    if len(scenes) > 1 and scenes[0].row is not None:
+        rows = f"it has {len(scenes)} rows; name one, e.g. '{source}{scenes[0].row.label}'"
         raise InputError(rows, str(source))
     return scenes[0]
 
@@ -159,13 +159,9 @@ def _scene(row: Row | None, content: dict[str, Any], file: Path, name: str, path
         text = f"its numbers cannot be computed with ({words_of(error)})"
         raise InputError(text, where) from None
     scene.came_from(file, f"{name}{row.label if row else ''}", row)
-    if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
+    if isinstance(scene.geometry, MeshFile) and not scene.geometry.path.is_file():
         raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", where)
     return scene
-
-
-def _label(scene: Scene) -> str:
-    return scene.row.label if scene.row else ""
 
 
 def _the_row(
@@ -231,12 +227,6 @@ def restore_scene(content: dict[str, Any]) -> Scene:
     return scene
 
 
-def mesh_path(scene: Scene) -> Path:
-    """Absolute path of the mesh file of a scene whose geometry is one."""
-    assert isinstance(scene.geometry, MeshFile)
-    return scene.geometry.path
-
-
 def read_mesh(scene: Scene, level: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Read nodes (n, d), m, and cells (m, k) of a scene whose geometry is a mesh file.
 
@@ -267,7 +257,7 @@ def scene_hash(scene: Scene) -> str:
     )
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     if isinstance(scene.geometry, MeshFile):
-        digest.update(mesh_path(scene).read_bytes())
+        digest.update(scene.geometry.path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -19,10 +19,12 @@ from verify.files import plain, write_json, write_whole
 from verify.printable import csv_text
 from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status, Verdict
-from verify.runner import Options, Progress, run_cases
 from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import cache_folder, digest_of
+from verify.runner.run import run_cases
+from verify.runner.selection import Options
 from verify.runner.tasks import Limits, Task, made
+from verify.runner.work import Progress
 from verify.scene import Scene
 from verify.solution import Solution, read_solution
 
