@@ -139,27 +139,19 @@ def _description(scene: "Scene") -> str:
         ("measured", [_keys(quantity) for quantity in scene.quantities]),
         ("judged by", [_judge(scene)]),
         ("accepted if", [_demand(check) for check in scene.acceptance] or ["nothing is judged"]),
-        (
-            "known",
-            [
-                f"{f.check} of {f.metric} fails with {f.solver}: {f.reason}"
-                for f in scene.known_findings
-            ],
-        ),
+        ("known", [_known(finding) for finding in scene.known_findings]),
         ("hash", [scene_hash(scene)]),
     ]
     lines = [scene.name, scene.title, "", textwrap.fill(scene.requirement, 92), ""]
     for name, entries in parts:
-        for i, entry in enumerate(entries):
-            lines.append(
-                textwrap.fill(
-                    entry,
-                    92,
-                    initial_indent=f"{name if i == 0 else '':<12}",
-                    subsequent_indent=" " * 14,
-                )
-            )
+        for head, entry in zip([name, *[""] * len(entries)], entries, strict=False):
+            indents = {"initial_indent": f"{head:<12}", "subsequent_indent": " " * 14}
+            lines.append(textwrap.fill(entry, 92, **indents))
     return "\n".join(lines)
+
+
+def _known(finding: Any) -> str:
+    return f"{finding.check} of {finding.metric} fails with {finding.solver}: {finding.reason}"
 
 
 def _size(scene: "Scene") -> list[str]:
@@ -279,14 +271,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
-    from verify.runner.mesh_faults import (
-        body_notes,
-        inner_warning,
-        mesh_warning,
-        pieces_warning,
-        unit_warning,
-        unused_groups,
-    )
+    from verify.runner.mesh_faults import body_notes, mesh_warnings
     from verify.scene import load_scenes
 
     try:
@@ -294,17 +279,16 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         for scene in scenes:
             check_scene(scene)
     except InputError as error:
-        error_row = {"title": None, "error": one_line(error), "body": ""}
-        return {"file": file, **error_row, "notes": [], "warnings": [], "cost": []}
+        blank = {"body": "", "notes": [], "warnings": [], "cost": []}
+        return {"file": file, "title": None, "error": one_line(error), **blank}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
-    warnings = (mesh_warning, pieces_warning, unit_warning, inner_warning, unused_groups)
     return {
         "file": file,
         "title": f"{scenes[0].title}{rows}",
         "error": None,
         "body": body_text(scenes[0]),
         "notes": body_notes(scenes[0]),
-        "warnings": [said for say in warnings if (said := say(scenes[0]))],
+        "warnings": mesh_warnings(scenes[0]),
         "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
     }
 
@@ -452,14 +436,10 @@ def _compile(as_json: bool) -> int:
     print(f"{use.kernels} compilations in {use.wall:.1f} s, {whole:.1f} s of processor time")
     if whole > 0.0:
         print("\nseconds  module")
-    for name, seconds in _by_module(use.seconds).items():
+    by_module = Counter[str]()
+    for kernel, spent in use.seconds.items():
+        by_module[kernel.partition(":")[0]] += spent  # type: ignore[assignment]
+    for name, seconds in by_module.most_common():
         if seconds >= 0.05:
             print(f"{seconds:7.1f}  {name}")
     return 0
-
-
-def _by_module(seconds: dict[str, float]) -> dict[str, float]:
-    found: Counter[str] = Counter()
-    for kernel, spent in seconds.items():
-        found[kernel.partition(":")[0]] += spent  # type: ignore[assignment]
-    return dict(found.most_common())

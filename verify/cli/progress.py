@@ -102,7 +102,7 @@ def _case_text(result: CaseResult) -> str:
 
 
 class Lines:
-    """Progress of a run and of work beside it: a line per finished solve and case, and for waits."""
+    """Progress of a run and of work beside it: a line per finished solve, case, and for waits."""
 
     def __init__(self, stream: TextIO, expected: str) -> None:
         self.expected, self.done, self.total = expected, 0, 0

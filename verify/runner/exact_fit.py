@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from verify.compare.hooke import law_of
 from verify.errors import InputError
-from verify.geometry.simplices import distance_to_pieces, measures, unit_normals
+from verify.geometry.simplices import distance_to_pieces, measures, on_simplices, unit_normals
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at
@@ -26,6 +25,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 _FACETS, _CELLS, _FACES = 400, 400, 40  # most samples of the boundary, the body, a cut
+_ROUND_OFF = 1e-12  # of the body: of a point on a facet
 _BESIDE = 1e-6  # of an element or of the body: on the side meant, and nowhere else
 
 
@@ -73,15 +73,7 @@ def in_body(mesh: SimplexMesh, rng: np.random.Generator) -> Array:
 
 def holds(mesh: SimplexMesh, points: Array) -> Bools:
     """Whether each of the points (n, d) lies in the body."""
-    corners = mesh.points[mesh.cells]
-    middle = corners.mean(axis=1)
-    reach = np.linalg.norm(corners - middle[:, None], axis=2).max()
-    found = np.zeros(len(points), dtype=bool)
-    for i, cells in enumerate(cKDTree(middle).query_ball_point(points, reach)):
-        edges = (corners[cells, 1:] - corners[cells, :1]).transpose(0, 2, 1)
-        share = np.linalg.solve(edges, (points[i] - corners[cells, 0])[:, :, None])[:, :, 0]
-        found[i] = bool(((share >= 0.0).all(axis=1) & (share.sum(axis=1) <= 1.0)).any())
-    return found
+    return on_simplices(points, mesh.points[mesh.cells], _ROUND_OFF * mesh.extent)
 
 
 def on_cut(cut: Any, steps: Array, rng: np.random.Generator) -> OnCut:

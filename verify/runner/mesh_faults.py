@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
@@ -76,10 +78,9 @@ def mesh_warning(scene: Scene) -> str:
 
 def body_notes(scene: Scene) -> list[str]:
     """Say what was done to the mesh of a file, and list its groups with measure and extent."""
-    if not isinstance(scene.geometry, MeshFile):
+    if not isinstance(given := scene.geometry, MeshFile):
         return []
-    body, used = scene.geometry.body(), _used_groups(scene)
-    said = _done_to_the_mesh(scene)
+    body, used, said = given.body(), _used_groups(scene), _done_to_the_mesh(scene, given)
     for name, group in body.groups.items():
         parts = {**group.parts, **({0: body.points[body.cells[group.cells]]} if len(group.cells)
                                    else {})}  # fmt: skip
@@ -95,16 +96,19 @@ def body_notes(scene: Scene) -> list[str]:
         box = " × ".join(f"[{low:.3g}, {high:.3g}]" for low, high in ends)
         unused = "" if name in used else " (unused)"
         said.append(f"{GROUP}{name}: {', '.join(words)}, in {box} m{unused}")
-    return [*said, *filter(None, [wave_time(scene)])]
+    return [*said, *filter(None, [_wave_time(scene, given)])]
 
 
-def pieces_warning(scene: Scene) -> str:
-    """Warn of a body of a mesh file in pieces that share no facet, or say ""."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def mesh_warnings(scene: Scene) -> list[str]:
+    """Warn of all that makes the body of a mesh file another than meant."""
+    if not isinstance(body := scene.geometry, MeshFile):
+        return []
+    said = (_pieces, _unit, _inner, _unused)
+    return list(filter(None, [mesh_warning(scene), *(one(scene, body) for one in said)]))
 
-    if not isinstance(scene.geometry, MeshFile):
-        return ""
+
+def _pieces(scene: Scene, body: MeshFile) -> str:
+    """Warn of a body in pieces that share no facet, or say ""."""
     points, cells = read_mesh(scene)
     facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
     _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
@@ -116,17 +120,15 @@ def pieces_warning(scene: Scene) -> str:
     least = np.bincount(piece).argmin()
     own = cells[piece == least]
     return (
-        f"'{scene.geometry.file}' is in {count} pieces that share no facet, "
+        f"'{body.file}' is in {count} pieces that share no facet, "
         f"the least of {len(own)} cells around {_at(points[own].mean(axis=(0, 1)))}"
     )
 
 
-def unit_warning(scene: Scene) -> str:
-    """Warn of a body of a mesh file that would hang longer than twice its size, or say ""."""
-    if not isinstance(scene.geometry, MeshFile) or scene.material.density is None:
-        return ""
+def _unit(scene: Scene, body: MeshFile) -> str:
+    """Warn of a body that would hang longer than twice its size, or say ""."""
     pulls = [np.linalg.norm(one.acceleration) for one in scene.loads if isinstance(one, Gravity)]
-    size, material = scene.geometry.body().size, scene.material
+    size, material = body.body().size, scene.material
     stretch = sum(pulls) * (material.density or 0.0) * size / (2.0 * material.young)
     if stretch <= 1.0:
         return ""
@@ -136,31 +138,27 @@ def unit_warning(scene: Scene) -> str:
     )
 
 
-def wave_time(scene: Scene) -> str:
-    """Say how long a shear wave takes through the body of a mesh file, its slowest natural time."""
+def _wave_time(scene: Scene, body: MeshFile) -> str:
+    """Say how long a shear wave takes through the body, its slowest natural time, or ""."""
     material = scene.material
-    if not isinstance(scene.geometry, MeshFile) or material.density is None:
+    if material.density is None:
         return ""
     shear = material.young / (2.0 * (1.0 + material.poisson))
-    time = scene.geometry.body().size * np.sqrt(material.density / shear)
+    time = body.body().size * np.sqrt(material.density / shear)
     return f"a shear wave crosses the body in {time:.3g} s"
 
 
-def unused_groups(scene: Scene) -> str:
-    """Warn of groups of a mesh file that its case does not use, or say ""."""
-    if not isinstance(scene.geometry, MeshFile):
-        return ""
-    left = [name for name in scene.geometry.body().groups if name not in _used_groups(scene)]
+def _unused(scene: Scene, body: MeshFile) -> str:
+    """Warn of groups that the case does not use, or say ""."""
+    left = [name for name in body.body().groups if name not in _used_groups(scene)]
     if not left:
         return ""
     names = ", ".join(f"'{name}'" for name in left[:_LISTED]) + (", …" if left[_LISTED:] else "")
-    return f"groups of '{scene.geometry.file}' that the case does not use: {names}"
+    return f"groups of '{body.file}' that the case does not use: {names}"
 
 
-def inner_warning(scene: Scene) -> str:
+def _inner(scene: Scene, body: MeshFile) -> str:
     """Warn of a group, at which a support or traction acts, of which much is no boundary, or ""."""
-    if not isinstance(scene.geometry, MeshFile):
-        return ""
     skin = _Skin(*read_mesh(scene))
     boundary = skin.points[skin.facets]
     acting = {f"supports[{i}]": one.where for i, one in enumerate(scene.supports)}
@@ -168,9 +166,9 @@ def inner_warning(scene: Scene) -> str:
                if isinstance(one, Traction)}  # fmt: skip
     said = []
     for key, where in acting.items():
-        if not scene.geometry.is_part(where) or scene.geometry.holds_inside(where):
+        if not body.is_part(where) or body.holds_inside(where):
             continue
-        group = scene.geometry.body().group(where.removeprefix(GROUP))
+        group = body.body().group(where.removeprefix(GROUP))
         if 1 in group.parts:
             nodes = group.parts[1][:, 0]
             away = cKDTree(boundary.reshape(-1, scene.dimension)).query(nodes)[0]
@@ -180,7 +178,7 @@ def inner_warning(scene: Scene) -> str:
                     "left out"
                 )
         elif boundary.shape[1] in group.parts:
-            pieces = pieces_on_part(scene.geometry, where, boundary)
+            pieces = pieces_on_part(body, where, boundary)
             on = measures(boundary) @ pieces.covered(len(boundary))
             inside = 1.0 - on / measures(group.parts[boundary.shape[1]]).sum()
             if inside > _INSIDE:
@@ -198,17 +196,17 @@ def _used_groups(scene: Scene) -> set[str]:
 
 def mesh_notices(scene: Scene) -> list[Notice]:
     """Return the warnings of a mesh file and what was done to it, for the record of a case."""
-    said = filter(None, [mesh_warning(scene), unit_warning(scene), inner_warning(scene)])
-    notices = [Notice(NoticeKind.WARNING, "mesh file", None, text) for text in said]
-    if isinstance(scene.geometry, MeshFile):
-        done = _done_to_the_mesh(scene)
-        notices += [Notice(NoticeKind.ADEQUACY, "mesh file", None, note) for note in done]
-    return notices
+    if not isinstance(body := scene.geometry, MeshFile):
+        return []
+    said = {
+        NoticeKind.WARNING: [mesh_warning(scene), _unit(scene, body), _inner(scene, body)],
+        NoticeKind.ADEQUACY: _done_to_the_mesh(scene, body),
+    }
+    return [Notice(kind, "mesh file", None, x) for kind, texts in said.items() for x in texts if x]
 
 
-def _done_to_the_mesh(scene: Scene) -> list[str]:
-    assert isinstance(scene.geometry, MeshFile)
-    notes = list(scene.geometry.body().notes)
+def _done_to_the_mesh(scene: Scene, body: MeshFile) -> list[str]:
+    notes = list(body.body().notes)
     if times := scene.mesh.refine:
         notes.append(
             f"levels are refined uniformly up to {times} times; a curved boundary stays as the "
@@ -244,8 +242,6 @@ class _Skin:
 
     def coincident(self) -> Ints:
         """Pairs (p, 2) of nodes of the skin at one place."""
-        from scipy.spatial import cKDTree
-
         if not len(self.nodes):
             return np.zeros((0, 2), dtype=np.int64)
         tree = cKDTree(self.points[self.nodes])
@@ -253,8 +249,6 @@ class _Skin:
 
     def unjoined(self) -> tuple[Ints, Ints]:
         """Nodes that lie on a facet of which they are no corner, and nodes close before one."""
-        from scipy.spatial import cKDTree
-
         if not len(self.facets):
             return self.facets, self.facets
         corners = self.points[self.facets]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import boundary_facets, on_simplices
+from verify.geometry.simplices import boundary_facets, on_simplices, oriented
 from verify.read_mesh import RawMesh, base_of, dimension_of, read_raw
 from verify.scene.strict import nearest
 
@@ -334,10 +334,7 @@ def _oriented(points: Array, cells: Ints, where: str) -> tuple[Ints, int]:
         at = ", ".join(f"{x:.6g}" for x in points[cells[flat[0]]].mean(axis=0))
         text = f"{flat.size} cells without volume, first cell {flat[0]} at ({at})"
         raise InputError(text, where)
-    cells = cells.copy()
-    negative = volume < 0
-    cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
-    return cells, int(negative.sum())
+    return oriented(points, cells), int((volume < 0).sum())
 
 
 def _refuse_overlaps(points: Array, cells: Ints, oriented: bool, where: str) -> None:

@@ -12,13 +12,12 @@ part, so that the energy under a load rises from level to level.
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
-from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import feet, nearest_parts
+from verify.geometry.simplices import feet, measures, nearest_parts
 from verify.result import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.regions import Side, comparisons, is_affine, parse_region
@@ -259,7 +258,7 @@ def _off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
     corners = simplices.shape[1]
     pairs = combinations(range(corners), 2)
     lengths = [np.linalg.norm(simplices[:, i] - simplices[:, j], axis=1) for i, j in pairs]
-    width = lengths[0] if corners == 2 else _double_areas(simplices) / np.max(lengths, axis=0)
+    width = 2.0 * measures(simplices) / np.max(lengths, axis=0) if corners == 3 else lengths[0]
     narrow = np.flatnonzero(width <= _STRIP * size)
     if not len(narrow):
         return points
@@ -276,12 +275,6 @@ def _off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
         distinct = np.unique(np.round(ways, 6), axis=0)
         points[row] += 2.0 * _STRIP * size * distinct.sum(axis=0)
     return points
-
-
-def _double_areas(triangles: Array) -> Array:
-    one, other = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    gram = np.sum(one**2, axis=1) * np.sum(other**2, axis=1) - np.sum(one * other, axis=1) ** 2
-    return np.sqrt(np.maximum(gram, 0.0))
 
 
 def _ridges(boundary: Array) -> Array:
@@ -353,9 +346,7 @@ def held_facets(
     facet = np.arange(len(corners)) if facet is None else facet
     pieces = pieces_on_part(geometry, where, corners, boundary)
     k, size = corners.shape[1], size_of(boundary)
-    edges = corners[:, 1:] - corners[:, :1]
-    gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
-    measure = np.sqrt(np.maximum(gram, 0.0)) / factorial(k - 1)
+    measure = measures(corners)
     lengths = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(k)]
     of_facet = np.bincount(facet, measure)
     covered = np.bincount(facet, measure * pieces.covered(len(corners)))
@@ -375,16 +366,9 @@ def held_facets(
 
 def shifted_ends(found: list[HeldFacets], size: float) -> list[Regularisation]:
     """Report by how much supports hold more than their parts; `size` is the element size, m."""
-    count, shift = (
-        sum(len(one.ended) for one in found),
-        max((one.shift for one in found), default=0.0),
-    )
-    if not count:
-        return []
-    return [
-        Regularisation(END_OF_SUPPORT, count, shift, "m"),
-        Regularisation(END_OF_SUPPORT, count, shift / size, "h"),
-    ]
+    count, shift = sum(len(one.ended) for one in found), max((x.shift for x in found), default=0.0)
+    sizes = {"m": shift, "h": shift / size} if count else {}
+    return [Regularisation(END_OF_SUPPORT, count, one, unit) for unit, one in sizes.items()]
 
 
 def held_nodes(

@@ -25,20 +25,36 @@ _Term = Callable[[_Variables], tuple[Any, Any]]  # the value, and its derivative
 _LONGEST = 2000  # characters
 _COORDINATES = ("x", "y", "z")
 _TIME = "t"
-_ARITHMETIC = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
 _COMPARISONS = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
 }
-_FUNCTIONS = {"abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "hypot": np.hypot}
+# by operator or name: the value, and its derivative from values and derivatives of what it is of
+_Rule = tuple[Callable[..., Any], Callable[..., Any]]
+_UNARY: dict[type | str, _Rule] = {
+    ast.UAdd: (operator.pos, lambda a, da: da),
+    ast.USub: (operator.neg, lambda a, da: -da),
+    "abs": (np.abs, lambda a, da: _product(np.sign(a), da)),
+    "sqrt": (np.sqrt, lambda a, da: _product(0.5 / np.sqrt(a), da)),
+    "sin": (np.sin, lambda a, da: _product(np.cos(a), da)),
+    "cos": (np.cos, lambda a, da: _product(-np.sin(a), da)),
+}
+_BINARY: dict[type | str, _Rule] = {
+    ast.Add: (operator.add, lambda a, b, da, db: da + db),
+    ast.Sub: (operator.sub, lambda a, b, da, db: da - db),
+    ast.Mult: (operator.mul, lambda a, b, da, db: _product(b, da) + _product(a, db)),
+    ast.Div: (
+        operator.truediv, lambda a, b, da, db: _product(1 / b, da) - _product(a / b**2, db)
+    ),
+    ast.Pow: (
+        operator.pow,
+        lambda a, b, da, db: _product(b * a ** (b - 1), da) + _product(np.log(a) * a**b, db),
+    ),
+    "hypot": (np.hypot, lambda a, b, da, db: _product(1 / np.hypot(a, b), a * da + b * db)),
+}  # fmt: skip
+_FUNCTIONS = [name for name in (*_UNARY, *_BINARY) if isinstance(name, str)]
 #: names that mean something in a formula
 RESERVED_NAMES = {*_COORDINATES, *_FUNCTIONS, "t", "pi", "and", "or", "not"}
 _MEANING = (
@@ -286,6 +302,7 @@ def _number(node: ast.AST, language: _Language) -> _Term:
     The function gives the value, and its derivative by the time (forward differentiation).
     """
     still = np.float64(0.0)
+    key: Any
     match node:
         case ast.Constant(value=int() | float() as value) if (
             not isinstance(value, bool) and abs(value) <= 1e300
@@ -295,63 +312,26 @@ def _number(node: ast.AST, language: _Language) -> _Term:
             return lambda at: (np.float64(np.pi), still)
         case ast.Name(id=name) if name in language.names:
             return lambda at: (at[name], np.float64(name == _TIME))
-        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return _number(operand, language)
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            inner = _number(operand, language)
+        case ast.UnaryOp(op=op, operand=operand):
+            key, parts = type(op), [operand]
+        case ast.BinOp(left=left, op=op, right=right):
+            key, parts = type(op), [left, right]
+        case ast.Call(func=ast.Name(id=key), args=parts, keywords=[]):
+            pass
+        case _:
+            raise language.fault(node)
+    table = {1: _UNARY, 2: _BINARY}.get(len(parts), {})
+    if key not in table:
+        raise language.fault(node)
+    terms, (value_of, rate_of) = [_number(part, language) for part in parts], table[key]
 
-            def negative(at: _Variables) -> tuple[Any, Any]:
-                a, da = inner(at)
-                return -a, -da
+    def applied(at: _Variables) -> tuple[Any, Any]:
+        values, rates = zip(*(term(at) for term in terms), strict=True)
+        return value_of(*values), rate_of(*values, *rates)
 
-            return negative
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
-            one, other = _number(left, language), _number(right, language)
-            value_of, rate_of = _ARITHMETIC[type(op)], _RATES[type(op)]
-
-            def combined(at: _Variables) -> tuple[Any, Any]:
-                (a, da), (b, db) = one(at), other(at)
-                return value_of(a, b), rate_of(a, da, b, db)
-
-            return combined
-        case ast.Call(func=ast.Name(id="hypot"), args=[left, right], keywords=[]):
-            one, other = _number(left, language), _number(right, language)
-
-            def length(at: _Variables) -> tuple[Any, Any]:
-                (a, da), (b, db) = one(at), other(at)
-                return np.hypot(a, b), _product(1 / np.hypot(a, b), a * da + b * db)
-
-            return length
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in _SLOPES:
-            inner, slope = _number(argument, language), _SLOPES[name]
-
-            def applied(at: _Variables) -> tuple[Any, Any]:
-                a, da = inner(at)
-                return _FUNCTIONS[name](a), _product(slope(a), da)
-
-            return applied
-    raise language.fault(node)
+    return applied
 
 
 def _product(slope: Any, rate: Any) -> Any:
     """Chain rule; what stands still has no rate, even where the slope is infinite."""
     return np.where(rate == 0.0, 0.0, slope * rate)
-
-
-def _power_rate(a: Any, da: Any, b: Any, db: Any) -> Any:
-    return _product(b * a ** (b - 1), da) + _product(np.log(a) * a**b, db)
-
-
-_RATES: dict[type, Callable[[Any, Any, Any, Any], Any]] = {
-    ast.Add: lambda a, da, b, db: da + db,
-    ast.Sub: lambda a, da, b, db: da - db,
-    ast.Mult: lambda a, da, b, db: _product(b, da) + _product(a, db),
-    ast.Div: lambda a, da, b, db: _product(1 / b, da) - _product(a / b**2, db),
-    ast.Pow: _power_rate,
-}
-_SLOPES: dict[str, Callable[[Any], Any]] = {
-    "abs": np.sign,
-    "sqrt": lambda a: 0.5 / np.sqrt(a),
-    "sin": np.cos,
-    "cos": lambda a: -np.sin(a),
-}

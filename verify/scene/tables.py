@@ -33,6 +33,7 @@ from verify.scene.strict import (
 )
 from verify.scene.tool_path import Cut
 
+Array = NDArray[np.float64]
 _LARGEST = 30.0  # of a velocity like r^-½: a tip less than 1/1000 of a cell away
 
 
@@ -80,7 +81,7 @@ class Moving(Strict):
         ("", lambda m: m.centre is not None and m.spin is None, "centre belongs to a spin"),
     )  # fmt: skip
 
-    def velocities(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def velocities(self, points: Array) -> Array:
         """Velocity (n, d) of points (n, d), m/s."""
         n, d = points.shape
         velocity = np.tile(np.asarray(self.velocity or (0.0,) * d, dtype=float), (n, 1))
@@ -112,9 +113,7 @@ class InitialField(Strict):
          "an initial field needs a displacement, a velocity, or both"),
     )  # fmt: skip
 
-    def state(
-        self, points: NDArray[np.float64], near: NDArray[np.float64], exact: Any
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def state(self, points: Array, near: Array, exact: Any) -> tuple[Array, Array]:
         """Displacement and velocity (n, d) of points (n, d), m and m/s.
 
         Parameters
@@ -140,9 +139,7 @@ class InitialField(Strict):
         return fields[0], fields[1]
 
 
-def _bounded(
-    values: NDArray[np.float64], beside: NDArray[np.float64], points: NDArray[np.float64], name: str
-) -> NDArray[np.float64]:
+def _bounded(values: Array, beside: Array, points: Array, name: str) -> Array:
     """Refuse values (n, d) that stand out from all of those beside the points."""
     size = np.linalg.norm(values, axis=1)
     most = _LARGEST * float(np.linalg.norm(beside, axis=1).max(initial=0.0))
@@ -286,14 +283,6 @@ class Replay(Strict):
     tool_force: NonNegative = 0.0
 
 
-def _strain_energy_only() -> list[Quantity]:
-    return [StrainEnergyQuantity(kind="strain_energy")]
-
-
-def _at_rest() -> Initial:
-    return AtRest(kind="rest")
-
-
 class SceneTables(Strict):
     """Tables of a case as they stand in its file; `Scene` is those that fit one another.
 
@@ -322,11 +311,11 @@ class SceneTables(Strict):
     cuts: list[Cut] = Field(default_factory=list)
     contact: Contact = Field(default_factory=Contact)
     analysis: Analysis = Field(default_factory=Analysis)
-    initial: Initial = Field(default_factory=_at_rest)
+    initial: Initial = Field(default_factory=lambda: AtRest(kind="rest"))
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
     replay: Replay | None = None
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
-        default_factory=_strain_energy_only
+        default_factory=lambda: [StrainEnergyQuantity(kind="strain_energy")]
     )
     acceptance: list[Acceptance] = Field(default_factory=list)
     known_findings: list[KnownFinding] = Field(default_factory=list)

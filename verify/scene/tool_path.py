@@ -30,6 +30,7 @@ from verify.scene.cuts import (
 )
 from verify.scene.strict import Finite, Point3, Positive, Rules, Vector, none_or_both
 
+Array = NDArray[np.float64]
 _SAME = 1e-9  # of a length: two this close are one
 _IN_PLANE = "belongs to a path in space; the points are plane"
 _IN_SPACE = "missing; in space the blade has a depth and a direction"
@@ -102,12 +103,12 @@ class ToolPathCut(CutShape):
         return len(self.points[0])
 
     @property
-    def moments(self) -> NDArray[np.float64]:
+    def moments(self) -> Array:
         """(n,) when the tip is at each point, in s."""
         if self.times is not None:
             return np.array(self.times, dtype=float)
         assert self.speed is not None
-        steps = np.linalg.norm(np.diff(np.array(self.points, dtype=float), axis=0), axis=1)
+        steps = np.linalg.norm(np.diff(self._tips(), axis=0), axis=1)
         return self.starts_at + np.concatenate([[0.0], np.cumsum(steps)]) / self.speed
 
     @property
@@ -121,7 +122,7 @@ class ToolPathCut(CutShape):
         return float(self.moments[-1])
 
     @property
-    def blade(self) -> NDArray[np.float64]:
+    def blade(self) -> Array:
         """(n, 3) vector from the tip to the other end of the blade at each point, in m."""
         directions = self._directions()
         lengths = np.linalg.norm(directions, axis=1, keepdims=True)
@@ -129,7 +130,7 @@ class ToolPathCut(CutShape):
         return np.broadcast_to(blade, (len(self.points), 3)).copy()
 
     @property
-    def travel(self) -> NDArray[np.float64]:
+    def travel(self) -> Array:
         """(n,) way of the blade up to each point, m: of the end that goes farther."""
         tips, blades = self._tips(), self._blades()
         moves = [np.linalg.norm(np.diff(end, axis=0), axis=1) for end in (tips, tips + blades)]
@@ -141,9 +142,9 @@ class ToolPathCut(CutShape):
         lasting = np.diff(self.moments) > 0.0
         return float(np.max(np.diff(self.travel)[lasting] / np.diff(self.moments)[lasting]))
 
-    def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
+    def vertices(self, spacing: float | None = None) -> Array:
         """Points (n, d) of the tip, each once; `spacing` does not matter to straight segments."""
-        tips = np.array(self.points, dtype=float)
+        tips = self._tips()
         moves = np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.0
         return tips[np.concatenate([[True], moves])]
 
@@ -175,7 +176,7 @@ class ToolPathCut(CutShape):
         """
         moments, ends = self.moments, np.hstack([self._tips(), self._blades()])
 
-        def at(time: float) -> tuple[int, NDArray[np.float64]]:
+        def at(time: float) -> tuple[int, Array]:
             k = int(np.searchsorted(moments, time, side="right"))
             if not 0 < k < len(moments):
                 return k, ends[:0]
@@ -188,9 +189,7 @@ class ToolPathCut(CutShape):
             return None
         return self._made(*np.hsplit(way, 2))
 
-    def _made(
-        self, tips: NDArray[np.float64], blades: NDArray[np.float64]
-    ) -> PolylineCut | SweptCut | PolygonCut:
+    def _made(self, tips: Array, blades: Array) -> PolylineCut | SweptCut | PolygonCut:
         """Return the cut that a blade sweeps from place to place, tips and blades (n, d)."""
         shared: dict[str, Any] = {"name": self.name, "expected": self.expected}
         moved = np.append(True, np.diff(tips, axis=0).any(axis=1))
@@ -211,7 +210,7 @@ class ToolPathCut(CutShape):
                 "expected a blade that keeps its direction, or sweeps a plane"
             ) from None
 
-    def passed_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def passed_at(self, points: Array) -> Array:
         """Give the times (n,) in s at which the blade is first at points (n, d) of the cut, in m.
 
         A point off the cut has the time of the nearest place that the search finds on it.
@@ -230,20 +229,18 @@ class ToolPathCut(CutShape):
             times = np.where(closer, reached, times)
         return times
 
-    def _blades(self) -> NDArray[np.float64]:
+    def _blades(self) -> Array:
         """Blade (n, d) of any dimension; in the plane it is a point."""
         return self.blade if self.dimension == 3 else np.zeros((len(self.points), 2))
 
-    def _tips(self) -> NDArray[np.float64]:
+    def _tips(self) -> Array:
         return np.array(self.points, dtype=float)
 
-    def _directions(self) -> NDArray[np.float64]:
+    def _directions(self) -> Array:
         return np.array(self.direction, dtype=float).reshape(-1, 3)
 
 
-def _place_in_patch(
-    points: NDArray[np.float64], tips: NDArray[np.float64], blades: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _place_in_patch(points: Array, tips: Array, blades: Array) -> tuple[Array, Array]:
     """Share (n,) of a move at which the blade is nearest to points, and its distance (n,) then.
 
     The move sweeps tip(s) + r · blade(s), both linear in s, with s and r from 0 to 1.
@@ -267,11 +264,11 @@ def _place_in_patch(
     return s, np.linalg.norm(points - place, axis=1)
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _dot(a: Array, b: Array) -> Array:
     return np.einsum("nd,nd->n", a, b)
 
 
-def _distinct(points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+def _distinct(points: list[Array]) -> list[Array]:
     """Leave out points that repeat the one before them, round and round."""
     pairs = zip(points, [points[-1], *points], strict=False)
     return [point for point, before in pairs if (point != before).any()]
