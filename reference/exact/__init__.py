@@ -2,5 +2,3 @@
 
 from reference.exact.catalogue import exact_of, exact_solution, exact_solution_names
 from reference.exact.solution import ExactSolution
-
-__all__ = ["ExactSolution", "exact_of", "exact_solution", "exact_solution_names"]

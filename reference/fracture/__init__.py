@@ -25,24 +25,3 @@ from reference.fracture.tips import (
     tip_at,
     tips,
 )
-
-__all__ = [
-    "CircularFront",
-    "DomainError",
-    "Front",
-    "FrontCoordinates",
-    "FrontIntensity",
-    "StraightFront",
-    "StressIntensity",
-    "Tip",
-    "front_at",
-    "front_intensity",
-    "front_reach",
-    "no_tip",
-    "station_count",
-    "station_spacing",
-    "stress_intensity",
-    "stress_of",
-    "tip_at",
-    "tips",
-]

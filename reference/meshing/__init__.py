@@ -11,19 +11,3 @@ from reference.meshing.imprint import (
 )
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.session import Grading, background_mesh, clear_radii, singular_points
-
-__all__ = [
-    "ConformingMesh",
-    "Grading",
-    "Realised",
-    "background_mesh",
-    "clear_radii",
-    "conforming_mesh",
-    "imprint",
-    "imprint_facets",
-    "imprint_polygons",
-    "open_cut",
-    "singular_points",
-    "structured_tetrahedra",
-    "structured_triangles",
-]

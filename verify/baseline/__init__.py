@@ -8,19 +8,3 @@ uncertainty); only a hand that edits the file can move it.
 from verify.baseline.checking import Row, VerdictChange, check_run, exit_code_of, verdict_changes
 from verify.baseline.record import Baseline, FinishedRun, read_baseline, read_run, write_baseline
 from verify.baseline.updating import Move, save_run, update_from
-
-__all__ = [
-    "Baseline",
-    "FinishedRun",
-    "Move",
-    "Row",
-    "VerdictChange",
-    "check_run",
-    "exit_code_of",
-    "read_baseline",
-    "read_run",
-    "save_run",
-    "update_from",
-    "verdict_changes",
-    "write_baseline",
-]

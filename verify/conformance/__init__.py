@@ -2,5 +2,3 @@
 
 from verify.conformance.check import CheckResult, State
 from verify.conformance.suite import conform, exit_code_of
-
-__all__ = ["CheckResult", "State", "conform", "exit_code_of"]

@@ -8,16 +8,3 @@
 from verify.exchange.export import Answers, ProgramSolver, answers_of, export_case, read_answers
 from verify.exchange.paraview import export_fields
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
-
-__all__ = [
-    "Answers",
-    "HeldNodes",
-    "Load",
-    "Problem",
-    "ProgramSolver",
-    "answers_of",
-    "export_case",
-    "export_fields",
-    "problem_of",
-    "read_answers",
-]

@@ -7,13 +7,3 @@ their own Python and import nothing of this package.
 
 from verify.foreign.installing import ForeignProgram, install, remove, state_of
 from verify.foreign.records import ForeignSolver, foreign_solver, foreign_solvers
-
-__all__ = [
-    "ForeignProgram",
-    "ForeignSolver",
-    "foreign_solver",
-    "foreign_solvers",
-    "install",
-    "remove",
-    "state_of",
-]

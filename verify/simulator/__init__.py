@@ -3,7 +3,3 @@
 from verify.simulator.quality import Quality, quality_of
 from verify.simulator.session import PHASES, Session, StepRecord
 from verify.simulator.stage import Hold, Hook, Stage, stage_of
-
-__all__ = [
-    "PHASES", "Hold", "Hook", "Quality", "Session", "Stage", "StepRecord", "quality_of", "stage_of",
-]  # fmt: skip
