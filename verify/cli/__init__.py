@@ -15,7 +15,6 @@ from verify.files import DISK_FAILURES
 from verify.printable import one_line
 from verify.processes import pin_to_one_thread
 
-
 _EXAMPLES = """\
 examples:
   verify list                                 the cases that come with the project

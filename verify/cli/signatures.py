@@ -247,8 +247,7 @@ def _add_argument(command: Any, parameter: Parameter, said: Arg) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Call the command that was asked for, and return its exit code."""
-    code: int = _called(arguments.command, arguments)
-    return code
+    return _called(arguments.command, arguments)
 
 
 def _called(target: Callable[..., Any], arguments: argparse.Namespace) -> Any:

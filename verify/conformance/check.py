@@ -211,7 +211,5 @@ def weight_imbalance(solution: Solution, weight: Array, law: Hooke) -> float:
 
 def _quadratic_mean(u: Array, corners: int) -> Array:
     if corners == 3:
-        plane: Array = u[:, 3:].mean(axis=1)
-        return plane
-    space: Array = -u[:, :4].sum(axis=1) / 20 + u[:, 4:].sum(axis=1) / 5
-    return space
+        return u[:, 3:].mean(axis=1)
+    return -u[:, :4].sum(axis=1) / 20 + u[:, 4:].sum(axis=1) / 5

@@ -94,16 +94,9 @@ def export_case(
             folder.mkdir(parents=True, exist_ok=True)
             for name, problem in problems.items():
                 files += _write_problem(problem, folder, name)
-        background = problems["mesh"]
-        entries.append(
-            {
-                "level": level,
-                "folder": folder.name,
-                "size": background.size,
-                "nodes": len(background.points),
-                "cells": len(background.cells),
-            }
-        )
+        background, entry = problems["mesh"], {"level": level, "folder": folder.name}
+        counts = {"nodes": len(background.points), "cells": len(background.cells)}
+        entries.append({**entry, "size": background.size, **counts})
     with asked_place(out):
         if scene.cuts:
             _write_cuts(scene, out / "cuts.vtu")

@@ -234,18 +234,10 @@ def problem_of(
     cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))
     if conforming and scene.cuts:
         boundary, cut_facets = _opened(scene, level, boundary)
-    return Problem(
-        scene=scene,
-        level=level,
-        size=size,
-        points=boundary.points,
-        cells=boundary.cells,
-        boundary=boundary.corners,
-        conforming=conforming,
-        cut_facets=cut_facets,
-        held=[_held(scene, boundary, i, conforming, exact) for i in range(len(scene.supports))],
-        loads=[_load(scene, boundary, i, conforming, exact) for i in range(len(scene.loads))],
-    )
+    held = [_held(scene, boundary, i, conforming, exact) for i in range(len(scene.supports))]
+    loads = [_load(scene, boundary, i, conforming, exact) for i in range(len(scene.loads))]
+    mesh = boundary.points, boundary.cells, boundary.corners
+    return Problem(scene, level, size, *mesh, conforming, cut_facets, held, loads)
 
 
 def _opened(scene: Scene, level: int, background: Boundary) -> tuple[Boundary, Array]:

@@ -166,11 +166,9 @@ class Watched[Found](Protocol):
 
     def poll(self) -> Found | None:
         """Look once; return how it ended, or what it found."""
-        ...
 
     def kill(self) -> None:
         """End it."""
-        ...
 
 
 def watch_all[Found](

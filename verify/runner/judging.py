@@ -7,7 +7,7 @@ solves that were compared.
 
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from shutil import rmtree
@@ -49,6 +49,7 @@ from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
 
+_Solutions = dict[str, dict[int, Solution]]  # by solver and level
 _WILD = 1e3  # sizes of its body: a solution that moves farther has no openings to look at
 
 
@@ -122,14 +123,14 @@ class _Measurements:
 
 def _stored(
     root: Path, folders: Sequence[str], unfit: Mapping[str, str], at: Path
-) -> tuple[list[SolveRecord], dict[str, dict[int, Solution]], dict[tuple[str, int], str]]:
+) -> tuple[list[SolveRecord], _Solutions, dict[tuple[str, int], str]]:
     """Read records and solutions; a solution that cannot be read is a failed solve.
 
     Each folder is written into the file `at` before its solution is read. The third that is
     returned is the folder by solver and level.
     """
     records: list[SolveRecord] = []
-    solutions: dict[str, dict[int, Solution]] = {}
+    solutions: _Solutions = {}
     for name in folders:
         write_whole(at, name)
         record = load_record(root / name)
@@ -169,17 +170,13 @@ def _adequacy(
 
 
 def _with_openings(
-    result: CaseResult,
-    scene: Scene,
-    solutions: dict[str, dict[int, Solution]],
-    exact: Any,
-    announce: Callable[[SolveRecord], None],
+    result: CaseResult, scene: Scene, solutions: _Solutions, *rest: Any
 ) -> CaseResult:
     """Add openings and overlaps; if a guest's fail, of built-in solvers alone."""
     own = {name: one for name, one in solutions.items() if is_built_in(name)}
     for given in (solutions, own):
         try:
-            return with_openings(result, scene, given, exact, announce)
+            return with_openings(result, scene, given, *rest)
         except Exception as error:
             traceback.print_exc()
             text = f"cannot be had: {words_of(error)}"
@@ -188,9 +185,7 @@ def _with_openings(
     return result
 
 
-def _comparable(
-    result: CaseResult, solutions: dict[str, dict[int, Solution]]
-) -> dict[str, dict[int, Solution]]:
+def _comparable(result: CaseResult, solutions: _Solutions) -> _Solutions:
     """Leave out the solutions that could not be compared, or move out of all proportion."""
     fit = {
         (s.solver, s.level)
@@ -210,11 +205,7 @@ def _is_wild(solution: Solution) -> bool:
 
 
 def _error_pictures(
-    result: CaseResult,
-    scene: Scene,
-    solutions: dict[str, dict[int, Solution]],
-    exact: Any,
-    folder: Path,
+    result: CaseResult, scene: Scene, solutions: _Solutions, exact: Any, folder: Path
 ) -> dict[str, Path]:
     """Write the error field of the finest solution of each solver, if there is a reference."""
     body = body_of(scene)

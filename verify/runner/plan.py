@@ -182,16 +182,11 @@ def plan_case(
         parameters = parameters_of(name, options.parameters)
         code = [code_of_solver(name), found[name].source]
         physics = judging if name == REFERENCE else asked
-        given = [physics, name, level, options.repetitions, parameters, code]
-        return Job(
-            case=scene.name,
-            solver=name,
-            level=level,
-            repetitions=options.repetitions,
-            key=kept.key(scene, level) if kept and name == REFERENCE else digest_of(given),
-            folder=directory.solve_folder(scene.name, name, level),
-            parameters=parameters,
-        )
+        repetitions, folder = options.repetitions, directory.solve_folder(scene.name, name, level)
+        key = digest_of([physics, name, level, repetitions, parameters, code])
+        if kept and name == REFERENCE:
+            key = kept.key(scene, level)
+        return Job(scene.name, name, level, repetitions, key, folder, parameters)
 
     within = None if kept else options.within
     plan = CasePlan(scene, solvers, job_of, bundle=kept, within=within, coarser=coarser)
@@ -275,19 +270,11 @@ def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]
         except UnsupportedSceneError:  # the comparison says so
             continue
         scenes[model] = other
-        physics = reference_digest(other)
-        jobs += [
-            Job(
-                case=scene.name,
-                solver=REFERENCE,
-                level=level,
-                repetitions=1,
-                key=digest_of([physics, REFERENCE, level, 1, {}, code_of_solver(REFERENCE)]),
-                folder=folder / f"{REFERENCE}_{model}-{level}",
-                model=model,
-            )
-            for level in range(other.reference.levels)
-        ]
+        physics, code = reference_digest(other), code_of_solver(REFERENCE)
+        for level in range(other.reference.levels):
+            key = digest_of([physics, REFERENCE, level, 1, {}, code])
+            place = folder / f"{REFERENCE}_{model}-{level}"
+            jobs.append(Job(scene.name, REFERENCE, level, 1, key, place, model=model))
     return jobs, scenes
 
 

@@ -100,19 +100,15 @@ class Progress(Protocol):
 
     def planned(self, solves: int, cases: int) -> None:
         """Report how much there is to do; repeated when that changes."""
-        ...
 
     def started(self, label: str) -> None:
         """Report that a solve or a comparison begins."""
-        ...
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         """Report that a solve ended."""
-        ...
 
     def judged(self, result: CaseResult) -> None:
         """Report that a case is compared and judged."""
-        ...
 
 
 class Work:

@@ -231,8 +231,7 @@ def _bisected(pieces: Pieces, i: Ints, j: Ints, share: Array) -> Pieces:
 def _normal_projections(corners: Array) -> Array:
     """Projections (q, d, d) onto the normal space of simplices (q, k, d)."""
     along = np.linalg.qr(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))[0]
-    projections: Array = np.eye(corners.shape[2]) - along @ np.swapaxes(along, 1, 2)
-    return projections
+    return np.eye(corners.shape[2]) - along @ np.swapaxes(along, 1, 2)
 
 
 def _joined(pieces: Pieces, on: NDArray[np.bool_], count: int) -> Pieces:
@@ -293,8 +292,7 @@ def _ridges(boundary: Array) -> Array:
     _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     facet = np.repeat(np.arange(count), k)
     turn = 1.0 - np.abs(np.sum(directions[facet] * directions[facet[first[place.ravel()]]], axis=1))
-    edges: Array = ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
-    return edges
+    return ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
 
 
 # ----------------------------------------------------------------------------------- supports

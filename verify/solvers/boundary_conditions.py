@@ -64,8 +64,7 @@ class Boundary:
         cell, opposite = self.facets.T
         on_facet = np.ones((len(cell), self.cells.shape[1]), dtype=bool)
         on_facet[np.arange(len(cell)), opposite] = False
-        corners: _Ints = self.cells[cell][on_facet].reshape(len(cell), self.cells.shape[1] - 1)
-        return corners
+        return self.cells[cell][on_facet].reshape(len(cell), self.cells.shape[1] - 1)
 
     @cached_property
     def nodes(self) -> _Ints:
@@ -75,8 +74,7 @@ class Boundary:
     @cached_property
     def places(self) -> _Floats:
         """Corners (b, k, d) of each facet, m."""
-        places: _Floats = self.points[self.corners]
-        return places
+        return self.points[self.corners]
 
     def loaded(self, scene: Scene, where: str, key: str) -> Pieces:
         """Find pieces of the facets that lie on the part `where` of a scene, on which a load acts.
@@ -118,8 +116,7 @@ class Boundary:
         else:
             normals = np.cross(edges[:, 0], np.cross(edges[:, 0], outward))
         normals *= np.where(np.einsum("qc,qc->q", normals, outward) < 0.0, -1.0, 1.0)[:, None]
-        unit: _Floats = normals / np.linalg.norm(normals, axis=1)[:, None]
-        return unit
+        return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def no_facet(scene: Scene, where: str, key: str) -> InputError:

@@ -211,7 +211,10 @@ def _solve(
         return _solution(scene, space, record, fields, size)
 
     def made(level: int) -> tuple[ConformingMesh, float, int]:
-        return *_shared(comm, lambda: make_mesh(level)), level
+        if comm is None:
+            return *make_mesh(level), level
+        # on the first rank, for all
+        return *comm.bcast(make_mesh(level) if comm.rank == 0 else None), level
 
     # a trial on the coarsest mesh compiles the forms
     return repeated(repetitions, lambda: made(level), run, lambda: made(0))
@@ -223,16 +226,6 @@ def _comm() -> Any:
 
     ranks, _ = all_ranks()
     return ranks if ranks.size > 1 else None
-
-
-def _shared(
-    comm: Any, make_mesh: Callable[[], tuple[ConformingMesh, float]]
-) -> tuple[ConformingMesh, float]:
-    """Make a mesh on the first rank, for all."""
-    if comm is None:
-        return make_mesh()
-    shared: tuple[ConformingMesh, float] = comm.bcast(make_mesh() if comm.rank == 0 else None)
-    return shared
 
 
 def _equilibrium(

@@ -86,6 +86,7 @@ def natural_step(scene: Scene, size: float) -> float:
     return size / wave_speed(scene.material)
 
 
+@dataclass(eq=False)
 class TiedMotion:
     """A body on a mesh with all its cuts, tied where they are closed: a `timeline.Mover`.
 
@@ -109,25 +110,23 @@ class TiedMotion:
         If a support or load acts nowhere.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        space: ConformingSpace,
-        exact: Any,
-        marching: Marching,
-        record: Record,
-        comm: Any,
-        pressure: bool,
-    ) -> None:
-        self.scene, self.space, self.exact = scene, space, exact
-        self.comm, self.marching, self.record = comm, marching, record
+    scene: Scene
+    space: ConformingSpace
+    exact: Any
+    marching: Marching
+    record: Record
+    comm: Any
+    pressure: bool
+
+    def __post_init__(self) -> None:
+        scene, space, marching, record = self.scene, self.space, self.marching, self.record
         self.timeline = timeline_of(scene, kinks=True)
-        pressure = pressure and scene.analysis.kinematics == "linear"
+        pressure = self.pressure and scene.analysis.kinematics == "linear"
         self.unknowns = MIXED if pressure else "displacement"
         phases = ("loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
         with record.timed("loading"):
-            self.body = MovingBody(scene, space, exact, pressure)
+            self.body = MovingBody(scene, space, self.exact, pressure)
             self.facing = facing_nodes(space)
             swept = marching.opening == "swept"
             self.opening = facet_openings(scene, space, self.facing, swept, marching.delay)

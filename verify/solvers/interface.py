@@ -64,11 +64,9 @@ class Solver(Protocol):
 
     def refuses(self, scene: Scene) -> str | None:
         """Say why this solver cannot do `scene`, in one sentence, or None if it can."""
-        ...
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels on which it can solve `scene`."""
-        ...
 
     def solve(self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any) -> Solution:
         """Solve `scene` on mesh `level` (0 is the coarsest).
@@ -83,7 +81,6 @@ class Solver(Protocol):
         InputError
             If something that the scene names (a mesh file) is bad.
         """
-        ...
 
 
 def refusal_of(solver: Solver, scene: Scene) -> str | None:

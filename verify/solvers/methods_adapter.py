@@ -4,6 +4,7 @@ And how their bodies are cut on the way.
 """
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -47,6 +48,8 @@ from verify.xfem.release import ancestors, parting_cuts
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+_Made = tuple[SimplexMesh, float]  # a mesh, and the size of its elements in m
+_Given = dict[str, Any]
 _SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")
 _WELDED = ("subdivision", "snapping", "snapping_subdivision")
 _WITH_FACES = (*_WELDED, "virtual_node", "virtual_node_arbitrary")
@@ -62,6 +65,7 @@ _RULES = {
 }
 
 
+@dataclass(eq=False)
 class MethodOpening:
     """A body cut by one of the methods, as `verify.solvers.motion_of_scene.OpeningBody`.
 
@@ -74,7 +78,7 @@ class MethodOpening:
         One of `METHODS`.
     parameters : dict
         Its own.
-    inertia : callable
+    inertia_of : callable
         Internal force and mass of a cut body.
     mesh : SimplexMesh
     openings : Openings
@@ -85,22 +89,19 @@ class MethodOpening:
         With all cuts open; made by `events`.
     """
 
-    final: CutBody
+    method: str
+    parameters: _Given
+    inertia_of: Callable[[CutBody], tuple[InternalForce, Mass]]
+    mesh: SimplexMesh
+    openings: Openings
+    final: CutBody = field(init=False)
+
     mass = "sidewise"
     phase = "cutting"
 
-    def __init__(
-        self,
-        method: str,
-        parameters: dict[str, Any],
-        inertia: Callable[[CutBody], tuple[InternalForce, Mass]],
-        mesh: SimplexMesh,
-        openings: Openings,
-    ) -> None:
-        self.removal = method.startswith("removal")
-        self.rule = _RULES.get(method, OPENINGS[openings.rule])
-        self.mesh, self.openings = mesh, openings
-        self._method, self._parameters, self._inertia = method, parameters, inertia
+    def __post_init__(self) -> None:
+        self.removal = self.method.startswith("removal")
+        self.rule = _RULES.get(self.method, OPENINGS[self.openings.rule])
         self._bodies: dict[int, CutBody] = {}  # by the identity of their mesh
         self._seams: Seams | None = None
         self._place: _Ints
@@ -109,7 +110,7 @@ class MethodOpening:
     def events(self) -> _Floats:
         """Return the times at which something opens, s."""
         self.final = self._kept_body(self._made(np.inf))
-        if self._method in _WELDED:
+        if self.method in _WELDED:
             self._seams = seams_of(self.final.phantom)
             _, place = np.unique(self.final.phantom.node_points, axis=0, return_inverse=True)
             self._place = place.ravel()
@@ -128,13 +129,13 @@ class MethodOpening:
             body = make_body(self.mesh, phantom, conforming=shown, cell_origin=origin)
             return self._kept_body(body).phantom
         all_open = self._opened.until(np.inf, passed)
-        if self._method == "uncut" or (self._opened.until(time, passed) == all_open).all():
+        if self.method == "uncut" or (self._opened.until(time, passed) == all_open).all():
             return self.final.phantom
         return self._kept_body(self._made(time, passed)).phantom
 
     def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a body that `at` has returned."""
-        return self._inertia(self._bodies[id(phantom)])
+        return self.inertia_of(self._bodies[id(phantom)])
 
     def inherited(self, old: PhantomMesh, state: MotionState, further: DynamicBody) -> MotionState:
         """Hand a state on to the body that is cut further."""
@@ -189,14 +190,14 @@ class MethodOpening:
     def _made(self, time: float, passed: bool = False) -> CutBody:
         """Make the body that the method cuts by the cuts as they are at a time."""
         given = (self.mesh, self.openings.cuts)
-        if self._method in (*_WELDED, "uncut"):
-            return METHODS[self._method](*given, **self._parameters)
+        if self.method in (*_WELDED, "uncut"):
+            return METHODS[self.method](*given, **self.parameters)
 
         def opened(cut: PhantomMesh) -> NDArray[np.bool_]:
             self._opened = self.openings.of_cells(cut)
             return self._opened.until(time, passed)
 
-        return METHODS[self._method](*given, **self._parameters, opened=opened)
+        return METHODS[self.method](*given, **self.parameters, opened=opened)
 
     def _kept_body(self, body: CutBody) -> CutBody:
         self._bodies[id(body.phantom)] = body
@@ -289,10 +290,10 @@ class MethodSolver:
         self._check(scene, scheme, parameters)
         integration = Integration(scheme, step_factor, spectral_radius)
 
-        def run(mesh: tuple[SimplexMesh, float], trial: bool) -> Solution:
+        def run(made: _Made, trial: bool) -> Solution:
             if scene.analysis.kind == "dynamic":
-                return self._moved(scene, *mesh, integration, rule, parameters, trial)
-            return self._at_rest(scene, *mesh, load_steps, parameters)
+                return self._moved(scene, made, integration, rule, parameters, trial)
+            return self._at_rest(scene, made, load_steps, parameters)
 
         with errors_of_scene(scene):
             return repeated(repetitions, lambda: background_mesh(scene, level), run)
@@ -326,17 +327,10 @@ class MethodSolver:
             )
 
     def _moved(
-        self,
-        scene: Scene,
-        mesh: SimplexMesh,
-        size: float,
-        integration: Integration,
-        rule: str,
-        parameters: dict[str, Any],
-        trial: bool,
+        self, scene: Scene, made: _Made, how: Integration, rule: str, given: _Given, trial: bool
     ) -> Solution:
         """Cut, load, move."""
-        record = Record()
+        record, (mesh, size) = Record(), made
         forces: list[InternalForce] = []
 
         def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
@@ -346,23 +340,17 @@ class MethodSolver:
             return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
         openings = openings_of(scene, size, rule)
-        opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-        motion = CutMotion(scene, opening, integration, exact_of(scene), record)
+        opening = MethodOpening(self._method, given, inertia, mesh, openings)
+        motion = CutMotion(scene, opening, how, exact_of(scene), record)
         phantom, fields = motion.run(trial)
         record.regularisations.append(springs_left_out(forces[-1]))
         self._say(record, opening.final)
         return solution_on(scene, record, phantom, fields, size, opening.final.conforming)
 
-    def _at_rest(
-        self,
-        scene: Scene,
-        mesh: SimplexMesh,
-        size: float,
-        load_steps: int,
-        parameters: dict[str, Any],
-    ) -> Solution:
+    def _at_rest(self, scene: Scene, made: _Made, load_steps: int, given: _Given) -> Solution:
         """Cut, load, solve."""
-        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
+        mesh, size = made
+        body = METHODS[self._method](mesh, cuts_of(scene, size), **given)
         record = Record(timings=dict(body.seconds))
         fields = solve_equilibrium(
             scene, body.phantom, exact_of(scene), record, resisting=body.resisting, law=self._law,

@@ -14,7 +14,7 @@ from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import Regularisation
 from verify.solution_checks import CONSISTENT
-from verify.solvers.body_of_scene import Openings, density_of, material_of
+from verify.solvers.body_of_scene import Openings
 from verify.solvers.runs import (
     LedgerRows,
     Record,
@@ -199,6 +199,7 @@ class _Output(NamedTuple):
     acceleration: _Floats | None
 
 
+@dataclass(eq=False)
 class CutMotion:
     """A body on virtual nodes in motion, made anew when something opens: a `timeline.Mover`.
 
@@ -216,16 +217,15 @@ class CutMotion:
         Gets timings, iterations, notes and regularisations.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        opening: OpeningBody,
-        integration: Integration,
-        exact: Any,
-        record: Record,
-    ) -> None:
-        self.scene, self.opening, self.timeline = scene, opening, timeline_of(scene, kinks=False)
-        self.integration, self.exact, self.record = integration, exact, record
+    scene: Scene
+    opening: OpeningBody
+    integration: Integration
+    exact: Any
+    record: Record
+
+    def __post_init__(self) -> None:
+        scene, opening, record = self.scene, self.opening, self.record
+        self.timeline = timeline_of(scene, kinks=False)
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
         with record.timed(opening.phase):
@@ -241,7 +241,7 @@ class CutMotion:
         at_once = opening.fading(body.force.phantom) is None
         self._entered = start if at_once else -np.inf  # events until then are taken up
         with record.timed("initial state"):
-            state = initial_state(scene, body, exact)
+            state = initial_state(scene, body, self.exact)
         self._take(body, state)
 
     def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
@@ -367,15 +367,9 @@ class CutMotion:
         self.body, self.state = body, state
         self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
         self._instants, self._taken = list[tuple[int, dict[str, float]]](), 0
-        mesh, integration = body.force.phantom.mesh, self.integration
-        self._largest, self.record.notes["step from"] = largest_step(
-            body,
-            material_of(self.scene, mesh),
-            density_of(self.scene, mesh),
-            integration.scheme,
-            integration.step_factor,
-            self.scene.analysis.time_step,
-        )
+        scheme, factor = self.integration.scheme, self.integration.step_factor
+        found = largest_step(self.scene, body, scheme, factor)
+        self._largest, self.record.notes["step from"] = found
 
     def _leave(self) -> None:
         """Enter what has happened to the body."""

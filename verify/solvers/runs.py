@@ -178,12 +178,10 @@ class Mover(Protocol):
     @property
     def time(self) -> float:
         """Time of the state, s."""
-        ...
 
     @property
     def largest(self) -> float:
         """Largest time step of the body as it is open now, s."""
-        ...
 
     def open(self, time: float) -> bool:
         """Open what the cuts have passed at a time, the state's up to steps added up.
@@ -193,19 +191,15 @@ class Mover(Protocol):
         bool
             Whether anything has opened.
         """
-        ...
 
     def begin(self) -> None:
         """Take up what has jumped: at the start, at an opening or at a break."""
-        ...
 
     def put_out(self) -> None:
         """Keep the state for the output, and enter it into the account."""
-        ...
 
     def step(self, size: float) -> None:
         """Advance the state by a time, s, and account for it."""
-        ...
 
 
 def march(

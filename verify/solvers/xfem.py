@@ -100,6 +100,7 @@ class _Parameters:
         }
 
 
+@dataclass(eq=False)
 class XfemOpening:
     """A scene on a mesh that is cut, as `verify.solvers.motion_of_scene.OpeningBody`.
 
@@ -113,16 +114,18 @@ class XfemOpening:
     given : _Parameters
     """
 
+    scene: Scene
+    mesh: SimplexMesh
+    openings: Openings
+    exact: Any
+    given: _Parameters
+
     removal = False
     phase = "enrichment"
 
-    def __init__(
-        self, scene: Scene, mesh: SimplexMesh, openings: Openings, exact: Any, given: _Parameters
-    ) -> None:
-        self.scene, self.openings, self.exact = scene, openings, exact
-        self.given, self.mass = given, given.mass
-        self.rule = OPENINGS[openings.rule]
-        self._to_cut = to_cut(mesh, openings.cuts, given.tip)
+    def __post_init__(self) -> None:
+        self.mass, self.rule = self.given.mass, OPENINGS[self.openings.rule]
+        self._to_cut = to_cut(self.mesh, self.openings.cuts, self.given.tip)
         self._opened: Opened
         self._slivers: list[Regularisation] = []
         self._penalised: list[Regularisation] = []
@@ -261,7 +264,7 @@ class XfemSolver:
         with errors_of_scene(scene):
             return repeated(
                 repetitions, lambda: background_mesh(scene, level),
-                lambda mesh, trial: _run(scene, *mesh, exact, given, trial),
+                lambda made, trial: _run(scene, made, exact, given, trial),
             )  # fmt: skip
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
@@ -307,14 +310,10 @@ def _check_penalty(scene: Scene, mass: str) -> None:
 
 
 def _run(
-    scene: Scene,
-    mesh: SimplexMesh,
-    size: float,
-    exact: Any,
-    given: _Parameters,
-    trial: bool,
+    scene: Scene, made: tuple[SimplexMesh, float], exact: Any, given: _Parameters, trial: bool
 ) -> Solution:
     """Cut, load, solve."""
+    mesh, size = made
     given = given.on(scene, mesh)
     record = Record(notes=given.notes())
     if scene.analysis.kind == "dynamic":

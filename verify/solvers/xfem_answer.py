@@ -135,8 +135,7 @@ def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
     away = np.flatnonzero((distinct == 0).all(axis=1))
     names = np.arange(1, len(distinct) + 1)
     names[away] = 0
-    sides: NDArray[np.int64] = names[number.ravel()]
-    return sides
+    return names[number.ravel()]
 
 
 def _of_the_cut(phantom: PhantomMesh) -> list[Regularisation]:

@@ -32,7 +32,6 @@ from verify.xfem.arrays import XfemError
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
 from verify.xfem.closing import ClosingFaces, solve_closed
-from verify.xfem.element import Material
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.explicit import (
@@ -169,15 +168,8 @@ _REACH = 1.0  # strain up to which the step of a turning body is a bound
 EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
 
 
-def largest_step(
-    body: DynamicBody,
-    material: Material,
-    density: ArrayLike,
-    scheme: str,
-    factor: float,
-    asked: float | None,
-) -> tuple[float, str]:
-    """Return the largest time step, s, and where it comes from.
+def largest_step(scene: Scene, body: DynamicBody, scheme: str, factor: float) -> tuple[float, str]:
+    """Return the largest time step of a body, s, and where it comes from.
 
     An explicit scheme takes `factor` times its critical step, or the step asked for if that is
     smaller. Where pieces turn, the critical step allows strains up to 1, and `RESONANCE_FREE` of
@@ -186,19 +178,16 @@ def largest_step(
 
     Parameters
     ----------
+    scene : Scene
     body : DynamicBody
-    material : Material
-    density : float or (m,) array_like
     scheme : str
         One of `SCHEMES`.
     factor : float
-    asked : float, optional
-        ``analysis.time_step`` of the scene, s.
     """
-    explicit = scheme in EXPLICIT
+    explicit, asked = scheme in EXPLICIT, scene.analysis.time_step
     if not explicit and asked is not None:
         return asked, "analysis.time_step"
-    critical = _critical(body, material, density, explicit)
+    critical = _critical(scene, body, explicit)
     turning = explicit and body.force.is_corotational
     found = factor * critical * (RESONANCE_FREE if turning else 1.0)
     said = f"{factor:g} of {'√½ of ' if turning else ''}the critical step {critical:.4g} s"
@@ -209,12 +198,13 @@ def largest_step(
     return found, said
 
 
-def _critical(body: DynamicBody, material: Material, density: ArrayLike, explicit: bool) -> float:
-    phantom = body.force.phantom
+def _critical(scene: Scene, body: DynamicBody, explicit: bool) -> float:
+    mesh = body.force.phantom.mesh
     if not explicit or body.mass.keeps_element_steps:
         # side-wise mass: the step of the smallest uncut element is stable, whatever the cuts
         strain = _REACH if body.force.is_corotational else 0.0
-        step = float(element_critical_steps(phantom.mesh, material, density, strain).min())
+        elastic, density = material_of(scene, mesh), density_of(scene, mesh)
+        step = float(element_critical_steps(mesh, elastic, density, strain).min())
     else:
         force: Any = body.force
         blocks = force.stiffness(body.pattern, np.zeros(body.shape), "rotation-fixed")
