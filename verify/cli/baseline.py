@@ -18,13 +18,13 @@ exit codes of diff: 0, or 1 if a verdict became worse
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from verify.cli.signatures import Actions, Arg, AsJson, Run
-from verify.cli.streams import print_json
+from verify.cli.streams import said
 
 if TYPE_CHECKING:
     from verify.baseline import Baseline, Row
@@ -54,15 +54,10 @@ def save(run: Run, *, file: File = FILE, as_json: AsJson = False) -> int:
     rows = [row for row in check_run(after, measured, partial=True) if row.axis != "own"]
     bad = [row for row in rows if row.verdict is Verdict.FAIL]
     code = exit_code_of(bad)
-    if as_json:
-        answer = {"exit": code, "file": str(file), "added": added, "notes": notes}
-        print_json({**answer, "rows": [asdict(row) for row in bad]})
-        return code
-    for note in notes:
-        print(note)
-    _print_rows(bad)
-    print(f"{file}: {added} values added, {_size(before)} kept as they were")
-    return code
+    answer = {"exit": code, "file": str(file), "added": added, "notes": notes}
+    lines = [*notes, *_lines(bad)]
+    lines.append(f"{file}: {added} values added, {_size(before)} kept as they were")
+    return said(as_json, {**answer, "rows": [asdict(row) for row in bad]}, lines, code)
 
 
 def check(
@@ -88,15 +83,11 @@ def check(
     baseline = read_baseline(file)
     rows = check_run(baseline, read_run(run), partial)
     code = exit_code_of(rows, strict)
-    if as_json:
-        print_json({"exit": code, "rows": [asdict(row) for row in rows]})
-        return code
-    _print_rows([row for row in rows if row.verdict is not Verdict.PASS])
+    lines = list(_lines(row for row in rows if row.verdict is not Verdict.PASS))
     counts = Counter((row.axis, row.verdict) for row in rows)
     for axis in ("own", "meaning", "independent", "reference", "speed"):
-        said = ", ".join(f"{counts[axis, v]} {v}" for v in Verdict if counts[axis, v])
-        if said:
-            print(f"{axis:<12} {said}")
+        found = ", ".join(f"{counts[axis, v]} {v}" for v in Verdict if counts[axis, v])
+        lines += [f"{axis:<12} {found}"] if found else []
     open_ended = sum(
         1
         for case in baseline.cases.values()
@@ -104,11 +95,12 @@ def check(
         if quantity.independent is None or quantity.independent.tolerance is None
     )
     if open_ended:
-        print(
+        lines.append(
             f"{open_ended} quantities have no tolerance against an independent value and are "
             "held against the last own value only"
         )
-    return code
+    answer = {"exit": code, "rows": [asdict(row) for row in rows]}
+    return said(as_json, answer, lines, code)
 
 
 def update(
@@ -133,19 +125,16 @@ def update(
     if moved:
         write_baseline(after, file)
     code = 1 if any(move.state == "refused" for move in moves) else 0
-    if as_json:
-        answer = {"exit": code, "file": str(file), "moved": len(moved)}
-        print_json({**answer, "moves": [asdict(move) for move in moves]})
-        return code
+    lines = []
     for move in moves:
         old, new = f"{move.old:.10g}", "–" if move.new is None else f"{move.new:.10g}"
         change = f" ({move.new / move.old - 1:+.3e})" if move.new is not None and move.old else ""
-        print(f"{move.state:<8} {move.case}:{move.quantity}: {old} → {new}{change}")
-        if move.reason:
-            print(f"         {move.reason}")
+        lines.append(f"{move.state:<8} {move.case}:{move.quantity}: {old} → {new}{change}")
+        lines += [f"         {move.reason}"] if move.reason else []
     rest = "" if only else "; name what shall move with --only CASE:METRIC"
-    print(f"{file}: {len(moved)} own values moved, no independent one{rest}")
-    return code
+    lines.append(f"{file}: {len(moved)} own values moved, no independent one{rest}")
+    answer = {"exit": code, "file": str(file), "moved": len(moved)}
+    return said(as_json, {**answer, "moves": [asdict(move) for move in moves]}, lines, code)
 
 
 def _apart(*values: float | None) -> str:
@@ -179,39 +168,35 @@ def diff(
     old, new = read_run(run), read_run(other)
     changes = verdict_changes(old, new)
     code = 1 if any_worse(changes) else 0
-    if as_json:
-        answer = {"exit": code, "old": old.origin, "new": new.origin}
-        meaning = {"meaning": list(meaning_lines(old, new))}
-        print_json({**answer, **meaning, "changes": [asdict(c) for c in changes]})
-        return code
+    meaning, lines = list(meaning_lines(old, new)), []
     for side, name in ((old, "old"), (new, "new")):
         commit = str(side.origin.get("commit") or "no commit")[:12]
         dirty = ", with local changes" if side.origin.get("dirty") else ""
-        print(f"{name}: {side.directory} ({commit}{dirty}, {side.origin.get('date')})")
-    for line in meaning_lines(old, new):
-        print(line)
+        lines.append(f"{name}: {side.directory} ({commit}{dirty}, {side.origin.get('date')})")
+    lines += meaning
     for change in changes:
         verdicts = f"{change.old or '–'} → {change.new or '–'}"
         numbers = _apart(change.old_observed, change.new_observed)
-        print(f"{change.direction:<6} {change.case}: {change.check}: {verdicts} ({numbers})")
-        print(f"       {change.reason}")
+        lines.append(f"{change.direction:<6} {change.case}: {change.check}: {verdicts} ({numbers})")
+        lines.append(f"       {change.reason}")
     counts = Counter(change.direction for change in changes)
-    said = ", ".join(f"{count} {direction}" for direction, count in counts.items())
-    print(said or "no verdict changed")
-    return code
+    found = ", ".join(f"{count} {direction}" for direction, count in counts.items())
+    answer = {"exit": code, "old": old.origin, "new": new.origin, "meaning": meaning}
+    answer["changes"] = [asdict(change) for change in changes]
+    return said(as_json, answer, [*lines, found or "no verdict changed"], code)
 
 
 def _size(baseline: "Baseline") -> int:
     return sum(len(case.quantities) + len(case.speed) for case in baseline.cases.values())
 
 
-def _print_rows(rows: Sequence["Row"]) -> None:
+def _lines(rows: Iterable["Row"]) -> Iterator[str]:
     for row in rows:
         place = f"{row.case}:{row.quantity}" if row.quantity else row.case
         numbers = ""
         if row.now is not None and row.stored is not None:
             numbers = f"{row.now:.10g}, stored {row.stored:.10g}: "
-        print(f"{row.verdict:<9} {row.axis:<11} {place}: {numbers}{row.reason}")
+        yield f"{row.verdict:<9} {row.axis:<11} {place}: {numbers}{row.reason}"
 
 
 ACTIONS = Actions((save, check, update, diff))

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from verify.cli.signatures import Actions, Arg, AsJson
-from verify.cli.streams import print_json
+from verify.cli.streams import said
 from verify.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,18 +49,15 @@ def list_(*, as_json: AsJson = False) -> int:
         }
         for entry in cache.entries()
     ]
-    if as_json:
-        print_json({"folder": str(cache.root), "entries": rows})
-        return 0
-    for row in rows:
-        state = "outdated" if row["outdated"] else "current"
-        print(
-            f"{row['case']}  level {row['level']}  {row['unknowns']} unknowns  "
-            f"{row['bytes'] / 1e6:.2f} MB  {row['made']}  DOLFINx {row['dolfinx']}  {state}"
-        )
+    lines = [
+        f"{row['case']}  level {row['level']}  {row['unknowns']} unknowns  "
+        f"{row['bytes'] / 1e6:.2f} MB  {row['made']}  DOLFINx {row['dolfinx']}  "
+        f"{'outdated' if row['outdated'] else 'current'}"
+        for row in rows
+    ]
     total = sum(row["bytes"] for row in rows) / 1e6
-    print(f"{len(rows)} references, {total:.1f} MB in {cache.root}")
-    return 0
+    lines.append(f"{len(rows)} references, {total:.1f} MB in {cache.root}")
+    return said(as_json, {"folder": str(cache.root), "entries": rows}, lines)
 
 
 def clear(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from verify.cli.signatures import Arg, Cases, Jobs, Out, Repetitions, Strict, Timeout
-from verify.cli.streams import command_line, print_json
+from verify.cli.streams import command_line, said
 
 if TYPE_CHECKING:
     from verify.conformance import CheckResult
@@ -56,17 +56,12 @@ def export(
         files += export_case(scene, place, levels or None, conforming or template is not None)
     if template:
         files += write_template(out)
-    if as_json:
-        print_json({"case": case, "files": [str(file) for file in files]})
-        return 0
-    for file in files:
-        print(file)
-    folders = f"{out}/<case>" if len(scenes) > 1 else out
-    print(
+    names, folders = [str(file) for file in files], f"{out}/<case>" if len(scenes) > 1 else out
+    then = (
         f"answer in {folders}/level-<k>/solution.json and .vtu, then: "
         f"verify import {case} {out} --solver NAME --out RUN"
     )
-    return 0
+    return said(as_json, {"case": case, "files": names}, [*names, then])
 
 
 def import_(
@@ -180,16 +175,12 @@ def conform(
     with waiting_reported(sys.stderr, f"conformance of {name}"):
         results = conform(name, given, timeout, checks)
     code = exit_code_of(results)
-    if as_json:
-        answer = {"solver": name, "parameters": given, "exit": code}
-        print_json({**answer, "checks": [asdict(result) for result in results]})
-        return code
-    width = max(len(result.name) for result in results)
-    for result in results:
-        print(f"{result.name:<{width}}  {result.state:<8} {_number(result):<19} {result.claim}")
-        if result.reason:
-            print(f"{'':<{width}}  {result.reason}")
-    return code
+    width, lines = max(len(result.name) for result in results), []
+    for one in results:
+        lines.append(f"{one.name:<{width}}  {one.state:<8} {_number(one):<19} {one.claim}")
+        lines += [f"{'':<{width}}  {one.reason}"] if one.reason else []
+    answer = {"solver": name, "parameters": given, "exit": code}
+    return said(as_json, {**answer, "checks": list(map(asdict, results))}, lines, code)
 
 
 def _number(result: "CheckResult") -> str:

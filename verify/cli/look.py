@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from verify.cli.signatures import Arg, AsJson, Case, Matching, Run
-from verify.cli.streams import print_json
+from verify.cli.streams import print_json, said
 from verify.errors import InputError
 from verify.printable import one_line
 
@@ -115,11 +115,7 @@ def describe(
     from verify.scene import load_scene
 
     scene = load_scene(case)
-    if as_json:
-        print_json(scene.model_dump(mode="json", by_alias=True))
-    else:
-        print(_description(scene))
-    return 0
+    return said(as_json, scene.model_dump(mode="json", by_alias=True), [_description(scene)])
 
 
 def _description(scene: "Scene") -> str:
@@ -379,8 +375,7 @@ def paraview(
 
     files = export_fields(run, out or run / "paraview", solvers, level, reference)
     names = [str(file) for file in files]
-    print_json({"files": names}) if as_json else print("\n".join(names))
-    return 0
+    return said(as_json, {"files": names}, names)
 
 
 def doctor(
@@ -409,16 +404,13 @@ def doctor(
 
     findings = examine()
     code = 3 if any(finding.needed and not finding.works for finding in findings) else 0
-    if as_json:
-        print_json([finding.as_json() for finding in findings])
-        return code
-    width = max(len(finding.name) for finding in findings)
+    width, lines = max(len(finding.name) for finding in findings), []
     for finding in findings:
         mark = "ok     " if finding.works else "MISSING" if finding.needed else "absent "
-        print(f"{mark}  {finding.name:<{width}}  {finding.found}")
+        lines.append(f"{mark}  {finding.name:<{width}}  {finding.found}")
         if finding.cure and not finding.works:
-            print(f"         {'':<{width}}  → {finding.cure}")
-    return code
+            lines.append(f"         {'':<{width}}  → {finding.cure}")
+    return said(as_json, [finding.as_json() for finding in findings], lines, code)
 
 
 def _compile(as_json: bool) -> int:
@@ -429,17 +421,13 @@ def _compile(as_json: bool) -> int:
     except FirstUseError as error:
         print(f"verify: error: {error}", file=sys.stderr)
         return 3
-    if as_json:
-        print_json(asdict(use))
-        return 0
     whole = sum(use.seconds.values())
-    print(f"{use.kernels} compilations in {use.wall:.1f} s, {whole:.1f} s of processor time")
-    if whole > 0.0:
-        print("\nseconds  module")
-    by_module = Counter[str]()
+    lines = [f"{use.kernels} compilations in {use.wall:.1f} s, {whole:.1f} s of processor time"]
+    lines += ["\nseconds  module"] if whole > 0.0 else []
+    by_module = Counter[str]()  # seconds
     for kernel, spent in use.seconds.items():
         by_module[kernel.partition(":")[0]] += spent  # type: ignore[assignment]
-    for name, seconds in by_module.most_common():
-        if seconds >= 0.05:
-            print(f"{seconds:7.1f}  {name}")
-    return 0
+    lines += [
+        f"{seconds:7.1f}  {name}" for name, seconds in by_module.most_common() if seconds >= 0.05
+    ]
+    return said(as_json, asdict(use), lines)

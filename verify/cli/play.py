@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from verify.cli.signatures import Arg, Case, positive
-from verify.cli.streams import print_json
+from verify.cli.streams import said
 from verify.errors import InputError, UnsupportedSceneError
 
 _FORCES = ("driving_force", "resistance")  # on blades, as Session.blade_forces gives them
@@ -86,15 +86,11 @@ def play(
 
         time, strokes = play_in_window(stage, scene.title, stroke)
         file = str(stroke) if strokes else None
-        if as_json:
-            print_json({"case": scene.name, "time": time, "strokes": strokes, "stroke": file})
-        else:
-            made = f"strokes of the mouse: {strokes}, in {file}" if file else "no stroke was made"
-            print(f"{scene.name}: closed at t = {time:.2f} s; {made}")
-        return 0
+        made = f"strokes of the mouse: {strokes}, in {file}" if file else "no stroke was made"
+        answer = {"case": scene.name, "time": time, "strokes": strokes, "stroke": file}
+        return said(as_json, answer, [f"{scene.name}: closed at t = {time:.2f} s; {made}"])
     summary = _played(stage, scene, out, frames, zoom, records)
-    print_json(summary) if as_json else print(_words(summary))
-    return 0
+    return said(as_json, summary, _words(summary))
 
 
 def _check_outputs(
@@ -238,7 +234,7 @@ def _table(records: "list[StepRecord]", blades: "dict[str, tuple[Floats, Floats]
     return text.getvalue()
 
 
-def _words(summary: dict[str, Any]) -> str:
+def _words(summary: dict[str, Any]) -> list[str]:
     median = summary["median_seconds"]["step"]
     shares = ", ".join(f"{share:.0%} within {n}" for n, share in summary["steps_within"].items())
     lines = [
@@ -257,4 +253,4 @@ def _words(summary: dict[str, Any]) -> str:
         for cut in summary["cuts"]
         if cut["largest_driving_force"]
     ]
-    return "\n".join([*lines, *([f"drawn: {summary['out']}"] if summary["out"] else [])])
+    return [*lines, *([f"drawn: {summary['out']}"] if summary["out"] else [])]

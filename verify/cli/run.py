@@ -260,7 +260,11 @@ def _solved(
         given = options.parameters
         rank_run(asked.out, summary.results, given, asked.conform, asked.timeout, announce)
         progress.doing(f"the report of {len(summary.results)} cases")
-        return summary, None if asked.no_report else _rendered(asked.out, drawings)
+        if asked.no_report:
+            return summary, None
+        from verify.report.rendering import render
+
+        return summary, str(render(asked.out, drawings=drawings))
 
 
 def _answer(result: "CaseResult") -> dict[str, Any]:
@@ -289,12 +293,6 @@ def _drawings(beside: bool) -> Iterator[Path | None]:
 def _load_report() -> None:
     with contextlib.suppress(Exception):  # reported when the report is to be written
         import_module("verify.report.rendering").load()
-
-
-def _rendered(directory: Path, drawings: Path | None) -> str:
-    from verify.report.rendering import render
-
-    return str(render(directory, drawings=drawings))
 
 
 def of_one_solver(given: Iterable[str]) -> dict[str, Any]:

@@ -15,7 +15,6 @@ fails; nothing of it is left then.
 from typing import Annotated, Any
 
 from verify.cli.signatures import Actions, Arg, AsJson
-from verify.cli.streams import print_json
 
 Name = Annotated[str, Arg("NAME", help="name of the solver")]
 
@@ -30,20 +29,16 @@ def list_(*, as_json: AsJson = False) -> int:
         state = state_of(solver)
         said = {"title": solver.title, "licence": solver.licence, "source": solver.source}
         rows.append({"name": name, **said, "parameters": solver.parameters, **vars(state)})
-    if as_json:
-        print_json(rows, ensure_ascii=False)
-        return 0
     others = [name for name in solver_names() if name not in {row["name"] for row in rows}]
-    print(f"of the project, and plugged in: {', '.join(others)}")
+    lines = [f"of the project, and plugged in: {', '.join(others)}"]
     for row in rows:
         here = f"{row['version']}, {row['python']}" if row["python"] else "not installed"
-        print(f"{row['name']}  {row['title']}  [{row['licence']}]  {here}")
-        if row["missing"]:
-            print(f"  {row['missing']}")
+        lines.append(f"{row['name']}  {row['title']}  [{row['licence']}]  {here}")
+        lines += [f"  {row['missing']}"] if row["missing"] else []
         if row["parameters"]:
             given = ", ".join(f"{key}={value}" for key, value in row["parameters"].items())
-            print(f"  --set {row['name']}.NAME=VALUE: {given}")
-    return 0
+            lines.append(f"  --set {row['name']}.NAME=VALUE: {given}")
+    return said(as_json, rows, lines, ensure_ascii=False)
 
 
 def install(

@@ -5,7 +5,7 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -70,6 +70,18 @@ def in_colour(line: str) -> str:
 def print_json(content: Any, ensure_ascii: bool = True) -> None:
     """Print an answer as JSON."""
     print(json.dumps(content, indent=2, ensure_ascii=ensure_ascii))
+
+
+def said(
+    as_json: bool, answer: Any, lines: Iterable[str], code: int = 0, ensure_ascii: bool = True
+) -> int:
+    """Print an answer as JSON, or as lines; return the exit code."""
+    if as_json:
+        print_json(answer, ensure_ascii)
+    else:
+        for line in lines:
+            print(line)
+    return code
 
 
 def command_line() -> str:

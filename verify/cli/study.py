@@ -86,10 +86,7 @@ def slivers(
     """
     from verify.study.slivers import sliver_study
 
-    def study(making: "Making") -> "Study":
-        return _over_scenes(sliver_study, cases or [*SLIVERS], None, measured, making)
-
-    return _written("slivers", answer, study)
+    return _over_scenes("slivers", sliver_study, cases or [*SLIVERS], None, measured, answer)
 
 
 def energy(
@@ -107,10 +104,8 @@ def energy(
     """
     from verify.study.measured_scenes import energy_study
 
-    def study(making: "Making") -> "Study":
-        return _over_scenes(energy_study, cases, None if cases else "energy", measured, making)
-
-    return _written("energy", answer, study)
+    tagged = None if cases else "energy"
+    return _over_scenes("energy", energy_study, cases, tagged, measured, answer)
 
 
 def thesis(*, quick: Quick = False, answer: Answer) -> int:
@@ -334,21 +329,27 @@ def positions(
 
 
 def _over_scenes(
-    study: "Callable[..., MeasuredStudy]",
+    kind: str,
+    made: "Callable[..., MeasuredStudy]",
     cases: Sequence[str],
     expression: str | None,
     measured: Measured,
-    making: "Making",
-) -> "MeasuredStudy":
-    """Run a study of measured scenes over the cases and solvers that are asked for."""
+    answer: Answer,
+) -> int:
+    """Make a study of measured scenes over the cases and solvers that are asked for."""
     from verify.runner.selection import select_cases
     from verify.study.measured_scenes import variant_of
 
     named = bool(cases) and list(cases) != [*SLIVERS]
-    scenes = select_cases(cases, expression, "quick" if measured.quick and not named else "heavy")
-    variants = [variant_of(text) for text in measured.solvers or ("xfem", "conforming")]
+    weight = "quick" if measured.quick and not named else "heavy"
     processes = measured.processes or len(os.sched_getaffinity(0))
-    return study(scenes, variants, replace(making, processes=processes), measured.quick)
+
+    def study(making: "Making") -> "Study":
+        scenes = select_cases(cases, expression, weight)
+        variants = [variant_of(text) for text in measured.solvers or ("xfem", "conforming")]
+        return made(scenes, variants, replace(making, processes=processes), measured.quick)
+
+    return _written(kind, answer, study)
 
 
 def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> int:

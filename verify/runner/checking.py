@@ -32,8 +32,11 @@ def check_scene(scene: Scene) -> None:
     if scene.played_only is None:
         _check_mechanics(scene, exact)
     for i, asked in enumerate(scene.quantities):
-        if isinstance(asked, FractureQuantity) and (reason := _missing(scene, asked)):
-            raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
+        if isinstance(asked, FractureQuantity):
+            from verify.judge.stress_intensity import intensity_defect
+
+            if reason := intensity_defect(scene, asked):
+                raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
     for i, check in enumerate(scene.acceptance):
         for name in (check.solver, check.compared):
             if name is not None:
@@ -75,13 +78,6 @@ def _exact_of(scene: Scene, where: str) -> Any:
         return exact_of(scene)
     except InputError as error:
         raise InputError(f"exact: {error}", where) from None
-
-
-def _missing(scene: Scene, asked: FractureQuantity) -> str | None:
-    """Why a stress-intensity factor cannot be had from any solution, or None."""
-    from verify.judge.stress_intensity import intensity_defect
-
-    return intensity_defect(scene, asked)
 
 
 def check_solver_name(name: str, where: str) -> None:

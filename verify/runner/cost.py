@@ -41,16 +41,6 @@ _COARSEST = 8  # times the size of elements that a case asks for
 _PER_AREA, _PER_VOLUME = 2 / sqrt(3), sqrt(2)  # nodes per h^d of equilateral triangles, tetrahedra
 
 
-def volume_of(scene: Scene) -> float:
-    """Area or volume of a rectangle, a box or a polygon."""
-    body = scene.geometry
-    if isinstance(body, Box):
-        return float(np.prod(np.subtract(body.upper, body.lower)))
-    assert isinstance(body, Rectangle | Polygon)
-    x, y = body.outline().T
-    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-
-
 def body_text(scene: Scene) -> str:
     """Say extent, volume and mass of a body, of a mesh file its nodes and cells too.
 
@@ -71,9 +61,9 @@ def body_text(scene: Scene) -> str:
         sides, places, volumes = np.ptp(grid.points, axis=0), grid.points[grid.cells], grid.measures
         places = places.mean(axis=1)
         mesh = f", {len(grid.points)} nodes, {len(grid.cells)} cells"
-    elif len(ends := body.extremes()):
-        sides, places = np.ptp(ends, axis=0), points_of_body(scene)
-        volumes = np.full(len(places), volume_of(scene) / len(places))
+    elif isinstance(body, Rectangle | Box | Polygon):
+        sides, places = np.ptp(body.extremes(), axis=0), points_of_body(scene)
+        volumes = np.full(len(places), body.measure() / len(places))
     else:
         return ""
     extent = " × ".join(f"{side:.3g}" for side in sides)
@@ -278,7 +268,7 @@ def mesh_of_level(scene: Scene, level: int) -> tuple[float, float] | None:
         return float(np.prod(counts + 1.0)), float(max(sides / counts))
     assert scene.mesh.sizes is not None
     size = scene.mesh.sizes[level]
-    return _nodes(scene, size), size
+    return _nodes(body, size), size
 
 
 def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
@@ -290,18 +280,18 @@ def _reference_mesh(scene: Scene, level: int) -> tuple[float, float] | None:
         level += scene.first_refinement
         nodes, size = coarse[0] * 2.0 ** (scene.cell_dimension * level), coarse[1] / 2**level
     elif isinstance(body, Rectangle | Box | Polygon):
-        extent = volume_of(scene) ** (1 / scene.dimension)
+        extent = body.measure() ** (1 / scene.dimension)
         size = scene.reference.size or extent / _FINENESS[scene.dimension]
         size /= 2**level
-        nodes = _GRADED[scene.dimension] * _nodes(scene, size)
+        nodes = _GRADED[scene.dimension] * _nodes(body, size)
     else:
         return None
     return nodes * degree**scene.cell_dimension, size
 
 
-def _nodes(scene: Scene, size: float) -> float:
+def _nodes(body: Rectangle | Box | Polygon, size: float) -> float:
     """Nodes of an unstructured mesh: of equilateral cells, and half of those on its boundary."""
-    d, volume = scene.dimension, volume_of(scene)
+    d, volume = body.dimension, body.measure()
     inside = (_PER_AREA if d == 2 else _PER_VOLUME) * volume / size**d
     return float(inside + d * volume ** ((d - 1) / d) / size ** (d - 1))
 

@@ -243,22 +243,11 @@ def is_file_name(name: Any) -> bool:
     return isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_][\w.+-]{0,200}", name) is not None
 
 
-def record_of(entry: Any, where: str) -> SolveRecord:
-    """Make a record from its plain values.
-
-    Raises
-    ------
-    InputError
-        If a record has other fields.
-    """
-    return checked(SolveRecord, entry, "record", where)
-
-
 def _stored(content: dict[str, Any], folder: Path) -> SolveRecord:
     where = str(folder / "record.json")
     if "record" not in content:
         raise InputError("not a readable record ('record' is missing)", where)
-    return record_of(content["record"], where)
+    return checked(SolveRecord, content["record"], "record", where)
 
 
 def outcome_in(folder: Path) -> dict[str, Any] | None:

@@ -32,6 +32,7 @@ from verify.result import (
     NoticeKind,
     SolveRecord,
     Status,
+    checked,
     error_picture,
     write_result,
 )
@@ -41,7 +42,6 @@ from verify.runner.directory import (
     check_files,
     folder_name,
     load_record,
-    record_of,
 )  # fmt: skip
 from verify.runner.fingerprint import digest_of
 from verify.runner.mesh_faults import mesh_notices
@@ -108,7 +108,8 @@ class _Measurements:
         where = self._file(record)
         try:
             content = read_json(where)
-            return record_of(content["record"], str(where)) if content["key"] == self._key else None
+            record = checked(SolveRecord, content["record"], "record", str(where))
+            return record if content["key"] == self._key else None
         except (InputError, KeyError, TypeError):
             return None
 

@@ -81,18 +81,21 @@ class Families:
         if scene.row is None:
             return {}
         rows = self._rows[scene.row.family]
-        asked = {c.row for c in scene.acceptance if isinstance(c, RatioCheck) and c.row is not None}
-        return {value: rows[value] for value in asked if value in rows}
+        return {value: rows[value] for value in _rows_asked(scene) if value in rows}
 
     def _judged(self, name: str, result: CaseResult, others: dict[float, CaseResult]) -> CaseResult:
         scene = self._scenes[name]
-        if not any(isinstance(c, RatioCheck) and c.row is not None for c in scene.acceptance):
-            return result
-        if result.reference.kind is None:  # its comparison failed, and its verdicts say so
+        # without a reference its comparison failed, and its verdicts say so
+        if not _rows_asked(scene) or result.reference.kind is None:
             return result
         from verify.judge.verdict import with_verdicts  # loads the comparison: only where needed
 
         return with_verdicts(scene, result, self._judge_only, others)
+
+
+def _rows_asked(scene: Scene) -> set[float]:
+    checks = [check for check in scene.acceptance if isinstance(check, RatioCheck)]
+    return {check.row for check in checks if check.row is not None}
 
 
 class Progress(Protocol):

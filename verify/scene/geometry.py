@@ -82,6 +82,11 @@ class _PlaneBody(_Body):
         """Points (n, 2) with the same bounding box as the body."""
         return self.outline()
 
+    def measure(self) -> float:
+        """Return its area, m²."""
+        x, y = self.outline().T
+        return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+
     def holds(self, points: Array, tolerance: float) -> Bools:
         """Tell which points (n, 2) lie in it, or outside by no more than a tolerance, m."""
         outline = self.outline()
@@ -188,6 +193,10 @@ class Box(_Body):
     def extremes(self) -> Array:
         """Lowest and highest corner (2, 3)."""
         return np.array([self.lower, self.upper], dtype=float)
+
+    def measure(self) -> float:
+        """Return its volume, m³."""
+        return float(np.prod(np.subtract(self.upper, self.lower)))
 
     def holds(self, points: Array, tolerance: float) -> Bools:
         """Tell which points (n, 3) lie in it, or outside by no more than a tolerance, m."""

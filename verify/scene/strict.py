@@ -200,12 +200,7 @@ def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> 
 def _tags(found: Any, schema: dict[str, Any]) -> str:
     """Name the valid tags of a union, or the nearest one."""
     given = str(found["ctx"].get("tag", ""))
-    if "expected_tags" in found["ctx"]:
-        tags = [tag.strip(" '") for tag in found["ctx"]["expected_tags"].split(",")]
-    else:
-        node = _node(found["loc"], schema)
-        tags = list(node.get("discriminator", {}).get("mapping", {}))
-    return nearest(given, tags)
+    return nearest(given, _node(found["loc"], schema).get("discriminator", {}).get("mapping", {}))
 
 
 def _wanted(fault: Any) -> str:

@@ -51,7 +51,17 @@ def _refusal(scene: Scene) -> str | None:
     return None
 
 
-class ConformingSolver:
+class _OnConformingMeshes:
+    """What both adapters do not do, and the contact that they know."""
+
+    contact = ("static", "dynamic")
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse what `reference` does not do yet."""
+        return _refusal(scene) or refused_contact(self, scene)
+
+
+class ConformingSolver(_OnConformingMeshes):
     """P1 (or P2) elements on a mesh that conforms to the cut, at the mesh size of the scene.
 
     Parameters of `solve`
@@ -76,15 +86,10 @@ class ConformingSolver:
     """
 
     name = "conforming"
-    contact = ("static", "dynamic")
     choices: Mapping[str, Collection[Any]] = {
         "mesh": ("imprinted", "remeshed"), "degree": (1, 2), "scheme": SCHEMES,
         "opening": OPENINGS,
     }  # fmt: skip
-
-    def refuses(self, scene: Scene) -> str | None:
-        """Refuse what `reference` does not do yet."""
-        return _refusal(scene) or refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""
@@ -132,7 +137,7 @@ class ConformingSolver:
         return System(*linear_system(scene, space, exact_of(scene)))
 
 
-class ReferenceSolver:
+class ReferenceSolver(_OnConformingMeshes):
     """Elements of the degree that the scene asks for, graded to every singular point.
 
     Quadratic elements have a pressure of their own from Poisson's ratio 0.45 on, so that they do
@@ -147,11 +152,6 @@ class ReferenceSolver:
     """
 
     name = "reference"
-    contact = ("static", "dynamic")
-
-    def refuses(self, scene: Scene) -> str | None:
-        """Refuse what `reference` does not do yet."""
-        return _refusal(scene) or refused_contact(self, scene)
 
     def levels(self, scene: Scene) -> int:
         """Return the number of levels of the reference."""

@@ -104,8 +104,7 @@ def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
 
 
 def _plane_grading(scene: Scene) -> Grading:
-    x, y = scene.geometry.outline().T  # type: ignore[union-attr]
-    extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+    extent = np.sqrt(scene.geometry.measure())  # type: ignore[union-attr]
     size = scene.reference.size or extent / 12
     points = singular_points(scene)
     clear, way = clear_radii(scene, points), _way(scene, size)
@@ -114,8 +113,7 @@ def _plane_grading(scene: Scene) -> Grading:
 
 def _solid_grading(scene: Scene) -> Grading:
     assert isinstance(scene.geometry, Box)
-    sides = np.subtract(scene.geometry.upper, scene.geometry.lower)
-    extent = float(np.prod(sides)) ** (1 / 3)
+    extent = scene.geometry.measure() ** (1 / 3)
     size = scene.reference.size or extent / 4
     way = _way(scene, size)  # where the front has been everywhere, its last place is nothing apart
     curves = way is None

@@ -32,7 +32,7 @@ from verify.solvers.body_of_scene import (
     openings_of,
 )
 from verify.solvers.interface import check_choices, refused_contact
-from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
+from verify.solvers.motion_of_scene import CutMotion, Fade, Integration, OpeningBody
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_answer import Law, solution_on, solve_equilibrium, springs_left_out
@@ -44,7 +44,7 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.release import ancestors, parting_cuts
+from verify.xfem.release import ancestors
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -66,7 +66,7 @@ _RULES = {
 
 
 @dataclass(eq=False)
-class MethodOpening:
+class MethodOpening(OpeningBody):
     """A body cut by one of the methods, as `verify.solvers.motion_of_scene.OpeningBody`.
 
     Virtual nodes and removal cut again at every opening, what the cuts have opened by then. A
@@ -172,7 +172,7 @@ class MethodOpening:
         Of several seams at once it is the first cut of theirs.
         """
         if self._seams is None or self._opened.cut is None:
-            return parting_cuts(new, nodes, parent)
+            return super().parting(new, nodes, parent)
         own = np.zeros(self.final.phantom.node_count, dtype=np.int64)
         own[self.final.phantom.cells] = new.cells
         was = np.full(new.node_count, -1)
@@ -182,10 +182,6 @@ class MethodOpening:
         cut = np.full(new.node_count, len(self.openings.asked))
         np.minimum.at(cut, was[one[seam, corner]], self._opened.cut[seam])
         return cut[parent]
-
-    def regularisations(self) -> list[Regularisation]:
-        """Return nothing: the body of a method lists its changes."""
-        return []
 
     def _made(self, time: float, passed: bool = False) -> CutBody:
         """Make the body that the method cuts by the cuts as they are at a time."""

@@ -40,7 +40,13 @@ from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.release import TieForces, acceleration_at_corners, tie_forces
+from verify.xfem.release import (
+    TieForces,
+    acceleration_at_corners,
+    ancestors,
+    parting_cuts,
+    tie_forces,
+)
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -93,9 +99,8 @@ class StagedLedger(LedgerRows):
         for k, taken in instants:
             state = {n: float(getattr(ledger, n)[k]) for n in ("kinetic", "strain", "gravity")}
             momenta = ledger.momentum[k], ledger.angular_momentum[k]
-            self.enter(
-                state, done(k) | taken, *momenta, self._turned + ledger.cut_turn[k], self._removed
-            )
+            turned = self._turned + ledger.cut_turn[k]
+            self.enter(state, done(k) | taken | self._removed, *momenta, turned)
             self._penalty.append(float(ledger.penalty[k]))
         self._done, self._turned = done(-1), self._turned + ledger.cut_turn[-1]
 
@@ -148,7 +153,7 @@ class OpeningBody(Protocol):
     """
 
     openings: Openings
-    removal: bool
+    removal = False
     rule: str
     mass: str
     phase: str
@@ -167,15 +172,18 @@ class OpeningBody(Protocol):
 
     def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
         """Find corner of an old body from which each corner of one that is cut further comes."""
+        return ancestors(old, new)
 
     def fading(self, new: PhantomMesh) -> Fade | None:
         """Factors of the forces that hold released nodes of a body; None: all is let go at once."""
 
     def parting(self, new: PhantomMesh, nodes: _Ints, parent: _Ints) -> _Ints:
         """Cut that has parted each of some dof nodes, by the dof node that they were."""
+        return parting_cuts(new, nodes, parent)
 
     def regularisations(self) -> list[Regularisation]:
-        """Return what was changed in the body that was made last."""
+        """Return what was changed in the body that was made last: nothing, or the body says it."""
+        return []
 
 
 @dataclass(frozen=True)

@@ -310,7 +310,6 @@ class LedgerRows:
         momentum: _Floats,
         angular_momentum: _Floats,
         cut_angular_impulse: _Floats,
-        removed: Mapping[str, float] | None = None,
     ) -> None:
         """Enter a row.
 
@@ -320,15 +319,14 @@ class LedgerRows:
             Energies of the state by name, J.
         done : mapping
             What was done since the start, J: by the names of `reference.dynamics_step.DONE`; and
-            `work_of_blades`.
+            `work_of_blades`; and ``removed_energy`` and ``removed_mass``, where openings take
+            material away.
         momentum, angular_momentum : (d,), (1 or 3,) array
             In kg m/s and kg m²/s.
         cut_angular_impulse : (1 or 3,) array
             Of the tie forces of what the cuts have released, since the start, N m s.
-        removed : mapping, optional
-            ``removed_energy`` and ``removed_mass``, where openings take material away.
         """
-        row = {**state, **done, **(removed or {})}
+        row = {**state, **done}
         total = sum(state.values()) - done["work_of_loads"] - done["work_of_supports"]
         row["total"] = total + sum(row.get(name, 0.0) for name in _TAKEN)
         vectors = {

@@ -26,7 +26,7 @@ from verify.solvers.body_of_scene import (
 )
 from verify.solvers.boundary_conditions import motion_of_supports, supports_of
 from verify.solvers.interface import check_choices, refused_contact
-from verify.solvers.motion_of_scene import CutMotion, Fade, Integration
+from verify.solvers.motion_of_scene import CutMotion, Fade, Integration, OpeningBody
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem_answer import joined, penalised, solution_on, solve_equilibrium, treated
 from verify.solvers.xfem_system import MASSES, SCHEMES, elasticity_of, mass_of, system_of
@@ -38,11 +38,10 @@ from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
-from verify.xfem.release import ancestors, inherit_state, parting_cuts
+from verify.xfem.release import inherit_state
 from verify.xfem.slivers import join_fragments
 
 _Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _CHOICES: Mapping[str, Collection[str]] = {
     "tip": ("inside", "through", "nearest", "partial"),
@@ -101,7 +100,7 @@ class _Parameters:
 
 
 @dataclass(eq=False)
-class XfemOpening:
+class XfemOpening(OpeningBody):
     """A scene on a mesh that is cut, as `verify.solvers.motion_of_scene.OpeningBody`.
 
     Parameters
@@ -120,7 +119,6 @@ class XfemOpening:
     exact: Any
     given: _Parameters
 
-    removal = False
     phase = "enrichment"
 
     def __post_init__(self) -> None:
@@ -171,17 +169,9 @@ class XfemOpening:
                 f"further ({error}); slivers = 'keep' may help"
             ) from None
 
-    def source(self, old: PhantomMesh, new: PhantomMesh) -> _Ints:
-        """Find corner of an old body from which each corner of one that is cut further comes."""
-        return ancestors(old, new)
-
     def fading(self, new: PhantomMesh) -> Fade | None:
         """Return the factors of the forces at dof nodes that are released."""
         return self._opened.fade(new.node_parent)
-
-    def parting(self, new: PhantomMesh, nodes: _Ints, parent: _Ints) -> _Ints:
-        """Cut that has parted each of some dof nodes, by the dof node that they were."""
-        return parting_cuts(new, nodes, parent)
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was done to ends of cuts and to slivers."""
