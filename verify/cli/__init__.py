@@ -96,9 +96,7 @@ def build_parser() -> Parser:
     return parser
 
 
-def completion(
-    shell: Literal["bash", "zsh"],
-) -> int:
+def completion(shell: Literal["bash", "zsh"]) -> int:
     """Print a script that completes commands, options and cases in a shell.
 
     Parameters

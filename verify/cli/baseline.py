@@ -148,10 +148,7 @@ def _apart(*values: float | None) -> str:
 
 
 def diff(
-    run: Annotated[Path, Arg("OLD")],
-    other: Annotated[Path, Arg("NEW")],
-    *,
-    as_json: AsJson = False,
+    run: Annotated[Path, Arg("OLD")], other: Annotated[Path, Arg("NEW")], *, as_json: AsJson = False
 ) -> int:
     """Show which verdicts differ between two runs.
 

@@ -60,11 +60,7 @@ def list_(*, as_json: AsJson = False) -> int:
     return said(as_json, {"folder": str(cache.root), "entries": rows}, lines)
 
 
-def clear(
-    cases: Annotated[Sequence[str], Arg("CASE")] = (),
-    *,
-    outdated: bool = False,
-) -> int:
+def clear(cases: Annotated[Sequence[str], Arg("CASE")] = (), *, outdated: bool = False) -> int:
     """Remove references.
 
     Parameters
@@ -90,8 +86,7 @@ def clear(
 
 
 def export(
-    bundle: Annotated[Path, Arg("BUNDLE")],
-    cases: Annotated[Sequence[str], Arg("CASE")],
+    bundle: Annotated[Path, Arg("BUNDLE")], cases: Annotated[Sequence[str], Arg("CASE")]
 ) -> int:
     """Write the references of cases into one file, for runs without FEniCSx.
 

@@ -23,12 +23,7 @@ _UNWRAPPED = 10_000  # columns where there is no terminal: one line per case, fo
 _AS_IT_IS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
-def list_(
-    *,
-    exact: bool = False,
-    expression: Matching = None,
-    as_json: AsJson = False,
-) -> int:
+def list_(*, exact: bool = False, expression: Matching = None, as_json: AsJson = False) -> int:
     """List the cases, or the exact solutions.
 
     Parameters
@@ -95,11 +90,7 @@ def _exact_solutions() -> list[dict[str, Any]]:
     return [{"name": name, "title": text} for name, text in exact_solution_names().items()]
 
 
-def describe(
-    case: Case,
-    *,
-    as_json: Annotated[bool, Arg(flags=("--json",))] = False,
-) -> int:
+def describe(case: Case, *, as_json: Annotated[bool, Arg(flags=("--json",))] = False) -> int:
     """Say in words what a case asks.
 
     Parameters
@@ -379,9 +370,7 @@ def paraview(
 
 
 def doctor(
-    *,
-    compiling: Annotated[bool, Arg(flags=("--compile",))] = False,
-    as_json: AsJson = False,
+    *, compiling: Annotated[bool, Arg(flags=("--compile",))] = False, as_json: AsJson = False
 ) -> int:
     """Say what of the software that the solvers stand on is here, works, or is missing.
 

@@ -12,15 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from verify.cli.signatures import (
-    Arg,
-    Jobs,
-    Repetitions,
-    Strict,
-    Timeout,
-    count,
-    positive,
-)
+from verify.cli.signatures import Arg, Jobs, Repetitions, Strict, Timeout, count, positive
 from verify.cli.streams import command_line, print_json, print_line
 from verify.errors import InputError, RunStoppedError
 
@@ -98,11 +90,7 @@ class RunOptions:
     as_json: Annotated[bool, Arg(flags=("--json",))] = False
 
 
-def run(
-    cases: Annotated[Sequence[str], Arg("CASE")] = (),
-    *,
-    asked: RunOptions,
-) -> int:
+def run(cases: Annotated[Sequence[str], Arg("CASE")] = (), *, asked: RunOptions) -> int:
     """Solve, compare and judge cases, and render the report.
 
     Parameters

@@ -41,11 +41,7 @@ def list_(*, as_json: AsJson = False) -> int:
     return said(as_json, rows, lines, ensure_ascii=False)
 
 
-def install(
-    name: Name,
-    *,
-    python: Annotated[str | None, Arg("PYTHON")] = None,
-) -> int:
+def install(name: Name, *, python: Annotated[str | None, Arg("PYTHON")] = None) -> int:
     """Install one from its locked packages.
 
     Parameters

@@ -72,10 +72,7 @@ class Measured:
 
 
 def slivers(
-    cases: Annotated[Sequence[str], Arg("CASE")] = (),
-    *,
-    measured: Measured,
-    answer: Answer,
+    cases: Annotated[Sequence[str], Arg("CASE")] = (), *, measured: Measured, answer: Answer
 ) -> int:
     """Errors, conditioning and explicit steps of any solver, over families of scenes.
 
@@ -90,10 +87,7 @@ def slivers(
 
 
 def energy(
-    cases: Annotated[Sequence[str], Arg("CASE")] = (),
-    *,
-    measured: Measured,
-    answer: Answer,
+    cases: Annotated[Sequence[str], Arg("CASE")] = (), *, measured: Measured, answer: Answer
 ) -> int:
     """What any solver keeps of energy and momenta, over cases that move.
 
@@ -123,10 +117,7 @@ def claims(*, answer: Answer) -> int:
 
 
 def calibration(
-    *,
-    seed: Annotated[int, Arg("N", read=seed)] = 30,
-    quick: Quick = False,
-    answer: Answer,
+    *, seed: Annotated[int, Arg("N", read=seed)] = 30, quick: Quick = False, answer: Answer
 ) -> int:
     """Stated uncertainty of the reference against its true error.
 
@@ -249,10 +240,7 @@ def iterations(
     iterations: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (10, 40, 160),
     substeps: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (1, 4),
     most: Annotated[int | None, Arg("N", read=count)] = None,
-    names: Annotated[Sequence[str], Arg("PARAMETER", nargs=2)] = (
-        "iterations",
-        "substeps",
-    ),
+    names: Annotated[Sequence[str], Arg("PARAMETER", nargs=2)] = ("iterations", "substeps"),
     tolerance: Tolerance = 0.01,
     answer: Answer,
 ) -> int:

@@ -273,10 +273,7 @@ def _element(scene: Scene) -> float:
 
 _PARTED = {
     "two-cuts": (two_cuts, "the three parts between two cuts move without strain"),
-    "crossing-cuts": (
-        crossing_cuts,
-        "the quarters between crossing cuts move without strain",
-    ),
+    "crossing-cuts": (crossing_cuts, "the quarters between crossing cuts move without strain"),
     "branched-cut": (branched_cut, "the parts beside a branch of a cut move without strain"),
 }
 # Of the opening at the mouth, a quarter of an element before the end. With linear elements it is

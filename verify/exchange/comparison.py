@@ -14,13 +14,7 @@ from verify.errors import InputError
 from verify.exchange.export import Answers
 from verify.files import read_json
 from verify.result import CaseResult, SolveRecord, Status
-from verify.runner.directory import (
-    Job,
-    RunDirectory,
-    emptied,
-    solution_files,
-    store_record,
-)
+from verify.runner.directory import Job, RunDirectory, emptied, solution_files, store_record
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.run import run_cases
 from verify.runner.selection import Options

@@ -14,12 +14,7 @@ from verify.printable import duration_text
 from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.cost import LevelCost, case_cost, coarser_reference, finer_costs
 from verify.runner.directory import Job, RunDirectory, load_record, stored_record
-from verify.runner.fingerprint import (
-    code_of_solver,
-    digest_of,
-    physics_digest,
-    reference_digest,
-)
+from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest, reference_digest
 from verify.runner.loading import Loaded
 from verify.runner.references import REFERENCE, ReferenceBundle, bundle_of_case
 from verify.runner.selection import Options

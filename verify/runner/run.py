@@ -117,10 +117,7 @@ def run_cases(
     """
     for scene in scenes:
         check_scene(scene)
-    identity = {
-        "cases": [scene.name for scene in scenes],
-        "options_of_result": options.of_result(),
-    }
+    identity = {"cases": [scene.name for scene in scenes], "options_of_result": options.of_result()}
     check_judged(scenes, options)
     if options.ranks > 1 and not options.cluster:
         mpiexec()  # or say now that there is none

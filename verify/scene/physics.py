@@ -493,13 +493,7 @@ class CutFaces(_Load):
             return self.traction
         return [] if self.pressure is None else [self.pressure]
 
-    def on_faces(
-        self,
-        points: Array,
-        outward: Array,
-        normals: Array,
-        time: float = 0.0,
-    ) -> Array:
+    def on_faces(self, points: Array, outward: Array, normals: Array, time: float = 0.0) -> Array:
         """Traction (n, d) in Pa at points (n, d) of faces.
 
         Parameters

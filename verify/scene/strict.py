@@ -30,9 +30,7 @@ def _not_tiny(value: float) -> float:
 
 Finite = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
 Positive = Annotated[
-    float,
-    Field(strict=True, gt=0, le=_LARGEST, allow_inf_nan=False),
-    AfterValidator(_not_tiny),
+    float, Field(strict=True, gt=0, le=_LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)
 ]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
@@ -40,9 +38,7 @@ Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Line = Annotated[
     str,
     Field(
-        min_length=1,
-        max_length=2000,
-        pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]*$",
+        min_length=1, max_length=2000, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]*$"
     ),
 ]
 Point2 = tuple[Finite, Finite]

@@ -25,16 +25,7 @@ from reference.meshing.edge_splitting import graded_to
 from reference.meshing.inner_lines import singular_lines, split_at_part_ends
 from verify.errors import InputError
 from verify.geometry.simplices import mesh_edges, refine_uniformly
-from verify.scene import (
-    Box,
-    MeshFile,
-    Polygon,
-    PolygonCut,
-    Rectangle,
-    Scene,
-    SweptCut,
-    read_mesh,
-)
+from verify.scene import Box, MeshFile, Polygon, PolygonCut, Rectangle, Scene, SweptCut, read_mesh
 from verify.scene.acceptance import FractureQuantity
 from verify.scene.mesh_position import moved_mesh
 from verify.scene.tool_path import Cut
