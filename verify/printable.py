@@ -68,6 +68,11 @@ def memory_text(amount: float) -> str:
     return f"{amount / 1e6:.0f} MB" if amount < 0.9995e9 else f"{amount / 1e9:.3g} GB"
 
 
+def place_text(point: Iterable[float]) -> str:
+    """Return the coordinates of a point, with six digits each, in parentheses."""
+    return f"({', '.join(f'{x:.6g}' for x in point)})"
+
+
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
     """Return a table with a head, one line per row.
 

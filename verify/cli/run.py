@@ -203,19 +203,14 @@ def _options(
     from verify.runner.selection import Options
     from verify.solvers.interface import one_name
 
+    alike = ("repetitions", "jobs", "timeout", "references", "cluster", "ranks", "within")
     return Options(
         solvers=tuple(dict.fromkeys(names)),
-        repetitions=asked.repetitions,
         parameters=parameters,
-        jobs=asked.jobs,
-        timeout=asked.timeout,
         memory=asked.memory * 1e9 if asked.memory else None,
         cache=None if asked.no_cache else cache_folder(),
-        references=asked.references,
-        cluster=asked.cluster,
-        ranks=asked.ranks,
         judge_only=tuple(dict.fromkeys(map(one_name, asked.judge))),
-        within=asked.within,
+        **{name: getattr(asked, name) for name in alike},
     )
 
 

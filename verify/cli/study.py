@@ -16,7 +16,6 @@ Writes NAME.json, NAME.csv and NAME.html into the directory. Exit code 0 whateve
 findings say: they compare methods, most of which are known to fail somewhere.
 """
 
-import json
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -26,7 +25,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from verify.cli.signatures import Actions, Arg, Case, Out, Repetitions, count, positive, seed
-from verify.cli.streams import command_line
+from verify.cli.streams import command_line, said
 from verify.errors import InputError
 
 if TYPE_CHECKING:
@@ -362,15 +361,13 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
         raise
     written = write_study(answer.out, kind, found, command_line())
     page = render_study(answer.out, kind)
-    if answer.as_json:
-        said = [asdict(finding) for finding in found.findings]
-        print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
-        return 0
-    for finding in found.findings:
-        mark = "shown" if finding.verdict is None else str(finding.verdict)
-        print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
-    print(f"report: {page}")
-    return 0
+    lines = [
+        f"{one.verdict or 'shown'}: {one.topic}: {one.sentence} [expected: {one.expected}]"
+        for one in found.findings
+    ]
+    findings = [asdict(one) for one in found.findings]
+    content = {"record": str(written), "report": str(page), "findings": findings}
+    return said(answer.as_json, content, [*lines, f"report: {page}"])
 
 
 ACTIONS = Actions(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from verify.compare.hooke import law_of
 from verify.errors import InputError
 from verify.geometry.simplices import distance_to_pieces, measures, on_simplices, unit_normals
+from verify.printable import place_text as _place
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at
@@ -475,7 +476,3 @@ class _Fit:
         if self._scene.analysis.kinematics == "linear" or not self._scene.material.is_uniform:
             return np.asarray(field.stress(points, near))
         return law_of(self._scene).piola(field.gradient(points, near))
-
-
-def _place(point: Array) -> str:
-    return f"({', '.join(f'{x:.6g}' for x in point)})"

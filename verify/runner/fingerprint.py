@@ -190,7 +190,9 @@ class Sources:
             if name in found:
                 continue
             found.add(name)
-            passed |= {package for package in _above(name) if self.file(package)}
+            steps = name.split(".")
+            above = (".".join(steps[:n]) for n in range(1, len(steps)))
+            passed |= {package for package in above if self.file(package)}
             waiting += self._imported(name)
         return found | passed
 
@@ -294,12 +296,6 @@ def _imports(tree: ast.AST, package: str) -> Iterator[str]:
 
 def _is_type_checking(test: ast.expr) -> bool:
     return "TYPE_CHECKING" in (getattr(test, "id", ""), getattr(test, "attr", ""))
-
-
-def _above(name: str) -> list[str]:
-    """Return the packages that hold a module."""
-    steps = name.split(".")
-    return [".".join(steps[:n]) for n in range(1, len(steps))]
 
 
 def _data_files(folder: Path) -> Iterator[Path]:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from verify.errors import InputError
 from verify.geometry.simplices import boundary_facets, feet, measures
+from verify.printable import place_text as _at
 from verify.result import Notice, NoticeKind
 from verify.scene import Gravity, MeshFile, Scene, Traction, read_mesh
 from verify.scene.geometry import GROUP
@@ -213,10 +214,6 @@ def _done_to_the_mesh(scene: Scene, body: MeshFile) -> list[str]:
             "file has it"
         )
     return [f"of the mesh file, {note}" for note in notes]
-
-
-def _at(point: Array) -> str:
-    return f"({', '.join(f'{x:.6g}' for x in point)})"
 
 
 class _Skin:

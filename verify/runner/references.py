@@ -109,12 +109,10 @@ class Entry:
     def record_for(self, job: Job, words: str) -> SolveRecord:
         """Return its record for `job`, with a note in `words` on where it comes from."""
         code = "; the code of the reference has changed since" if self.outdated else ""
-        said = f"{words}, solved {self.made}{self._by()}{code}"
+        by = f" with DOLFINx {self.dolfinx}" if self.dolfinx else ""
+        said = f"{words}, solved {self.made}{by}{code}"
         notes = {**self.record.notes, "cache": said}
         return replace(self.record, case=job.case, notes=notes)
-
-    def _by(self) -> str:
-        return f" with DOLFINx {self.dolfinx}" if self.dolfinx else ""
 
     @property
     def dolfinx(self) -> str | None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.simplices import boundary_facets, on_simplices, oriented
+from verify.printable import place_text
 from verify.read_mesh import RawMesh, base_of, dimension_of, read_raw
 from verify.scene.strict import nearest
 
@@ -331,8 +332,8 @@ def _oriented(points: Array, cells: Ints, where: str) -> tuple[Ints, int]:
     size = np.linalg.norm(edges, axis=2).max(axis=1) ** edges.shape[1]
     flat = np.flatnonzero(~(np.abs(volume) > 1e-14 * size))
     if flat.size:
-        at = ", ".join(f"{x:.6g}" for x in points[cells[flat[0]]].mean(axis=0))
-        text = f"{flat.size} cells without volume, first cell {flat[0]} at ({at})"
+        at = place_text(points[cells[flat[0]]].mean(axis=0))
+        text = f"{flat.size} cells without volume, first cell {flat[0]} at {at}"
         raise InputError(text, where)
     return oriented(points, cells), int((volume < 0).sum())
 
@@ -354,7 +355,7 @@ def _refuse_overlaps(points: Array, cells: Ints, oriented: bool, where: str) -> 
     same = np.flatnonzero((asked[order[1:]] == asked[order[:-1]]).all(axis=1))
     if same.size:
         pair = np.sort(order[same[0] : same[0] + 2] % len(cells))
-        at = ", ".join(f"{x:.6g}" for x in points[cells[pair[0]]].mean(axis=0))
+        at = place_text(points[cells[pair[0]]].mean(axis=0))
         text = f"cells {pair[0]} and {pair[1]} overlap: they are on the same side of a facet"
         more = f", as are {same.size - 1} pairs more" if same.size > 1 else ""
-        raise InputError(f"{text}, around ({at}){more}; folded, or given twice", where)
+        raise InputError(f"{text}, around {at}{more}; folded, or given twice", where)

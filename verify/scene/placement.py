@@ -21,6 +21,7 @@ from verify.geometry.simplices import (
     overlap_area,
     rim_edges,
 )
+from verify.printable import place_text
 from verify.scene.acceptance import FractureQuantity, SectionQuantity, StressQuantity
 from verify.scene.cuts import ArcCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle
@@ -320,7 +321,7 @@ def misplaced_point(
         if point is None or isinstance(asked, FractureQuantity | SectionQuantity):
             continue
         at = np.array(point, dtype=float)
-        where = f"{place} ({', '.join(f'{x:.6g}' for x in at)})"
+        where = f"{place} {place_text(at)}"
         ball = [at]
         if isinstance(asked, StressQuantity):
             where += f" as the centre of a ball of {asked.radius:.4g} m"

@@ -44,6 +44,7 @@ _VALUES = "{} values; expected {}"
 _IN_TIME = "belongs to a dynamic analysis"
 _AFTER_END = "{:g} s is after the end, {:g} s"
 _EXACT = "'exact' needs an [exact] solution"
+_FACTOR = "quantities[stress_intensity|energy_release_rate]"
 _NO_CUT = "no cut '{}'{}"
 
 
@@ -337,8 +338,8 @@ RULES: Rules = (
     ("reference.kind", lambda s: s.reference.kind == "exact" and s.exact is None, _EXACT),
     ("cuts", lambda s: _twice(s.cuts), "names must differ, got {}"),
     ("quantities", lambda s: _twice(s.quantities), "names must differ, got {}"),
-    ("quantities[displacement].point", _point_elsewhere, "expected {} coordinates"),
-    ("quantities[section|stress].point", _point_elsewhere, "expected {} coordinates"),
+    ("quantities[displacement|part|section|stress].point", _point_elsewhere,
+     "expected {} coordinates"),
     ("quantities[reaction].centre", lambda s, p: p.centre and len(p.centre) != s.dimension
      and s.dimension, "expected {} coordinates"),
     ("quantities[reaction|section].component", lambda s, p: s.dimension == 2
@@ -353,7 +354,6 @@ RULES: Rules = (
      lambda s, p: s.dimension == 2 and "z" in p.component, "z in a 2D scene"),
     ("quantities[displacement].component",
      lambda s, p: "xyz".index(p.component) >= s.dimension, "z in a 2D scene"),
-    ("quantities[part].point", _point_elsewhere, "expected {} coordinates"),
     ("quantities[part].component", lambda s, p: s.dimension == 2 and _axis_in_plane(p),
      "{} in a 2D scene has {}"),
     ("quantities[part]",
@@ -370,8 +370,7 @@ RULES: Rules = (
     ("quantities[opening].point",
      lambda s, p: s.dimension == 3 and (p.point is None or p.at is not None),
      "an opening in 3D is at 'point = …'"),
-    ("quantities[stress_intensity|energy_release_rate].cut",
-     lambda s, p: _no_cut(s, p.cut), _NO_CUT),
+    (f"{_FACTOR}.cut", lambda s, p: _no_cut(s, p.cut), _NO_CUT),
     ("quantities[stress_intensity].mode",
      lambda s, p: p.mode == "III" and s.dimension == 2, "III belongs to 3D scenes"),
     ("quantities[stress_intensity].mode",
@@ -380,17 +379,16 @@ RULES: Rules = (
     ("quantities[energy_release_rate].cut",
      lambda s, p: s.dimension == 3 and _at_an_end(s, p) and p.cut,
      "'{}' is opened on the way; released_to_cut says what its blade takes"),
-    ("quantities[stress_intensity|energy_release_rate].end", lambda s, p: _at_an_end(s, p)
+    (f"{_FACTOR}.end", lambda s, p: _at_an_end(s, p)
      and (p.end is None or p.point is not None) and s.dimension, "a factor in {}D is at 'end = …'"),
-    ("quantities[stress_intensity|energy_release_rate].point", lambda s, p: not _at_an_end(s, p)
+    (f"{_FACTOR}.point", lambda s, p: not _at_an_end(s, p)
      and (p.point is None or p.end is not None), "a factor in 3D is at 'point = …'"),
-    ("quantities[stress_intensity|energy_release_rate].cut",
+    (f"{_FACTOR}.cut",
      lambda s, p: _cut(s, p.cut).kind == "arc" and _cut(s, p.cut).closed and p.cut,
      "'{}' is closed and has no end"),
-    ("quantities[stress_intensity|energy_release_rate].cut", _no_front,
+    (f"{_FACTOR}.cut", _no_front,
      "factors in 3D are known along the fronts of round discs and of polygons"),
-    ("quantities[stress_intensity|energy_release_rate].point", _off_front,
-     "is {:.3g} m away from the front of '{}'"),
+    (f"{_FACTOR}.point", _off_front, "is {:.3g} m away from the front of '{}'"),
     ("quantities[*].name", lambda s, p: p.name in METRICS and p.name,
      "'{}' names an error; take another"),
     ("acceptance[*].metric", lambda s, p: _unknown_metric(s, p.metric), "no '{}'{}"),

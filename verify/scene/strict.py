@@ -117,17 +117,12 @@ NO_POINT_LOADS = (
 _HINTS = {"loads": NO_POINT_LOADS}  # by the list
 # what pydantic expected, by the type of its error
 _WANTED = {
-    "float_type": "a finite number",
-    "finite_number": "a finite number",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
+    **dict.fromkeys(("float_type", "finite_number"), "a finite number"),
+    **dict.fromkeys(("int_type", "int_from_float"), "a whole number"),
     "string_type": "a text in quotes",
-    "string_too_short": "one line of text",
-    "string_pattern_mismatch": "one line of text",
+    **dict.fromkeys(("string_too_short", "string_pattern_mismatch"), "one line of text"),
     "string_too_long": "at most {max_length} characters",
-    "dict_type": "a table of keys",
-    "model_type": "a table of keys",
-    "model_attributes_type": "a table of keys",
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table of keys"),
     "too_short": "at least {min_length} entries",
     "too_long": "at most {max_length} entries",
     "greater_than": "a number > {gt:g}",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
 from verify.errors import InputError
+from verify.printable import place_text
 from verify.scene.acceptance import (
     Acceptance,
     BladeCheck,
@@ -145,9 +146,9 @@ def _bounded(values: Array, beside: Array, points: Array, name: str) -> Array:
     most = _LARGEST * float(np.linalg.norm(beside, axis=1).max(initial=0.0))
     wrong = np.flatnonzero(~(size <= most) & (most > 0.0))
     if len(wrong):
-        at = ", ".join(f"{x:.6g}" for x in points[wrong[0]])
+        at = place_text(points[wrong[0]])
         raise InputError(
-            f"initial.{name}: the exact field is unbounded at the node ({at}); expected no node at "
+            f"initial.{name}: the exact field is unbounded at the node {at}; expected no node at "
             "the tip at the time 0: another mesh, or another place of the tip"
         )
     return np.asarray(values)

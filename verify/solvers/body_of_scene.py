@@ -94,7 +94,7 @@ def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
     """
     states: dict[str | None, State] = {"strain": "plane strain", "stress": "plane stress"}
     state = states.get(scene.material.plane, "solid")
-    young, poisson, _ = _moduli(scene, mesh.points[mesh.cells].mean(axis=1))
+    young, poisson, _ = moduli_of(scene, mesh.points[mesh.cells].mean(axis=1))
     thickness = scene.material.thickness
     if thickness is None:
         return replace(isotropic(young, poisson, state), law=scene.material.model)
@@ -107,16 +107,11 @@ def density_of(scene: Scene, mesh: SimplexMesh) -> float | NDArray[np.float64]:
 
     One number, or one for each cell (m,) where materials differ by region.
     """
-    density = volumetric_mass(scene, mesh.points[mesh.cells].mean(axis=1))
+    density = moduli_of(scene, mesh.points[mesh.cells].mean(axis=1))[2]
     return density * (scene.material.thickness or 1.0)
 
 
-def volumetric_mass(scene: Scene, points: NDArray[np.float64]) -> Any:
-    """Return the density in kg/m³: one number, or (n,) at points where materials differ."""
-    return _moduli(scene, points)[2]
-
-
-def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
+def moduli_of(scene: Scene, points: NDArray[np.float64]) -> Any:
     """Compute Young's modulus, Poisson's ratio and density: numbers, or arrays (n,) at points."""
     material = scene.material
     if material.is_uniform:

@@ -23,7 +23,7 @@ from verify.scene.parts import (
 )
 from verify.scene.physics import Load, PrescribedMotion, factor_at, first_factor
 from verify.solution import Regularisation
-from verify.solvers.body_of_scene import volumetric_mass
+from verify.solvers.body_of_scene import moduli_of
 from verify.xfem.body import MovingSupports
 from verify.xfem.loads_and_supports import (
     Supports,
@@ -152,7 +152,7 @@ class ForceDensity:
         Only the weight differs by cell, where materials do: by that at the centroids (m, d).
         """
         if isinstance(self.load, Gravity):
-            density = volumetric_mass(self.scene, centroids)
+            density = moduli_of(self.scene, centroids)[2]
             return np.multiply.outer(density, np.asarray(self.load.acceleration))
         given = self.load.traction if isinstance(self.load, Traction) else self.load.force
         return np.asarray(given, dtype=float) if is_uniform(given) else None
@@ -183,10 +183,8 @@ class ForceDensity:
 
 def loads_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> _Floats:
     """Return the consistent nodal forces (N, d) of all loads, N (per metre in 2D)."""
-    total = np.zeros_like(phantom.node_points)
-    for i in range(len(scene.loads)):
-        total += forces_of(scene, i, phantom, exact)
-    return total
+    each = (forces_of(scene, i, phantom, exact) for i in range(len(scene.loads)))
+    return sum(each, np.zeros_like(phantom.node_points))
 
 
 def is_moving(load: Load, exact: Any) -> bool:

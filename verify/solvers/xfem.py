@@ -90,14 +90,6 @@ class _Parameters:
         """Return the options of the time integration."""
         return Integration(self.scheme, self.step_factor, self.spectral_radius)
 
-    def notes(self) -> dict[str, str]:
-        """Say them, for the report."""
-        return {
-            "method": "P1 XFEM, element-wise cut",
-            "tip": str(self.tip),
-            "slivers": self.slivers,
-        }
-
 
 @dataclass(eq=False)
 class XfemOpening(OpeningBody):
@@ -305,7 +297,8 @@ def _run(
     """Cut, load, solve."""
     mesh, size = made
     given = given.on(scene, mesh)
-    record = Record(notes=given.notes())
+    said = {"method": "P1 XFEM, element-wise cut", "tip": str(given.tip), "slivers": given.slivers}
+    record = Record(notes=said)
     if scene.analysis.kind == "dynamic":
         openings = openings_of(scene, size, given.opening or scene.analysis.opening)
         opening = XfemOpening(scene, mesh, openings, exact, given)
