@@ -15,7 +15,6 @@ from verify.errors import InputError
 from verify.printable import one_line
 
 if TYPE_CHECKING:
-    from verify.runner.selection import Options
     from verify.scene import Scene
 
 
@@ -227,10 +226,8 @@ def check(files: Annotated[Sequence[str], Arg("FILE")], *, as_json: AsJson = Fal
     from verify.cli.run_text import case_lines, memory_line
     from verify.runner.cost import LevelCost
     from verify.runner.fingerprint import cache_folder
-    from verify.runner.selection import Options
 
-    options = Options()
-    rows = [_checked(file, options) for file in files]
+    rows = [_checked(file) for file in files]
     if as_json:
         print_json(rows)
     else:
@@ -253,12 +250,13 @@ def check(files: Annotated[Sequence[str], Arg("FILE")], *, as_json: AsJson = Fal
     return 2 if any(row["error"] for row in rows) else 0
 
 
-def _checked(file: str, options: "Options") -> dict[str, Any]:
+def _checked(file: str) -> dict[str, Any]:
     """Return the checks of a file as plain values."""
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
     from verify.runner.mesh_faults import body_notes, mesh_warnings
+    from verify.runner.selection import Options
     from verify.scene import load_scenes
 
     try:
@@ -276,7 +274,7 @@ def _checked(file: str, options: "Options") -> dict[str, Any]:
         "body": body_text(scenes[0]),
         "notes": body_notes(scenes[0]),
         "warnings": mesh_warnings(scenes[0]),
-        "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
+        "cost": [asdict(one) for scene in scenes for one in costs_of(scene, Options())],
     }
 
 

@@ -13,6 +13,10 @@ from verify.cli.signatures import Arg, Case, positive
 from verify.cli.streams import said
 from verify.errors import InputError, UnsupportedSceneError
 
+_QUALITY = (
+    "volume_error", "loose_edges", "inverted_elements", "inverted_facets", "stray_facets",
+    "largest_stretch",
+)  # fmt: skip
 _FORCES = ("driving_force", "resistance")  # on blades, as Session.blade_forces gives them
 
 if TYPE_CHECKING:
@@ -163,12 +167,7 @@ def _played(
         "seconds_of_95_percent_of_the_steps": step.most,
         "seconds_of_the_slowest_step": step.largest,
         "steps_within": step.within,
-        "volume_error": quality.volume_error,
-        "loose_edges": quality.loose_edges,
-        "inverted_elements": quality.inverted_elements,
-        "inverted_facets": quality.inverted_facets,
-        "stray_facets": quality.stray_facets,
-        "largest_stretch": quality.largest_stretch,
+        **{name: getattr(quality, name) for name in _QUALITY},
         "cuts": [
             {
                 "name": name,

@@ -15,7 +15,7 @@ from verify.compare.hooke import law_of
 from verify.errors import InputError
 from verify.geometry.simplices import distance_to_pieces, measures, on_simplices, unit_normals
 from verify.printable import place_text as _place
-from verify.scene import BodyForce, CutFaces, Gravity, Scene, Support, Traction
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.parts import on_part
 from verify.scene.physics import PrescribedMotion, factor_at
 from verify.scene.tables import AtRest, InitialField, Moving
@@ -206,7 +206,9 @@ class _Fit:
         for i, support in enumerate(scene.supports):
             on = np.flatnonzero(on_part(scene.geometry, support.where, points, self._size))
             place = np.ix_(on, support.held(scene.dimension))
-            given[place], by[place] = self._prescribed(support, points[on], near[on], time), i
+            exact = self._exact if support.displacement == "exact" else None
+            motion = PrescribedMotion(support, points[on], near[on], exact)
+            given[place], by[place] = motion.values(factor_at(support.history, time), time), i
         largest = max(np.abs(true).max(initial=0.0), np.nanmax(np.abs(given), initial=0.0))
         off = np.nan_to_num(np.abs(given - true), nan=0.0)
         if off.max(initial=0.0) > _SAME * largest:
@@ -227,11 +229,6 @@ class _Fit:
                 on = on_part(self._scene.geometry, support.where, nodes, self._size)
                 points, near = np.vstack([points, nodes[on]]), np.vstack([near, beside[on]])
         return points, near
-
-    def _prescribed(self, support: Support, points: Array, near: Array, time: float) -> Array:
-        exact = self._exact if support.displacement == "exact" else None
-        motion = PrescribedMotion(support, points, near, exact)
-        return motion.values(factor_at(support.history, time), time)
 
     def _tractions(self, time: float) -> Iterator[str]:
         """Tractions of loads, or none, in the components that no support holds."""

@@ -122,9 +122,8 @@ def run_cases(
     if options.ranks > 1 and not options.cluster:
         mpiexec()  # or say now that there is none
     bundle = ReferenceBundle(options.references) if options.references else None
-    cluster = (
-        ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
-    )
+    limits = options.timeout, options.memory
+    cluster = ClusterEngine(options.cluster, *limits) if options.cluster else None
     names = list(dict.fromkeys(n for scene in scenes for n in solvers_of(scene, options)))
     if len(set(map(folder_name, names))) < len(names):
         said = f"{', '.join(sorted(names))}: two would have the same folder"

@@ -146,6 +146,11 @@ class _ResultantQuantity(Strict):
     component: Literal["x", "y", "z"]
     time: Time = None
 
+    @property
+    def about(self) -> list[float] | None:
+        """Point that a moment is about, m."""
+        return getattr(self, "point", getattr(self, "centre", None))
+
     def direction(self, dimension: int) -> NDArray[np.float64]:
         """Return the unit vector (d,) of a force, or the axis of a moment."""
         return np.eye(3)["xyz".index(self.component)][: 3 if self.of == "moment" else dimension]
@@ -171,11 +176,6 @@ class ReactionQuantity(_ResultantQuantity):
          "it belongs to a moment, which needs one"),
     )  # fmt: skip
 
-    @property
-    def about(self) -> list[float] | None:
-        """Point that a moment is about, m."""
-        return self.centre
-
 
 class SectionQuantity(_ResultantQuantity):
     """Force or moment in a section: of what lies beyond it on the rest (2D: per metre).
@@ -197,11 +197,6 @@ class SectionQuantity(_ResultantQuantity):
         ("normal", lambda p: len(p.normal) != len(p.point) and (len(p.normal), len(p.point)),
          "{} components at a point of {}"),
     )  # fmt: skip
-
-    @property
-    def about(self) -> list[float]:
-        """Point that a moment is about, m."""
-        return self.point
 
 
 class StressQuantity(Strict):
@@ -283,18 +278,11 @@ class StressIntensityQuantity(FractureQuantity):
 
 
 Quantity = Annotated[
-    StrainEnergyQuantity
-    | DisplacementQuantity
-    | MaximumDisplacementQuantity
-    | OpeningQuantity
-    | PartQuantity
-    | ReactionQuantity
-    | SectionQuantity
-    | StressQuantity
-    | EnergyReleaseQuantity
-    | StressIntensityQuantity,
+    StrainEnergyQuantity | DisplacementQuantity | MaximumDisplacementQuantity | OpeningQuantity
+    | PartQuantity | ReactionQuantity | SectionQuantity | StressQuantity
+    | EnergyReleaseQuantity | StressIntensityQuantity,
     Field(discriminator="kind"),
-]
+]  # fmt: skip
 
 
 class _Check(Strict):
