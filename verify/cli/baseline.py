@@ -121,8 +121,7 @@ def update(
     from verify.baseline import read_baseline, read_run, update_from, write_baseline
 
     after, moves = update_from(read_baseline(file), read_run(run), only)
-    moved = [move for move in moves if move.state == "moved"]
-    if moved:
+    if moved := [move for move in moves if move.state == "moved"]:
         write_baseline(after, file)
     code = 1 if any(move.state == "refused" for move in moves) else 0
     lines = []

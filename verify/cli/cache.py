@@ -100,8 +100,7 @@ def export(
     from verify.runner.references import write_bundle
     from verify.runner.selection import select_cases
 
-    scenes = select_cases(cases, None, "heavy")
-    if not scenes:
+    if not (scenes := select_cases(cases, None, "heavy")):
         raise InputError(f"no case matches {' '.join(cases)}")
     entries = write_bundle(bundle, scenes, _cache())
     size = bundle.stat().st_size / 1e6

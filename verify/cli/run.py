@@ -133,8 +133,7 @@ def run(cases: Annotated[Sequence[str], Arg("CASE")] = (), *, asked: RunOptions)
 
     names, parameters = _solvers_of(asked)
     weight = "quick" if asked.quick else "heavy" if asked.heavy else "normal"
-    scenes = select_cases(cases, asked.expression, weight)
-    if not scenes:
+    if not (scenes := select_cases(cases, asked.expression, weight)):
         print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
         return NOTHING_RAN
     options = _options(asked, names, parameters)

@@ -57,8 +57,7 @@ def memory_line(costs: Iterable[LevelCost]) -> str:
 
 def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> str:
     """Say in a line what a run will take, and which case takes most; empty if nobody knows."""
-    rows = [row for _, group in costs for row in group]
-    if not rows:
+    if not (rows := [row for _, group in costs for row in group]):
         return ""
     most, group = max(costs, key=lambda one: _seconds(one[1]))
     share = _seconds(group) / _seconds(rows)
@@ -76,8 +75,7 @@ def suites_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -
     """Say which suite comes first, with the cases and the rough time of each."""
     said = []
     for option, tag in (("-k demo", "demo"), ("--quick", "quick")):
-        suite = [rows for scene, rows in costs if tag in scene.tags]
-        if suite:
+        if suite := [rows for scene, rows in costs if tag in scene.tags]:
             spent = _START * (2 + len(suite) / jobs) + sum(map(_seconds, suite)) / jobs
             said.append(f"`verify run {option}` ({len(suite)} cases, {duration_text(spent)})")
     return f"which suite first: {', then '.join(said)}; rough" if said else ""

@@ -114,8 +114,7 @@ def _truth(run: Path, entry: CaseEntry, scene: Scene, judged: Sequence[Solution]
     else:
         finest = _chosen(entry, [REFERENCE], None)
         references = {s.level: read_stored(run, s.solution or "") for s in finest}
-    truth = truth_of(scene, references, judged, exact)
-    if truth is None:
+    if (truth := truth_of(scene, references, judged, exact)) is None:
         raise InputError("holds no stored solution of the reference", str(entry.folder))
     return truth
 

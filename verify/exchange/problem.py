@@ -340,8 +340,7 @@ def _load(scene: Scene, boundary: Boundary, i: int, conforming: bool, exact: Any
     measured = (measures(corners) * pieces.share)[:, None] * weights
     measured = measured * (scene.material.thickness or 1.0)
     density = ForceDensity(scene, load, exact)
-    uniform = density.uniform(_centroids(boundary, cells))
-    if uniform is None:
+    if (uniform := density.uniform(_centroids(boundary, cells))) is None:
         each = len(weights)
         # a point of a conforming mesh belongs to the side of its own cell; else to its own
         near = np.repeat(_centroids(boundary, cells), each, axis=0) if conforming else None

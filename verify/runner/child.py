@@ -346,8 +346,7 @@ def telling_line(log: Path) -> str:
         text = _ends(log)
     except OSError:
         return "left no log"
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    if not lines:
+    if not (lines := [line.strip() for line in text.splitlines() if line.strip()]):
         return "said nothing"
     for line in lines:
         if match := _FATAL.match(line):

@@ -49,8 +49,7 @@ class Comparison:
 
     def poll(self) -> CaseResult | None:
         """Look once; return the result when it is there."""
-        ending = self._child.poll()
-        if ending is None:
+        if (ending := self._child.poll()) is None:
             return None
         result = stored_result(self._folder, self._question["key"])
         return self._without_result(ending) if result is None else result

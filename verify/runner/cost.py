@@ -125,8 +125,7 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
         return _reference_costs(scene)
     rows = []
     for level in range(scene.mesh.count):
-        found = mesh_of_level(scene, level)
-        if found is None:
+        if (found := mesh_of_level(scene, level)) is None:
             return []
         nodes, size = found
         unknowns = round(nodes * scene.dimension)
@@ -146,8 +145,7 @@ def _reference_costs(scene: Scene) -> list[LevelCost]:
     """Estimate all levels of a reference before any is solved."""
     rows = []
     for level in range(scene.reference.levels):
-        found = _reference_mesh(scene, level)
-        if found is None:
+        if (found := _reference_mesh(scene, level)) is None:
             return []
         unknowns = found[0] * scene.dimension
         least, most = (round(share * unknowns) for share in _RANGE)
@@ -190,8 +188,7 @@ def forecast_text(scene: Scene, finer: Sequence[LevelCost], timeout: float, memo
         Limits of a solve, s and bytes.
     """
     said = [f"level {row.level} in about {duration_text(row.seconds)}" for row in finer]
-    beyond = [row for row in finer if row.seconds > timeout or row.memory > memory]
-    if not beyond:
+    if not (beyond := [row for row in finer if row.seconds > timeout or row.memory > memory]):
         return ", ".join(said)
     first = beyond[0]
     limit = f"{duration_text(timeout)} (--timeout)"

@@ -140,8 +140,7 @@ def _check_same_run(root: Path, identity: dict[str, Any]) -> None:
     before = read_json(file)
     if before.get("schema") != RUN_SCHEMA:
         raise InputError(f"not a run of schema {RUN_SCHEMA}; give --out a new directory", str(file))
-    changed = [key for key in _IDENTITY if before.get(key) != identity[key]]
-    if changed:
+    if changed := [key for key in _IDENTITY if before.get(key) != identity[key]]:
         what = {"cases": "cases", "options_of_result": "solvers, repetitions or parameters"}
         words = " and ".join(what[key] for key in changed)
         raise InputError(

@@ -196,8 +196,7 @@ def check_places_in_mesh(scene: Scene, mesh: SimplexMesh) -> None:
             raise InputError(f"{place}: expected '{cut.expected}' but it is '{kind}'", where)
     if scene.cell_dimension == scene.dimension:
         steps = _NEAR * size * np.vstack([np.eye(mesh.space), -np.eye(mesh.space)])
-        fault = misplaced_point(scene, size, lambda at: bool(holds(mesh, at + steps).any()))
-        if fault:
+        if fault := misplaced_point(scene, size, lambda at: bool(holds(mesh, at + steps).any())):
             raise InputError(fault, where)
 
 

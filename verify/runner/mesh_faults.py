@@ -151,8 +151,7 @@ def _wave_time(scene: Scene, body: MeshFile) -> str:
 
 def _unused(scene: Scene, body: MeshFile) -> str:
     """Warn of groups that the case does not use, or say ""."""
-    left = [name for name in body.body().groups if name not in _used_groups(scene)]
-    if not left:
+    if not (left := [name for name in body.body().groups if name not in _used_groups(scene)]):
         return ""
     names = ", ".join(f"'{name}'" for name in left[:_LISTED]) + (", …" if left[_LISTED:] else "")
     return f"groups of '{body.file}' that the case does not use: {names}"

@@ -28,8 +28,7 @@ def mpiexec() -> str:
         If there is none.
     """
     beside = Path(sys.executable).with_name("mpiexec")
-    found = str(beside) if beside.exists() else shutil.which("mpiexec")
-    if found is None:
+    if (found := str(beside) if beside.exists() else shutil.which("mpiexec")) is None:
         text = "needs mpiexec, which is neither beside this Python nor in the path"
         raise InputError(text, "--ranks")
     return found

@@ -306,8 +306,7 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
         if scene.judged_by_exact:
             raise InputError(f"'{scene.name}' is judged by its exact solution; it has no reference")
         own = cache.find(scene)
-        missing = set(range(scene.reference.levels)) - {entry.level for entry in own}
-        if missing:
+        if missing := set(range(scene.reference.levels)) - {entry.level for entry in own}:
             levels = ", ".join(map(str, sorted(missing)))
             raise InputError(
                 f"level {levels} of the reference of '{scene.name}' is not in the cache "

@@ -134,8 +134,7 @@ def _sources(names: Sequence[str]) -> dict[str, bool]:
         pattern = any(mark in name for mark in "*?[") and not name.endswith(".toml")
         folder = [case for case in known if case.startswith(f"{name.rstrip('/')}/")]
         if folder or (pattern and row_asked(name) is None):
-            found = folder or [case for case in known if fnmatchcase(case, name)]
-            if not found:
+            if not (found := folder or [case for case in known if fnmatchcase(case, name)]):
                 raise InputError(f"no case matches '{name}'; `verify list` shows them all")
             for case in found:
                 sources.setdefault(case, False)

@@ -301,8 +301,7 @@ class Work:
         return record
 
     def _record(self, job: Job, child: Running, ending: Ending) -> SolveRecord:
-        outcome = outcome_in(job.folder)
-        if outcome is None:
+        if (outcome := outcome_in(job.folder)) is None:
             blank = job.blank(*death(child.log, ending, self.options.timeout, self.memory))
             record = replace(blank, wall=ending.wall, peak_memory=ending.peak)
         else:

@@ -103,8 +103,7 @@ def load_scenes(source: str | Path) -> list[Scene]:
         With file, key and what was expected there, if anything is wrong.
     """
     text = str(source)
-    asked = row_asked(text)
-    if asked is not None:
+    if (asked := row_asked(text)) is not None:
         text = asked[0]
     path = Path(text)
     name = path.stem
@@ -135,8 +134,7 @@ def _check_row(scene: Scene, known: Sequence[Row | None], where: str) -> None:
     values = [row.value for row in known if row is not None]
     own = None if scene.row is None else scene.row.value
     for i, check in enumerate(scene.acceptance):
-        row = check.row if isinstance(check, RatioCheck) else None
-        if row is None:
+        if (row := check.row if isinstance(check, RatioCheck) else None) is None:
             continue
         if row not in values:
             listed = ", ".join(f"{value:g}" for value in values) or "no rows: no [parameters]"
@@ -169,8 +167,7 @@ def _the_row(
 ) -> tuple[Row | None, dict[str, Any]]:
     """Find the row that is named, by the number that its value is."""
     _, parameter, text = asked
-    known = [row.label for row, _ in rows if row is not None]
-    if not known:
+    if not (known := [row.label for row, _ in rows if row is not None]):
         raise InputError(f"has no parameters, and so no row '[{parameter}={text}]'", where)
     try:
         wanted = f"[{parameter}={float(text):.12g}]"

@@ -136,8 +136,7 @@ _WANTED = {
 def nearest(word: str, words: Iterable[str]) -> str:
     """Give a phrase to put behind "no such …": the nearest of `words`, or all if they are few."""
     known = sorted(words)
-    close = get_close_matches(word, known, n=1, cutoff=0.6)
-    if close:
+    if close := get_close_matches(word, known, n=1, cutoff=0.6):
         return f"; did you mean '{close[0]}'?"
     if len(known) > _FEW:
         return f"; expected one of {len(known)}, such as {', '.join(known[:_SHOWN])}"
@@ -199,8 +198,7 @@ def _wanted(fault: Any) -> str:
     if fault["type"] in ("list_type", "tuple_type"):
         table = isinstance(fault["input"], dict)
         return "a list of tables ([[…]], not […])" if table else "a list in brackets"
-    text = _WANTED.get(fault["type"])
-    if text is None:
+    if (text := _WANTED.get(fault["type"])) is None:
         return str(fault["msg"]).removeprefix("Input should be ")
     return text.format(**fault.get("ctx", {}))
 

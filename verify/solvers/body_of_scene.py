@@ -95,8 +95,7 @@ def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
     states: dict[str | None, State] = {"strain": "plane strain", "stress": "plane stress"}
     state = states.get(scene.material.plane, "solid")
     young, poisson, _ = moduli_of(scene, mesh.points[mesh.cells].mean(axis=1))
-    thickness = scene.material.thickness
-    if thickness is None:
+    if (thickness := scene.material.thickness) is None:
         return replace(isotropic(young, poisson, state), law=scene.material.model)
     sheet = isotropic(young, poisson, "plane stress")
     return Material(thickness * sheet.lam, thickness * sheet.mu)

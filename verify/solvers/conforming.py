@@ -280,8 +280,7 @@ def _equilibrium(
 
 def _stability(finite: LargeStrainSolve) -> str:
     """Say what the equilibrium was checked by beyond the energy of each step."""
-    modes = finite.negative_modes
-    if modes is None:
+    if (modes := finite.negative_modes) is None:
         return "not shown: a membrane, or a tangent too large to be factorised"
     said = f"{modes} negative modes of the tangent" if modes else "tangent positive definite"
     if finite.paths == 1:

@@ -171,8 +171,7 @@ def _realised(scene: Scene, level: int) -> Realised | None:
 
 def _imprinted(scene: Scene, level: int) -> tuple[Array, Cells, Cells]:
     """Imprint the cuts of the scene on its background mesh of a level."""
-    realised = _realised(scene, level)
-    if realised is not None:
+    if (realised := _realised(scene, level)) is not None:
         return realised[:3]
     points, cells = _background(scene, level)
     if scene.dimension == 2:

@@ -185,8 +185,7 @@ class TiedMotion:
         }
 
     def _contact(self) -> ContactPressure | None:
-        faces = self.body.contact
-        if faces is None:
+        if (faces := self.body.contact) is None:
             return None
         return ContactPressure(faces.points, faces.weights, np.array(self.pressures))
 

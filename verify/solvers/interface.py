@@ -193,8 +193,7 @@ def _class_of(name: str) -> Any:
         module, _, attribute = _BUILT_IN.get(name, name if ":" in name else _FOREIGN).partition(":")
         if not module or not attribute:
             raise InputError(f"solver '{name}'; expected MODULE:CLASS")
-        found = getattr(import_module(module), attribute, None)
-        if found is None:
+        if (found := getattr(import_module(module), attribute, None)) is None:
             raise InputError(f"solver '{name}': no '{attribute}' in module '{module}'")
         return found
     points = {point.name: point for point in entry_points(group=_GROUP)}

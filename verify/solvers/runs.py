@@ -226,8 +226,7 @@ def march(
     sizes: Counter[float] = Counter()
     stops = timeline.stops.tolist()
     for k, stop in enumerate(stops):
-        begun = mover.open(stop) or k == 0
-        if begun:
+        if begun := mover.open(stop) or k == 0:
             mover.begin()
         if stop in timeline.outputs:
             mover.put_out()

@@ -199,8 +199,7 @@ def solve_equilibrium(
         load = loads_of(scene, phantom, exact)
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
-    faces = faces_of(scene, phantom, penalise)
-    if faces is not None:
+    if (faces := faces_of(scene, phantom, penalise)) is not None:
         with record.timed("solve"):
             elastic = InternalForce(body, material, "linear", kernels)
             closed = solve_closed(elastic, faces, supports, load)
