@@ -284,6 +284,10 @@ class Replay(Strict):
     tool_force: NonNegative = 0.0
 
 
+def _strain_energy_only() -> list[Quantity]:
+    return [StrainEnergyQuantity(kind="strain_energy")]
+
+
 class SceneTables(Strict):
     """Tables of a case as they stand in its file; `Scene` is those that fit one another.
 
@@ -316,7 +320,7 @@ class SceneTables(Strict):
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
     replay: Replay | None = None
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
-        default_factory=lambda: [StrainEnergyQuantity(kind="strain_energy")]
+        default_factory=_strain_energy_only
     )
     acceptance: list[Acceptance] = Field(default_factory=list)
     known_findings: list[KnownFinding] = Field(default_factory=list)
