@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from verify.report.study_page import render_study
+from verify.scene import load_scene, load_scenes
 from verify.solution import Solution
 from verify.solvers import find_solver
 from verify.study import claims_measured as measured
@@ -89,11 +90,29 @@ def test_a_recovered_estimate_of_a_quadratic_field_is_its_interpolation_error():
 
 
 def test_strains_that_jump_across_a_cut_are_no_error_to_a_recovered_estimate():
-    from verify.scene import load_scene
-
     solution = find_solver("xfem").solve(load_scene("statics/f1_patch"), 0)
     assert np.ptp(solution.displacement) > 0.01
     assert recovered_error(solution, 0.6, 0.4) < 1e-12
+
+
+@pytest.mark.parametrize("method, kept", [
+    ("xfem", True), ("virtual_node", True), ("snapping", True),
+    ("subdivision", False), ("xfem mass=consistent", False),
+])  # fmt: skip
+def test_lumped_to_the_sides_no_sliver_shortens_the_step_and_subdivided_each_does(
+    method, kept, monkeypatch
+):
+    """Rows at ε = 0.1, 1e-4 and 1e-6; snapping moves nodes onto the cut in the last two."""
+    rows = [s for s in load_scenes("slivers/plane_edges") if s.row.value in (0.1, 1e-4, 1e-6)]
+    monkeypatch.setattr(measured, "load_scenes", lambda family: rows)
+    steps, raw, scaled = np.transpose(measured._systems.__wrapped__("slivers/plane_edges", method))
+    if kept:
+        assert steps[method == "snapping" :].min() > 0.99
+    else:  # in proportion to ε
+        assert steps[1:] / steps[:-1] == pytest.approx([1e-3, 1e-2], rel=0.05)
+    if method == "xfem":
+        assert raw[-1] > 1e4 * raw[0]
+        assert scaled[-1] < 1.1 * scaled[0]
 
 
 def test_removal_takes_the_triangles_that_the_line_crosses():

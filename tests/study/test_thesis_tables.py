@@ -1,4 +1,4 @@
-"""The thesis' tables measured again: laws of counting, delay and slivers; verdicts can fall."""
+"""The thesis' tables measured again: laws of counting and delay; verdicts can fall."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from verify.result import Verdict
-from verify.scene import load_scenes
 from verify.simulator.thesis import (
     CUTS,
     LIMITS,
@@ -19,15 +18,7 @@ from verify.simulator.thesis import (
     step_times,
     with_other_frames,
 )
-from verify.study import thesis_measured as measuring
-from verify.study.thesis_measured import (
-    METHODS,
-    Measured,
-    MethodOnCase,
-    exponent,
-    sliver_systems,
-)
-from verify.study.thesis_verdicts import verdicts_on_cost, verdicts_on_mechanics
+from verify.study.thesis_verdicts import Measured, verdicts
 
 _HOLD = (
     "Table 4.3, its law",
@@ -39,17 +30,11 @@ _HOLD = (
     "real time: every step within 1 ms",
     "Table 4.6: delay and machine",
     "Table 4.6: delay is size",
-    "stable: explicit step with slivers, virtual_node",
     "stable: no slivers in the face",
-    "accuracy: statics/f3",
-    "what goes wrong: small pieces",
 )
 _FALL = (
     "fewer unknowns: the catch",
     "Table 4.6, the thesis' own",
-    "stable: explicit step with slivers, subdivision",
-    "stable: explicit step with slivers, xfem mass=consistent",
-    "what goes wrong: methods",
 )
 
 
@@ -66,14 +51,6 @@ def strips():
 @pytest.fixture(scope="module")
 def crossed():
     return delays((200, 400))
-
-
-@pytest.fixture(scope="module")
-def slivers():
-    rows = [s for s in load_scenes("slivers/plane_edges") if s.row.value in (0.1, 1e-4, 1e-6)]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measuring, "load_scenes", lambda family: rows)
-        return [one for name in METHODS for one in sliver_systems("slivers/plane_edges", name)]
 
 
 def test_a_strip_of_n_cut_triangles_enriches_n_plus_2_nodes(strips) -> None:
@@ -134,41 +111,8 @@ def test_200_cuts_cost_a_step_of_1000_tetrahedra_less_than_in_the_thesis() -> No
     assert cut.step / bare.step < 2.1
 
 
-def test_lumped_to_the_sides_no_sliver_shortens_the_step_and_subdivided_each_does(slivers) -> None:
-    def steps(method):
-        return [step for step in slivers if step.method == method]
-
-    for method in ("xfem", "virtual_node"):
-        assert min(step.ratio for step in steps(method)) > 0.99
-        assert abs(exponent(steps(method))) < 0.01
-    for method in ("subdivision", "xfem mass=consistent"):
-        assert exponent(steps(method)) == pytest.approx(1.0, abs=0.01)
-    # a cut so near to nodes is snapped to them
-    assert steps("snapping")[-1].ratio > 0.99
-
-
-def test_an_exponent_is_no_slope_from_split_cells_to_a_cut_on_nodes(slivers) -> None:
-    split = [step for step in slivers if step.method == "subdivision"]
-    snapped = replace(split[-1], size=1e-9, ratio=1.0, unknowns=split[-1].unknowns - 4)
-    assert exponent([*split, snapped]) == exponent(split)
-    assert exponent(split) == pytest.approx(1.0, abs=0.01)
-    assert np.isnan(exponent(split[:1]))
-
-
-def test_small_pieces_are_badly_scaled_and_nothing_worse(slivers) -> None:
-    first, _, last = (row for row in slivers if row.method == "xfem")
-    assert last.condition > 1e4 * first.condition
-    assert last.scaled < 1.1 * first.scaled
-
-
-def method(solver, level, error, step=1.0):
-    both = (error, 0.99 * error, 1.01 * error)
-    return MethodOnCase("statics/griffith_inside" if error > 1 else "statics/f3", solver, level,
-                        0.1, 10, both, both, None, 0.0, step, 1.0, "", "")  # fmt: skip
-
-
 @pytest.fixture(scope="module")
-def measured(strips, face, crossed, slivers) -> Measured:
+def measured(strips, face, crossed) -> Measured:
     """Small true tables; times made up so as to keep every limit."""
     steps = [
         StepTime(size, cuts, size, cuts, 100 + cuts // 2, 1e-4, 2e-4, 2e-4, 0.3 * (1 + cuts), 0)
@@ -179,16 +123,12 @@ def measured(strips, face, crossed, slivers) -> Measured:
     phases = {"motion": 5e-4, "step": 8e-4}
     hand = RealTime(1005, 240, 1674, 276, 76, shares, shares, phases, phases, 9e-4, 0.01,
                     0.0, 0, 0, 0.0)  # fmt: skip
-    methods = [method("xfem", 0, 0.100), method("conforming", 0, 0.100), method("uncut", 0, 0.9)]
-    return Measured(
-        strips, face, steps, crossed, with_other_frames(200, crossed[2].speed, (0.1,)), hand,
-        methods, slivers,
-    )  # fmt: skip
+    frames = with_other_frames(200, crossed[2].speed, (0.1,))
+    return Measured(strips, face, steps, crossed, frames, hand)
 
 
 def verdict(measured, topic):
-    found = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
-    (one,) = [finding for finding in found if finding.topic.startswith(topic)]
+    (one,) = [finding for finding in verdicts(measured) if finding.topic.startswith(topic)]
     return one.verdict
 
 
@@ -215,9 +155,3 @@ def test_a_verdict_falls_with_its_evidence(measured) -> None:
     assert verdict(busy, "real time: every step within 1 ms") is Verdict.UNDECIDED
     loose = replace(measured, hand=replace(measured.hand, loose_edges=1))
     assert verdict(loose, "stable: the hand") is Verdict.FAIL
-    worse = [method("xfem", 0, 0.12), *measured.methods[1:]]
-    assert verdict(replace(measured, methods=worse), "accuracy") is Verdict.FAIL
-    unclear = [method("xfem", 0, 0.104), *measured.methods[1:]]
-    assert verdict(replace(measured, methods=unclear), "accuracy") is Verdict.UNDECIDED
-    nothing = [row for row in measured.methods if row.solver != "xfem"]
-    assert verdict(replace(measured, methods=nothing), "accuracy") is Verdict.UNDECIDED

@@ -1,12 +1,10 @@
 """The page of the thesis study: whose claims hold, and its figures with ours beside them."""
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from typing import Any
 
-from verify.report.notation import Drawing, Lead, solver_title
-from verify.report.plots import Palette, Series, loglog, profile_panel
-from verify.report.sliver_page import listed
+from verify.report.notation import Drawing, Lead
+from verify.report.plots import profile_panel
 
 
 def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -57,25 +55,7 @@ def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
             over_sizes("thesis: delay, s", "thesis"),
             over_sizes("size over speed: delay, s", "delay"),
         ],
-        "slivers": _thesis_slivers(record["slivers"]),
     }
-
-
-def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing | None]:
-    """Return the share of the uncut step; no line where the unknowns change."""
-    palette, panels = Palette(), []
-    for dimension in dict.fromkeys(row["dimension"] for row in slivers):
-        own, series = listed(slivers, dimension=dimension), []
-        for method in dict.fromkeys(row["method"] for row in own):
-            rows = sorted(listed(own, method=method), key=lambda row: -row["size"])
-            places: list[tuple[Any, Any]] = []
-            for _, stretch in groupby(rows, lambda row: row["unknowns"]):
-                places += [(None, None), *((row["size"], row["ratio"]) for row in stretch)]
-            series.append(Series(solver_title(method), places))
-        title = f"critical step over uncut, {dimension}D"
-        x_title = "distance of cut and nodes, element sizes"
-        panels.append(loglog(title, x_title, series, palette, falling=True))
-    return panels
 
 
 def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -84,7 +64,6 @@ def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
     for whose, words in (
         ("the thesis", "claims of the thesis"),
         ("this project", "claims of this project"),
-        ("other ways", "demands that the other ways to cut are held to as well"),
     ):
         own = [finding for finding in findings if finding.get("whose") == whose]
         if not own:

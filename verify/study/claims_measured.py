@@ -16,19 +16,18 @@ from numpy.typing import NDArray
 
 from reference.exact import exact_of
 from verify.conformance.scenes import held, line, pull, unit_scene, weight
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.convergence import observed_rate
 from verify.judge.intervals import quotient_half_width
 from verify.printable import words_of
 from verify.result import Metric, SolveRecord, Status
-from verify.scene import Scene, load_scene, scene_content
+from verify.scene import Scene, load_scene, load_scenes, scene_content
 from verify.simulator.thesis import FaceCount, count_face, count_strips, delays
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh
 from verify.study.measured_scenes import measured_scene, variant_of
-from verify.study.thesis_measured import sliver_systems
-from verify.system import critical_step, lowest_frequency, with_uncut_twin
+from verify.system import condition_numbers, critical_step, lowest_frequency, with_uncut_twin
 
 Array = NDArray[np.float64]
 Cut = tuple[Array, NDArray[np.int64], Array, Array]  # points, cells, point and normal of a plane
@@ -96,11 +95,24 @@ def _quotient(one: Metric, other: Metric, note: str = "") -> Number:
     return within(one.value / other.value, quotient_half_width(*parts), note)
 
 
-_systems = cache(sliver_systems)
+@cache
+def _systems(family: str, method: str) -> list[tuple[float, float, float]]:
+    """Critical step over the uncut body's, condition number, and that scaled by the diagonal."""
+    variant, found = variant_of(method), []
+    for scene in load_scenes(family):
+        if scene.row is None or not 0.0 < scene.row.value < 0.5:
+            continue
+        system: Any = getattr(variant.found(), "system", None)
+        try:
+            own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
+        except UnsupportedSceneError:
+            continue
+        found.append((critical_step(own) / critical_step(whole), *condition_numbers(own)))
+    return found
 
 
 def _least_over_slivers(method: str) -> Number:
-    found = [row.ratio for family in _FAMILIES for row in _systems(family, method)]
+    found = [step for family in _FAMILIES for step, *_ in _systems(family, method)]
     return _extreme(found, min, f"ε = 0.1 to 1e-12 in {' and '.join(_FAMILIES)}")
 
 
@@ -503,10 +515,8 @@ def diagonal_scaling() -> list[Number]:
     """Condition numbers over ε, largest over least, scaled by the diagonal; and the raw largest."""
     found = []
     for family in _FAMILIES:
-        rows = _systems(family, "xfem")
-        scaled = [row.scaled for row in rows]
-        raw = max(row.condition for row in rows)
-        note = f"{min(scaled):.3g} to {max(scaled):.3g}; unscaled up to {raw:.1e}"
+        _, raw, scaled = zip(*_systems(family, "xfem"), strict=True)
+        note = f"{min(scaled):.3g} to {max(scaled):.3g}; unscaled up to {max(raw):.1e}"
         found.append(exactly(max(scaled) / min(scaled), note))
     return found
 

@@ -1,13 +1,15 @@
-"""The study of the thesis: everything measured, judged, and as plain data."""
+"""The study of the thesis: its tables measured again, judged, and as plain data.
+
+What ways to cut do to errors and explicit steps is judged by the ranked run, the study of slivers
+and that of claims.
+"""
 
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from verify.judge.models import coarsest
 from verify.runner.tasks import Task
-from verify.scene import load_scene, scene_content
 from verify.simulator.thesis import (
     CUTS,
     SPEEDS,
@@ -25,25 +27,8 @@ from verify.simulator.thesis import (
     with_other_frames,
 )
 from verify.study.study import Making, Study
-from verify.study.thesis_measured import (
-    METHODS,
-    Measured,
-    compare_methods,
-    critical_steps,
-    sliver_systems,
-)
-from verify.study.thesis_verdicts import verdicts_on_cost, verdicts_on_mechanics
+from verify.study.thesis_verdicts import Measured, verdicts
 
-# exact without tips, exact with tips inside elements, and references in the plane and in space
-CASES = (
-    "statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip",
-    "statics/buried_cut", "controls/thin_skin",
-)  # fmt: skip
-SOLVERS = (
-    "xfem", "conforming", "subdivision", "snapping", "snapping_subdivision", "removal",
-    "removal_refined", "virtual_node", "virtual_node_arbitrary", "mass_spring", "uncut",
-)  # fmt: skip
-_FAMILIES = ("slivers/plane_edges", "slivers/space_faces")
 _ROWS = (10, 50, 100, 500, 1000)  # of Table 4.3
 
 
@@ -103,50 +88,24 @@ def _line(
 
 
 def thesis_study(making: Making, quick: bool) -> ThesisStudy:
-    """Solve the cases by all methods, measure the tables, and judge both.
+    """Measure the tables, and judge them.
 
     Parameters
     ----------
     making : Making
     quick : bool
-        Fewer cases, methods, levels, and rows of each table.
+        Fewer rows of each table.
 
     Raises
     ------
     ChildProcessError
         If a table cannot be measured; finished parts are kept.
     """
-    names, solvers = (CASES[:2], SOLVERS[:4]) if quick else (CASES, SOLVERS)
-    scenes = [coarsest(load_scene(name), 2 if quick else 3) for name in names]
-    making.announce(f"{len(solvers)} solvers on {', '.join(names)}, into thesis-cases")
-    results = making.run(scenes, "thesis-cases", solvers, 1 if quick else 3)
-    families = _FAMILIES[:1] if quick else _FAMILIES
     tables = _tables(quick)
-    slivers = [
-        Task(f"slivers, {name}, {method}", sliver_systems, {"family": name, "method": method})
-        for method in METHODS
-        for name in families
-    ]
-    steps = [
-        Task(f"critical steps, {scene.name}", critical_steps,
-             {"content": scene_content(scene), "solvers": solvers}, solvers)
-        for scene in scenes
-    ]  # fmt: skip
-    found = making.parts("thesis", [*tables.values(), *slivers, *steps])
-    rest = iter(found[len(tables) :])
-    own = dict(zip(tables, found, strict=False))
+    own = dict(zip(tables, making.parts("thesis", list(tables.values())), strict=True))
     (hand, contended), (late, frames) = own.pop("hand"), own.pop("waits")
-    measured = Measured(
-        **own,
-        delays=late,
-        frames=frames,
-        hand=hand,
-        contended=contended,
-        slivers=[one for _ in slivers for one in next(rest)],
-        methods=compare_methods(results, [one for _ in steps for one in next(rest)]),
-    )
-    findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
-    return ThesisStudy(findings=findings, measured=measured, quick=quick)
+    measured = Measured(**own, delays=late, frames=frames, hand=hand, contended=contended)
+    return ThesisStudy(findings=verdicts(measured), measured=measured, quick=quick)
 
 
 def _tables(quick: bool) -> dict[str, Task]:

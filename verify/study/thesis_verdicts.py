@@ -1,8 +1,8 @@
-"""Verdicts of the thesis study: Tables 4.3 to 4.6, stability, accuracy, and what goes wrong."""
+"""Verdicts of the thesis study: Tables 4.3 to 4.6, real time, and the step of a cut face."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from verify.result import Verdict
 from verify.simulator.session import LIMITS
 from verify.simulator.thesis import (
     SPEEDS,
@@ -14,22 +14,46 @@ from verify.simulator.thesis import (
     StripCount,
 )
 from verify.study.study import Finding, held
-from verify.study.thesis_measured import Measured, MethodOnCase, SliverSystem, exponent
 
 _NEAR = 0.2  # of the thesis' increments: another face, other strokes, two nodes less for each end
 _BEATEN = 500.0
 _SAME = 1e-9
 _ROUND = 0.1  # of the law of size over speed: elements of a patch differ in shape
-THESIS, PROJECT, OTHERS = "the thesis", "this project", "other ways"  # whose claim is judged
+_KEPT = 0.9  # of the uncut step
+THESIS, PROJECT = "the thesis", "this project"  # whose claim is judged
 
 
-def verdicts_on_cost(measured: Measured) -> list[Finding]:
-    """Judge the tables of cost."""
+@dataclass(frozen=True)
+class Measured:
+    """Numbers of all tables.
+
+    Attributes
+    ----------
+    strips, face : Table 4.3, Figure 4.11
+    steps : Tables 4.4 and 4.5, Figure 4.25
+    delays, frames : Table 4.6, Figure 4.26
+    hand : real time
+    contended : str
+        Why times may be too long, if they may.
+    """
+
+    strips: list[StripCount]
+    face: list[FaceCount]
+    steps: list[StepTime]
+    delays: list[Delay]
+    frames: list[Frames]
+    hand: RealTime
+    contended: str = ""
+
+
+def verdicts(measured: Measured) -> list[Finding]:
+    """Judge the tables."""
     return [
         *_unknowns(measured.strips, measured.face),
         *_steps(measured.steps),
         *_real_time(measured.hand, measured.contended),
         *_delays(measured.delays, measured.frames),
+        _face(measured.face[-1]),
     ]
 
 
@@ -206,51 +230,6 @@ def _fall(delays: Sequence[Delay], name: str) -> tuple[float, float]:
     return own[-1].thesis / own[0].thesis, own[-1].delay / own[0].delay
 
 
-_FLAT, _KEPT = 0.02, 0.9  # exponent of a step that slivers leave alone; share of the uncut one
-_AS_GOOD = 1.05
-_TIPS = 3.0
-# L² and energy norm against a conforming mesh: what the cases themselves demand (squared in L²)
-_LIMITS = {
-    "statics/griffith_inside": (_TIPS, _TIPS),
-    "statics/tissue_strip": (1.25**2, 1.25),
-    "statics/buried_cut": (_TIPS, _TIPS),
-}
-_TIP_CASE = "griffith_inside"
-
-
-def verdicts_on_mechanics(measured: Measured) -> list[Finding]:
-    """Judge slivers, accuracy and limits."""
-    return [
-        *_slivers(measured.slivers),
-        _face(measured.face[-1]),
-        *_accuracy(measured.methods),
-        *_wrong(measured.methods),
-        *_small([row for row in measured.slivers if row.method == "xfem"]),
-    ]
-
-
-def _slivers(steps: Sequence[SliverSystem]) -> Iterator[Finding]:
-    for method in dict.fromkeys(step.method for step in steps):
-        own = [step for step in steps if step.method == method]
-        slopes = {
-            dim: exponent([step for step in own if step.dimension == dim])
-            for dim in dict.fromkeys(step.dimension for step in own)
-        }
-        least = min(own, key=lambda step: step.ratio)
-        exponents = ", ".join(
-            f"{round(slope, 2) + 0.0:.2f} ({dim}D)" for dim, slope in slopes.items()
-        )
-        yield Finding(
-            f"stable: explicit step with slivers, {method}",
-            f"over ε from {max(s.size for s in own):g} to {min(s.size for s in own):g} the "
-            f"critical step is at least {least.ratio:.3g} of that of the uncut body, at "
-            f"ε = {least.size:g}; exponents {exponents}",
-            f"at least {_KEPT} of the uncut step, exponent within {_FLAT} of 0",
-            held(least.ratio >= _KEPT and not any(abs(s) > _FLAT for s in slopes.values())),
-            THESIS if method == "xfem" else OTHERS,
-        )
-
-
 def _face(row: FaceCount) -> Finding:
     said = ", ".join(
         f"{name} {step:.2g} ({row.smallest[name]:.1e})" for name, step in row.step.items()
@@ -265,113 +244,3 @@ def _face(row: FaceCount) -> Finding:
         held(kept),
         THESIS,
     )
-
-
-def _finest(methods: Sequence[MethodOnCase], case: str) -> dict[str, MethodOnCase]:
-    """By solver, on the finest level that both XFEM and the conforming solver were compared on."""
-    own = [row for row in methods if row.case == case and row.displacement is not None]
-    levels = [{r.level for r in own if r.solver == name} for name in ("xfem", "conforming")]
-    common = levels[0] & levels[1]
-    return {row.solver: row for row in own if common and row.level == max(common)}
-
-
-def _accuracy(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
-    for case in dict.fromkeys(row.case for row in methods):
-        finest = _finest(methods, case)
-        if not finest:
-            yield Finding(
-                f"accuracy: {case}", "XFEM and the conforming solver were not both compared",
-                "a comparison", Verdict.UNDECIDED, PROJECT,
-            )  # fmt: skip
-            continue
-        limits = _LIMITS.get(case, (_AS_GOOD, _AS_GOOD))
-        words, ratios = [], []
-        for limit, title, quantity in zip(
-            limits, ("L²", "energy norm"), ("displacement", "energy_norm"), strict=True
-        ):
-            one = getattr(finest["xfem"], quantity)
-            other = getattr(finest["conforming"], quantity)
-            if one is None or other is None:
-                continue
-            # the ratio of any two values in the intervals
-            low, high = one[1] / other[2], one[2] / max(other[1], 1e-300)
-            ratios.append((low / limit, high / limit))
-            words.append(f"{title} {one[0]:.3g} against {other[0]:.3g}")
-        kept = bool(ratios) and all(high <= 1.0 for _, high in ratios)
-        broken = any(low > 1.0 for low, _ in ratios)
-        steps = {r.solver: r.critical_step for r in finest.values() if r.critical_step}
-        said = ", ".join(f"{name} {step:.2g}" for name, step in steps.items())
-        yield Finding(
-            f"accuracy: {case}",
-            f"relative errors of XFEM against those of a conforming mesh of the same size, level "
-            f"{finest['xfem'].level}: {'; '.join(words) or 'none measured'}. "
-            f"Critical steps over that of the uncut mesh: {said}",
-            f"at most {limits[0]:g} (L²) and {limits[1]:g} times (energy norm) the conforming one",
-            held(kept if kept or broken else None),
-            PROJECT,
-        )
-
-
-def _wrong(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
-    for case in dict.fromkeys(row.case for row in methods):
-        finest = _finest(methods, case)
-        if not finest or "xfem" not in finest:
-            continue
-        own = finest["xfem"].displacement
-        assert own is not None
-        others = {n: r.displacement[0] / own[0] for n, r in finest.items() if r.displacement}
-        good = [name for name, ratio in others.items() if ratio <= _TIPS]
-        bad = {name: ratio for name, ratio in others.items() if ratio > _TIPS}
-        yield Finding(
-            f"what goes wrong: methods on {case}",
-            f"within {_TIPS:g} times XFEM's error: {', '.join(good)}; worse: "
-            + (", ".join(f"{name} {ratio:.0f} times" for name, ratio in bad.items()) or "none"),
-            f"every method within {_TIPS:g} times",
-            held(not bad),
-            OTHERS,
-        )
-        if _TIP_CASE in case:
-            yield from _tips(methods, case)
-
-
-def _tips(methods: Sequence[MethodOnCase], case: str) -> Iterator[Finding]:
-    rows = {
-        name: {
-            row.level: row
-            for row in methods
-            if row.case == case and row.solver == name and row.displacement is not None
-        }
-        for name in ("xfem", "conforming")
-    }
-    levels = sorted(set(rows["xfem"]) & set(rows["conforming"]))
-    ratios = [
-        rows["xfem"][k].displacement[0] / rows["conforming"][k].displacement[0]  # type: ignore[index]
-        for k in levels
-    ]
-    if not ratios:
-        return
-    yield Finding(
-        "what goes wrong: tips inside elements",
-        "without tip enrichment an incision ends on an edge of the element. Its error is "
-        + ", ".join(f"{ratio:.2f}" for ratio in ratios)
-        + " times that of a conforming mesh whose node is the tip, from coarse to fine; "
-        f"{rows['xfem'][levels[0]].changed or 'nothing else changed'}",
-        f"tips inside elements cost no accuracy: at most {_AS_GOOD:g} times",
-        held(max(ratios) <= _AS_GOOD),
-        THESIS,
-    )
-
-
-def _small(pieces: Sequence[SliverSystem]) -> Iterator[Finding]:
-    for dim in dict.fromkeys(row.dimension for row in pieces):
-        own = sorted((row for row in pieces if row.dimension == dim), key=lambda row: -row.size)
-        first, last = own[0], own[-1]
-        yield Finding(
-            f"what goes wrong: small pieces, {dim}D",
-            f"from ε = {first.size:g} to {last.size:g} the condition number of XFEM's stiffness "
-            f"goes from {first.condition:.1e} to {last.condition:.1e}; scaled by its diagonal it "
-            f"goes from {first.scaled:.0f} to {last.scaled:.0f}",
-            "condition number after scaling less than twice that at the first ε",
-            held(last.scaled <= 2.0 * first.scaled),
-            PROJECT,
-        )
