@@ -56,9 +56,9 @@ def test_rows_are_run_judged_by_each_other_and_reported(verify):
     assert compared["verdict"] == "PASS"
     assert compared["observed"] == pytest.approx(1.0)
     (shown,) = family_views(load_run(verify.folder / "out"), Palette())
-    assert shown.parameter == "epsilon"
-    assert "relative L² error of the displacement" in [part.title for part in shown.parts]
-    assert list(shown.parts[0].found) == [0.5, 0.0]
+    assert shown["parameter"] == "epsilon"
+    assert "relative L² error of the displacement" in [part["title"] for part in shown["parts"]]
+    assert list(shown["parts"][0]["found"]) == [0.5, 0.0]
     again = verify(*run)
     assert json.loads(again.stdout)["cases"] == json.loads(done.stdout)["cases"]
     alone = verify(*[arg.replace("square.toml", "square.toml[epsilon=0.5]") for arg in run[:3]],

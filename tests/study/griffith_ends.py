@@ -15,7 +15,6 @@ from verify.judge.quantities import Measured
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.budget import CutEnd, cut_ends
 
 
 def crack_scene(ends, angle, mesh):
@@ -47,14 +46,13 @@ class Off:
     `error` is relative, of the displacement in L2. The answer belongs to a crack with other ends:
     `ends` (2, 2) is their shift in elements, by modes, fitted in L2, and `rest` the error that is
     left. `released` is the shift from the energy alone, the sum of both ends: with the outline
-    held, dU/da = −G. `realised` is the realised shift, at the end of the crack first.
+    held, dU/da = −G.
     """
 
     error: float
     ends: np.ndarray
     rest: float
     released: float
-    realised: list[CutEnd]
 
 
 class Crack:
@@ -82,11 +80,6 @@ class Crack:
     def _norm(self, field):
         return float(np.sqrt(self._rule.weights @ np.sum(field**2, axis=1)))
 
-    def error_of(self, ends):
-        """Relative L2 norm of the displacement's change by advances of both ends, elements."""
-        both = np.repeat(ends, 2)
-        return float(np.sqrt(both @ self.gram @ both))
-
     def solve(self, solver, **parameters):
         """Solve by a solver and say what the answer is off by."""
         solution = find_solver(solver).solve(self.scene, 0, 1, **parameters)
@@ -100,15 +93,9 @@ class Crack:
         rest = error - self.size * np.einsum("i,iqd->qd", shift, self._advances)
         one = Measured(solution, self.body, law_of(self.scene), self.scene)
         excess = one.quantity(self.scene.quantities[0]) - self._energy
-        found = cut_ends(
-            self.body, solution.cut_facets, self.mesh.points, self.mesh.cells, self.size
-        )
-        last = self.exact.singular_points[1]
-        found.sort(key=lambda end: float(np.linalg.norm(np.subtract(end.place, last))))
         return Off(
             self._norm(error) / norm,
             shift.reshape(2, 2),
             self._norm(rest) / norm,
             -excess / self._release / self.size,
-            found,
         )

@@ -154,11 +154,6 @@ def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_wa
     static = [c for c in study.candidates if c.analysis == "static"]
     assert len(static) == 2
     assert any(c.high <= 0.15 for c in static) == adequate
-    (end,) = study.ends
-    assert end.place == (0.47, 0.27)
-    assert end.moved == end.nodes  # the end is a node
-    assert abs(end.moved) < 0.24
-    assert end.acts < end.moved - 0.3
     dynamic = [c for c in study.candidates if c.analysis == "dynamic" and c.level == 1]
     assert any(c.high <= 0.15 for c in dynamic)
     said = study.findings[0].sentence

@@ -89,34 +89,6 @@ def test_the_energy_says_the_same_of_the_ends_as_the_displacement(rule, count):
 
 
 @levels
-@pytest.mark.parametrize("rule", RULES)
-def test_where_the_answer_has_its_ends_follows_from_the_nodes_of_their_edges(rule, count):
-    answers = [one for _, one in of(rule, count)]
-    off = np.array([
-        [end.acts - shift for end, shift in zip(one.realised, one.ends[:, 0], strict=True)]
-        for one in answers
-    ])  # fmt: skip
-    stated = answers[0].realised[0].uncertainty
-    assert np.mean(np.abs(off) <= stated) >= 0.9  # 95 % of twice as many ends, other places
-    assert np.abs(off).max() < 2 * stated
-    moved = np.array([[end.moved for end in one.realised] for one in answers])
-    assert (moved.min() < -0.5) if rule == "inside" else (moved.max() > 0.5)
-    assert moved.max() < 1e-9 or rule == "through"
-    assert moved.min() > -1e-9 or rule == "inside"
-
-
-@levels
-@pytest.mark.parametrize("rule", RULES)
-def test_the_error_of_a_crack_is_predicted_from_the_places_of_its_ends_before_it_is_solved(
-    rule, count
-):
-    """In units of what an element at each end costs; the rest of the error is second order."""
-    for crack, one in of(rule, count):
-        predicted = crack.error_of([end.acts for end in one.realised])
-        assert abs(np.hypot(predicted, one.rest) - one.error) < 0.3 * crack.error_of([1.0, 1.0])
-
-
-@levels
 def test_conforming_elements_with_a_node_at_the_end_shorten_it_by_a_third_of_an_element_too(count):
     shifts = np.array([one.ends[:, 0] for _, one in of("conforming", count)])
     assert np.all((shifts > -0.55) & (shifts < -0.25))
@@ -138,7 +110,6 @@ def test_ends_on_nodes_of_the_mesh_cost_xfem_what_they_cost_conforming_elements(
     crack = Crack(scene)
     one, other = crack.solve("xfem"), crack.solve("conforming")
     assert one.error == pytest.approx(other.error, rel=1e-9)
-    assert [end.nodes for end in one.realised] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 LIMIT = 1.15

@@ -25,8 +25,6 @@ class Cell:
         A word that stands in a frame before the text: PASS, FAIL, UNDECIDED, ERROR.
     strong : bool
     tip : str
-    grade : str
-        Of a stability map: good, fair, poor, bad or none.
     link : str
         Identifier on the page that the text leads to.
     span : int
@@ -38,14 +36,13 @@ class Cell:
     verdict: str = ""
     strong: bool = False
     tip: str = ""
-    grade: str = ""
     link: str = ""
     span: int = 1
 
 
 @dataclass
 class Table:
-    """A table; `kind` is ``prose`` if its cells hold sentences, ``map`` if they are tinted.
+    """A table; `kind` is ``prose`` if its cells hold sentences.
 
     The first cell of a row is its head if `named`. Cells may be given as text, or as a number that
     `number` writes; they are kept as `Cell`.

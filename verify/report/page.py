@@ -6,7 +6,6 @@ its Markdown are made of it by templates.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from verify.printable import words_of
@@ -14,15 +13,7 @@ from verify.report.answers import answers
 from verify.report.case_view import CaseView
 from verify.report.curves import Point, error_curves, metric_names
 from verify.report.error_plots import answer_panels, key
-from verify.report.notation import (
-    Cell,
-    Drawing,
-    Table,
-    bytes_text,
-    error_title,
-    number,
-    solver_title,
-)
+from verify.report.notation import Cell, Table, bytes_text, error_title, number, solver_title
 from verify.report.plots import Palette, Series, loglog
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
@@ -33,65 +24,37 @@ _NAMED = 6  # entries of a list in the paragraph
 _PLACES = 2  # of what one solver fails
 
 
-@dataclass(frozen=True)
-class AnswerView:
-    """One of the four questions, its answer in a sentence, its panel, and the case drawn there."""
-
-    question: str
-    sentence: str
-    panel: Drawing | None
-    case: CaseView | None
-
-
-@dataclass
-class Overview:
-    """Counts, lists in words, the answers to the four questions, and the matrix of verdicts."""
-
-    counts: dict[str, int]
-    cases: int
-    checks: int
-    solvers: int
-    solves: int
-    findings: list[tuple[str, str]] = field(default_factory=list)
-    unchecked: str = ""
-    ended: str = ""
-    notes: list[str] = field(default_factory=list)
-    matrix: Table | None = None
-    names: list[str] = field(default_factory=list)
-    answers: list[AnswerView] = field(default_factory=list)
-    key: Drawing | None = None
-
-
-def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> Overview:
-    """Return the first screen of `run`."""
+def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> dict[str, Any]:
+    """Return the first screen: counts, lists in words, the four answers, the matrix of verdicts."""
     judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
     solves = [s for r in run.results for s in r.solves]
     solves += [s for e in run.entries for s in e.unjudged]
     counts = Counter(str(v.verdict) for _, v in judged)
-    view = Overview(
-        {str(verdict): counts[str(verdict)] for verdict in Verdict}, len(run.entries), len(judged),
-        len({v.solver for _, v in judged if v.solver}), len(solves),
-    )  # fmt: skip
-    view.findings = _findings(run, judged)
-    without = [e.name for e in run.entries if e.result and not e.result.verdicts]
-    view.unchecked = _listed(without)
     ended = Counter(str(s.status) for s in solves if s.status is not Status.SOLVED)
-    view.ended = ", ".join(f"{count} {name}" for name, count in sorted(ended.items()))
-    view.notes = [f"{defect}." for defect in run.defects]
+    notes = [f"{defect}." for defect in run.defects]
     if (run.record.get("provenance") or {}).get("dirty"):
-        view.notes.append(
+        notes.append(
             "the code differed from its commit when this ran: it cannot be reproduced from it."
         )
     asked = [s.solver for s in solves if s.solver != "reference"]
     asked += [v.solver or "nobody" for _, v in judged]
-    view.names = [solver_title(name) for name in dict.fromkeys(asked)]
-    view.matrix = _matrix(run, cases, view.names)
+    names = [solver_title(name) for name in dict.fromkeys(asked)]
+    view: dict[str, Any] = {
+        "counts": {str(verdict): counts[str(verdict)] for verdict in Verdict},
+        "cases": len(run.entries), "checks": len(judged), "solves": len(solves),
+        "solvers": len({v.solver for _, v in judged if v.solver}),
+        "findings": _findings(run, judged),
+        "unchecked": _listed([e.name for e in run.entries if e.result and not e.result.verdicts]),
+        "ended": ", ".join(f"{count} {name}" for name, count in sorted(ended.items())),
+        "notes": notes, "names": names, "matrix": _matrix(run, cases, names),
+        "answers": [], "key": None,
+    }  # fmt: skip
     try:
-        view.answers = _answers(run, cases, palette)
-        shown = [name for name in view.names if name not in ("nobody", "reference")]
-        view.key = key(shown, palette) if shown else None
+        view["answers"] = _answers(run, cases, palette)
+        shown = [name for name in names if name not in ("nobody", "reference")]
+        view["key"] = key(shown, palette) if shown else None
     except Exception as error:
-        view.notes.append(f"the four answers cannot be shown: {words_of(error)}.")
+        notes.append(f"the four answers cannot be shown: {words_of(error)}.")
     return view
 
 
@@ -191,12 +154,11 @@ def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
     """Return the verdict of each solver in each case, with its failed share."""
     rows = []
     for entry, case in zip(run.entries, cases, strict=True):
-        marks = [Cell(case.title, case.name, link=case.anchor), Cell("", verdict=str(case.verdict))]
         n = len(case.warnings)
-        said = [f"⚠ {n} warning{'s' * (n > 1)}"] if n else []
-        marks[1] = Cell("", "; ".join(said), verdict=str(case.verdict))
-        marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
-        rows.append(marks)
+        said = f"⚠ {n} warning{'s' * (n > 1)}" if n else ""
+        whole = Cell("", said, verdict=str(case.verdict))
+        marks = [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
+        rows.append([Cell(case.title, case.name, link=case.anchor), whole, *marks])
     kind = "matrix many" if len(names) > MANY else "matrix"
     return Table("Verdicts", ["case", "whole", *names], rows, kind, True)
 
@@ -217,15 +179,14 @@ def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
     return Cell(", ".join(words) if words else "–")
 
 
-def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[AnswerView]:
-    """Return the four answers with their panels; without data a sentence stands alone."""
-    found = answers(run.results)
-    panels = answer_panels(run.results, found, palette)
-    by_name = {case.name: case for case in cases}
+def _answers(run: Run, cases: Sequence[CaseView], palette: Palette) -> list[dict[str, Any]]:
+    """Return the four answers with panel and the case drawn there; some have a sentence alone."""
+    found, by_name = answers(run.results), {case.name: case for case in cases}
     return [
-        AnswerView(one.question, one.sentence, panel, by_name.get(one.example))
-        for one, panel in zip(found, panels, strict=True)
-    ]
+        {"question": one.question, "sentence": one.sentence, "panel": panel,
+         "case": by_name.get(one.example)}
+        for one, panel in zip(found, answer_panels(run.results, found, palette), strict=True)
+    ]  # fmt: skip
 
 
 def _listed(parts: list[str]) -> str:
@@ -236,25 +197,6 @@ def _listed(parts: list[str]) -> str:
 
 def _clause(sentence: str) -> str:
     return sentence.rstrip(". ") or "no reason given"
-
-
-@dataclass(frozen=True)
-class FamilyPart:
-    """An error over the rows of a family: the finest point of each solver, by value and name."""
-
-    title: str
-    solvers: list[str]
-    found: dict[float, dict[str, Point]]
-    panel: Drawing | None
-
-
-@dataclass
-class FamilyView:
-    """A family of scenes with a table and a figure for each error."""
-
-    name: str
-    parameter: str
-    parts: list[FamilyPart] = field(default_factory=list)
 
 
 def page_view(
@@ -274,7 +216,7 @@ def page_view(
     short : bool
         Whether cases, families and the reading aid are left out.
     """
-    families: list[FamilyView] = []
+    families: list[dict[str, Any]] = []
     ranking: dict[str, Any] | None = None
     try:
         families = family_views(run, palette)
@@ -298,8 +240,11 @@ def page_view(
     }
 
 
-def family_views(run: Run, palette: Palette) -> list[FamilyView]:
-    """Return the families of a run that have more than one row."""
+def family_views(run: Run, palette: Palette) -> list[dict[str, Any]]:
+    """Return the families of a run that have more than one row, each with a part for each error.
+
+    A part has the finest point of each solver, by value and name, and a panel of them.
+    """
     families: dict[str, list[CaseResult]] = {}
     for result in run.results:
         if result.row is not None:
@@ -307,10 +252,10 @@ def family_views(run: Run, palette: Palette) -> list[FamilyView]:
     return [_family(name, rows, palette) for name, rows in families.items() if len(rows) > 1]
 
 
-def _family(name: str, results: list[CaseResult], palette: Palette) -> FamilyView:
+def _family(name: str, results: list[CaseResult], palette: Palette) -> dict[str, Any]:
     rows = sorted(results, key=lambda result: -_row_value(result))
     assert rows[0].row is not None
-    view = FamilyView(name, rows[0].row["parameter"])
+    parameter, parts = rows[0].row["parameter"], []
     for metric in dict.fromkeys(metric for row in rows for metric in metric_names(row)):
         found = {_row_value(row): _finest(row, metric) for row in rows}
         solvers = list(dict.fromkeys(label for one in found.values() for label in one))
@@ -321,10 +266,10 @@ def _family(name: str, results: list[CaseResult], palette: Palette) -> FamilyVie
                                for x, one in sorted(found.items())])
                 for label in solvers
             ]  # fmt: skip
-            panel = loglog(title, view.parameter, series, palette)
+            panel = loglog(title, parameter, series, palette)
         if solvers:
-            view.parts.append(FamilyPart(title, solvers, found, panel))
-    return view
+            parts.append({"title": title, "solvers": solvers, "found": found, "panel": panel})
+    return {"name": name, "parameter": parameter, "parts": parts}
 
 
 def _row_value(result: CaseResult) -> float:

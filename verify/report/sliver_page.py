@@ -1,4 +1,4 @@
-"""The page of a sliver study: what its numbers answer, its figure, then maps and curves.
+"""The page of a sliver study: what its numbers answer, its figure, then worst values and curves.
 
 If one solver takes part with many values of one number, the question is what that number does.
 """
@@ -9,7 +9,6 @@ from itertools import groupby
 from typing import Any
 
 from verify.report.notation import (
-    Cell,
     Drawing,
     Lead,
     Table,
@@ -22,17 +21,13 @@ from verify.report.plots import Palette, Series, loglog
 
 Records = Sequence[Mapping[str, Any]]
 
-_GRADES = {"good": "●", "fair": "◐", "poor": "○", "bad": "✕"}
-_NOTHING = Cell("–", grade="none")
 _STEP, _UNCUT = "critical explicit step", "critical explicit step, uncut"
 _SCALED = "condition number scaled by the diagonal"
 _FREQUENCY, _MEASURE = "lowest natural frequency", "conforming"
 _UNKNOWNS = "unknowns of the system"
 _ERRORS = {"displacement_l2": "displacement, L²", "energy_norm": "energy norm"}
 _DRAWN = ("condition number", _SCALED, _STEP)
-_LEAST = (0.9, 0.5, 0.1)  # of the step: good, fair, poor
-_MOST = (1e3, 1e4, 1e6)  # of the condition number
-_KEPT = _LEAST[0]  # as in the study's findings: a tenth is what a safety factor of the step takes
+_KEPT = 0.9  # of the step, as in the findings: a tenth is what its safety factor takes
 _ALIKE = 0.05  # by which errors differ with the position of a mesh: less is no difference
 _FAR = 1.25  # as in the study's findings, times the error of the conforming mesh
 _SWEPT = 4  # values of one number that make it the question
@@ -194,36 +189,14 @@ def _times(ratio: float) -> str:
 
 
 def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return name, maps and curves of each family of scenes."""
+    """Return name, worst values and curves of each family of scenes."""
     palette = Palette.of(solver_title(m["solver"]) for m in record["measurements"])
     families = []
     for family in dict.fromkeys(m["family"] for m in record["measurements"]):
         measured = listed(record["measurements"], family=family)
-        growths = listed(record["growths"], family=family)
-        curves = _curves(measured, growths, palette)
-        maps = [*_worst(measured), *_maps(measured)]
-        families.append({"name": family, "maps": maps, "curves": curves})
+        curves = _curves(measured, listed(record["growths"], family=family), palette)
+        families.append({"name": family, "worst": _worst(measured, family), "curves": curves})
     return families
-
-
-def graded(
-    value: float | None, limits: Sequence[float], reason: str = "", most: bool = False
-) -> Cell:
-    """Grade a value by the first limit that it reaches (with `most`: does not exceed).
-
-    It is written with so many digits that it is not rounded to a grade that it misses.
-    """
-    if value is None:
-        return Cell("–", tip=reason, grade="none")
-
-    def grade(found: float) -> str:
-        reached = [found <= limit if most else found >= limit for limit in limits]
-        return list(_GRADES)[(*reached, True).index(True)]
-
-    own = grade(value)
-    enough = (n for n in range(2, 9) if grade(float(f"{value:.{n - 1}e}")) == own)
-    written = number(value, next(enough, 9))
-    return Cell(f"{_GRADES[own]} {written}", tip=reason, grade=own)
 
 
 def listed(records: Records, **fixed: Any) -> list[Mapping[str, Any]]:
@@ -231,69 +204,26 @@ def listed(records: Records, **fixed: Any) -> list[Mapping[str, Any]]:
     return [r for r in records if all(r.get(key) == value for key, value in fixed.items())]
 
 
-def _maps(measured: Records) -> list[tuple[Table, str]]:
-    """Return the maps of one family with their legends."""
-    steps = []
-    for record in listed(measured, quantity=_STEP):
-        uncut = listed(measured, quantity=_UNCUT, solver=record["solver"])
-        whole = next((one["value"] for one in uncut if one["value"]), None)
-        share = record["value"] / whole if record["value"] and whole else None
-        reason = record["reason"] or ("" if share else "no step of the uncut body to compare with")
-        steps.append((record, graded(share, _LEAST, reason)))
-    conditions = [
-        (one, graded(one["value"], _MOST, one["reason"], most=True))
-        for one in listed(measured, quantity=_SCALED)
-    ]
-    maps = []
-    for title, found, words, limits in (
-        ("Critical explicit step over that of the uncut body", steps, "at least", _LEAST),
-        ("Condition number, scaled by the diagonal", conditions, "at most", _MOST),
-    ):
-        if found:
-            ends = [f"{words} {number(limit, 1)}" for limit in limits]
-            last = "less" if limits is _LEAST else "more"
-            legend = zip(_GRADES.values(), [*ends, last], strict=True)
-            maps.append((_map(title, found), "; ".join(f"{sign} {end}" for sign, end in legend)))
-    return maps
-
-
-def _worst(measured: Records) -> list[tuple[Table, str]]:
+def _worst(measured: Records, family: str) -> Table | None:
     """Return the table of the worst value of each solver over ε, beside the conforming mesh."""
-    rows = []
-    family = measured[0]["family"] if measured else ""
-    solvers = list(dict.fromkeys(m["solver"] for m in measured))
+    solvers, rows = list(dict.fromkeys(m["solver"] for m in measured)), []
     for solver in solvers if _MEASURE in solvers else ():
         least = _least(_shares(measured, family, solver))
-        errors = [list(_ratios(measured, family, solver, name).values()) for name in _ERRORS]
+        errors = [_ratios(measured, family, solver, name).values() for name in _ERRORS]
         pitch = _ratios(measured, family, solver, _FREQUENCY).values()
-        scaled = list(_values(measured, family, solver, _SCALED).values())
         off = max((ratio - 1.0 for ratio in pitch), key=abs, default=None)
+        scaled = _values(measured, family, solver, _SCALED).values()
         rows.append([
             solver_title(solver),
-            _written(None if least is None else least[0]),
-            *(_written(max(one, default=None)) for one in errors),
-            Cell("–") if off is None else Cell(f"{off:+.2%}"),
-            _written(max(scaled, default=None)),
+            number(least and least[0], 3),
+            *(number(max(one, default=None), 3) for one in errors),
+            "–" if off is None else f"{off:+.2%}",
+            number(max(scaled, default=None), 3),
         ])  # fmt: skip
     heads = ["method", "least step over the uncut body's", "largest L² error over conforming",
              "largest energy-norm error over conforming", "lowest frequency off conforming",
              "largest scaled condition number"]  # fmt: skip
-    legend = "errors are of the static field; a mass leaves them as they are and moves frequencies"
-    return [(Table("Worst over ε", heads, rows, named=True), legend)] if rows else []
-
-
-def _written(value: float | None) -> Cell:
-    return _NOTHING if value is None else Cell(number(value, 3))
-
-
-def _map(title: str, found: Sequence[tuple[Mapping[str, Any], Cell]]) -> Table:
-    """Return a row per method and a column per size; the tint repeats the sign in each cell."""
-    sizes = sorted({record["size"] for record, _ in found}, reverse=True)
-    rows = []
-    for solver in dict.fromkeys(record["solver"] for record, _ in found):
-        own = {r["size"]: cell for r, cell in found if r["solver"] == solver}
-        rows.append([solver_title(solver), *(own.get(size, _NOTHING) for size in sizes)])
-    return Table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, "map", named=True)
+    return Table("Worst over ε", heads, rows, named=True) if rows else None
 
 
 def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing | None]:
