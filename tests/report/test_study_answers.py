@@ -7,10 +7,9 @@ import pytest
 from synthetic_studies import measured
 
 from verify.report import plots as figures
-from verify.report.iterations_page import iterations_lead
 from verify.report.plots import Palette, Series, loglog
 from verify.report.sliver_page import sliver_lead
-from verify.report.thesis_page import _said
+from verify.report.study_page import _said, iterations_lead
 
 STEP, UNCUT = "critical explicit step", "critical explicit step, uncut"
 SIZES = (0.1, 1e-3, 1e-6)

@@ -6,6 +6,7 @@ Some were chosen when earlier results were known: docs/theory/history.md.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -96,47 +97,38 @@ def _claimed(
 
 
 def _close(
-    kind: str, template: str, solver: str = "xfem", least: float = 0.0, most: float = QUARTER
-) -> Callable[[Evidence], Found | None]:
-    """Claim that the error of a solver over the measure's lies between two numbers."""
-
-    def of(evidence: Evidence) -> Found | None:
-        own = _claimed(evidence, kind, "displacement_l2", solver)
-        if own is None:
-            return None
-        text = template.format(number(own.ratio, 2))
-        bounds = [f"at least {least:g}"] * (least > 0.0) + [f"at most {most:g}"] * (most < np.inf)
-        return Found(text, own.written, f"medians {', '.join(bounds)}", own.within(least, most))
-
-    return of
+    evidence: Evidence, kind: str, template: str, least: float = 0.0, most: float = QUARTER
+) -> Found | None:
+    """Claim that XFEM's error over the measure's lies between two numbers."""
+    own = _claimed(evidence, kind, "displacement_l2", "xfem")
+    if own is None:
+        return None
+    bounds = [f"at least {least:g}"] * (least > 0.0) + [f"at most {most:g}"]
+    text = template.format(number(own.ratio, 2))
+    return Found(text, own.written, f"medians {', '.join(bounds)}", own.within(least, most))
 
 
 def _weighed(
-    kind: str, metric: str, solver: str, rival: str, factor: float, words: tuple[str, str, str]
-) -> Callable[[Evidence], Found | None]:
+    evidence: Evidence, kind: str, metric: str, solver: str, rival: str, factor: float,
+    words: Sequence[str],
+) -> Found | None:  # fmt: skip
     """Say which of two is better from `factor` on: words for less, for no difference, for more.
 
     At rest a difference of errors has to show over positions of the mesh (protocol). A run and a
     study of positions that contradict each other support nothing.
     """
-
-    def of(evidence: Evidence) -> Found | None:
-        own = _claimed(evidence, kind, metric, solver, rival)
-        if own is None:
-            return None
-        side = (own.ratio >= factor) - (own.ratio <= 1 / factor)
-        shown = 0 if own.scatter is None else (own.scatter[1] > 1.0) - (own.scatter[2] < 1.0)
-        if side and own.scatter is None and kind != "motion" and metric != "time":
-            return None
-        if own.scatter is not None and shown != -side:
-            side = shown and side
-        needs = (
-            f"a difference of {factor:g}, to the same side over positions of the mesh if studied"
-        )
-        text = words[side + 1].format(number(own.ratio, 2))
-        return Found(text, own.written, needs, not side or shown in (0, side))
-
-    return of
+    own = _claimed(evidence, kind, metric, solver, rival)
+    if own is None:
+        return None
+    side = (own.ratio >= factor) - (own.ratio <= 1 / factor)
+    shown = 0 if own.scatter is None else (own.scatter[1] > 1.0) - (own.scatter[2] < 1.0)
+    if side and own.scatter is None and kind != "motion" and metric != "time":
+        return None
+    if own.scatter is not None and shown != -side:
+        side = shown and side
+    needs = f"a difference of {factor:g}, to the same side over positions of the mesh if studied"
+    text = words[side + 1].format(number(own.ratio, 2))
+    return Found(text, own.written, needs, not side or shown in (0, side))
 
 
 def _tip_functions(evidence: Evidence) -> Found | None:
@@ -182,9 +174,8 @@ def steps_kept(evidence: Evidence, solver: str) -> list[tuple[float, float]]:
     steps: dict[tuple[str, str], dict[str, float]] = {}
     for row in evidence.slivers:
         if row["solver"] == solver and row["value"] and float(row["size"]) > 0.0:
-            steps.setdefault((row["family"], row["size"]), {})[row["quantity"]] = float(
-                row["value"]
-            )
+            own = steps.setdefault((row["family"], row["size"]), {})
+            own[row["quantity"]] = float(row["value"])
     least: dict[float, float] = {}
     for (_, size), own in steps.items():
         cut, whole = own.get("critical explicit step"), own.get("critical explicit step, uncut")
@@ -249,13 +240,9 @@ def _still(evidence: Evidence) -> Found | None:
         f"stay below {number(STILL, 1)}."
     )
     numbers = ", ".join(f"{name} {number(drift, 2)}" for name, drift in found.items())
-    return Found(
-        text,
-        numbers,
-        f"XFEM at most {number(STILL, 1)}",
-        found["xfem"] <= STILL,
-        "long" if "long" in evidence.commands else "arena",
-    )
+    source = "long" if "long" in evidence.commands else "arena"
+    needs = f"XFEM at most {number(STILL, 1)}"
+    return Found(text, numbers, needs, found["xfem"] <= STILL, source)
 
 
 def _cost(evidence: Evidence) -> Found | None:
@@ -279,21 +266,22 @@ _REMESHED = "conforming mesh=remeshed"
 _RUN_BOTH = "XFEM beside a conforming mesh on three such scenes"
 QUESTIONS: dict[str, tuple[Sentence, ...]] = {
     "Accuracy at rest": (
-        Sentence("through", _RUN_BOTH, _close(
-            "through", "XFEM or a conforming mesh: where cuts go through, XFEM's displacement "
-            "error is {} times a conforming mesh's.", least=1 / QUARTER)),
+        Sentence("through", _RUN_BOTH, partial(
+            _close, kind="through", least=1 / QUARTER, template="XFEM or a conforming mesh: "
+            "where cuts go through, XFEM's displacement "
+            "error is {} times a conforming mesh's.")),
     ),
     "Accuracy at a tip": (
-        Sentence("tip", _RUN_BOTH, _close(
-            "tip", "No mesh has to know the tip: where cuts end inside elements, XFEM's error is "
-            "{} times a conforming mesh's, whose node is the tip.")),
+        Sentence("tip", _RUN_BOTH, partial(
+            _close, kind="tip", template="No mesh has to know the tip: where cuts end inside "
+            "elements, XFEM's error is {} times a conforming mesh's, whose node is the tip.")),
         Sentence("tip functions", "tip functions, on several positions of the mesh",
                  _tip_functions),
     ),
     "A moving body, a blade, real time": (
-        Sentence("motion", _RUN_BOTH, _weighed(
-            "motion", "displacement_l2", "xfem", MEASURE, QUARTER,
-            ("XFEM: in motion its error is {} times a conforming mesh's.",
+        Sentence("motion", _RUN_BOTH, partial(
+            _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=MEASURE,
+            factor=QUARTER, words=("XFEM: in motion its error is {} times a conforming mesh's.",
              "XFEM, which needs no new mesh: in motion its error is {} times a conforming mesh's.",
              "XFEM needs no new mesh, but in motion its error is {} times a conforming mesh's."))),
         Sentence("real time", "a blade in real time (`verify study thesis`)", _real_time),
@@ -307,17 +295,16 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("drift", "10 000 steps (C7)", _still),
     ),
     "Why (not) remesh?": (
-        Sentence("remeshed", "remeshing, on several positions of the mesh", _weighed(
-            "rest", "displacement_l2", _REMESHED, MEASURE, QUARTER,
-            ("For accuracy: a new mesh for each cut has {} times the error of one whose cut cells "
-             "are split.",
-             "Not for accuracy: a new mesh for each cut has {} times the error of one whose cut "
-             "cells are split.",
-             "Not for accuracy: a new mesh for each cut has even {} times the error of one whose "
-             "cut cells are split."))),
-        Sentence("remeshing time", "times of remeshing", _weighed(
-            "rest", "time", _REMESHED, "xfem", TWICE,
-            ("At equal error remeshing takes only {} times XFEM's time.",
+        Sentence("remeshed", "remeshing, on several positions of the mesh", partial(
+            _weighed, kind="rest", metric="displacement_l2", solver=_REMESHED, rival=MEASURE,
+            factor=QUARTER, words=tuple(
+                f"{lead} {{}} times the error of one whose cut cells are split." for lead in (
+                    "For accuracy: a new mesh for each cut has",
+                    "Not for accuracy: a new mesh for each cut has",
+                    "Not for accuracy: a new mesh for each cut has even")))),
+        Sentence("remeshing time", "times of remeshing", partial(
+            _weighed, kind="rest", metric="time", solver=_REMESHED, rival="xfem", factor=TWICE,
+            words=("At equal error remeshing takes only {} times XFEM's time.",
              "At equal error remeshing takes {} times XFEM's time, which decides nothing.",
              "At equal error remeshing takes {} times XFEM's time."))),
     ),

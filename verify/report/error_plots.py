@@ -1,16 +1,11 @@
 """Errors of all solvers in one figure: over element size, unknowns, time; the first screen."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from matplotlib.axes import Axes
 
-from verify.report.answers import (
-    Answer,
-    compared_curves,
-    energy_curve,
-    moving,
-    sliver_curves,
-)
+from verify.report.answers import Answer, compared_curves, energy_curve, moving, sliver_curves
 from verify.report.curves import Curve, Point, floor, limits
 from verify.report.notation import ROUND_OFF, Drawing, number_text, solver_title
 from verify.report.plots import (
@@ -202,13 +197,11 @@ def _abandoned(
 def _spans(axes: Axes, points: Sequence[Point], style: Style) -> None:
     """Draw the spread of the repetitions."""
     for point in points:
-        if (time := point.duration) is None:
-            continue
-        if time.high > 1.05 * time.low > 0:
+        if (time := point.duration) and time.high > 1.05 * time.low > 0:
             axes.hlines(point.value, time.low, time.high, color=style.colour, linewidth=1.0)
 
 
-_WIDTH, _HEIGHT = 3.35, 2.4  # inches
+_small = partial(panel, width=3.35, height=2.4, legend=False)
 _ACROSS = 6  # solvers in a row of the legend
 _FAINT = 0.3  # opacity of the cases beside the one that is drawn whole
 _LEAST = 1e-16  # of a relative change of the energy: below is nothing
@@ -250,57 +243,38 @@ def _errors(
     results: Sequence[CaseResult], example: str, palette: Palette, over_time: bool
 ) -> Drawing | None:
     """Draw the error of one case over h or time, all others faintly below it."""
+    at = _OVER["time" if over_time else "size"][2]
 
-    def at(point: Point) -> float | None:
-        if not over_time:
-            return point.size
-        time = point.duration
-        return time.median if time and time.median > 0.0 else None
+    def told(curve: Curve) -> list[tuple[float, Point]]:
+        return [(x, p) for x, p in _placed(curve.points, at)
+                if p.value > max(p.uncertainty, ROUND_OFF)]  # fmt: skip
 
-    drawn = {
-        r.case: [(c, p) for c in compared_curves(r) if (p := _drawable(c, at))] for r in results
-    }
+    drawn = {r.case: [(c, own) for c in compared_curves(r) if (own := told(c))] for r in results}
     if not drawn.get(example):
         return None
-    every = [place for own in drawn.values() for _, places in own for place in places]
+    every = [(x, p.value) for own in drawn.values() for _, places in own for x, p in places]
+    own = [place for _, places in drawn[example] for place in places]
     title = "time of a cut, s" if over_time else "element size h, m"
-    with panel("relative L² error of the displacement", _WIDTH, _HEIGHT, legend=False) as (
-        figure,
-        axes,
-    ):
-        own = [place for _, places in drawn[example] for place in places]
-        _log_axes(axes, title, every, [*own, *_bars(drawn[example])])
+    with _small("relative L² error of the displacement") as (figure, axes):
+        # room for the band below errors whose half-width is wide enough for one
+        bars = [(x, p.uncertainty / 1.5) for x, p in own if limits(p)]
+        _log_axes(axes, title, every, [*((x, p.value) for x, p in own), *bars])
         if not over_time:
             uncertainty_band(axes, floor([curve for curve, _ in drawn[example]], at))
         for case, curves in drawn.items():
             for curve, places in curves:
                 style = palette[curve.label]
                 look = style.marked if case == example else {"color": style.colour, "alpha": _FAINT}
-                axes.plot(*zip(*places, strict=True), linewidth=1.5 if case == example else 0.8,
-                          linestyle=style.dashes, zorder=3 if case == example else 1,
-                          **look)  # fmt: skip
+                axes.plot([x for x, _ in places], [p.value for _, p in places],
+                          linewidth=1.5 if case == example else 0.8, linestyle=style.dashes,
+                          zorder=3 if case == example else 1, **look)  # fmt: skip
         said = "; ".join(
-            f"{curve.label}: {number_text(places[0][1])} at {number_text(places[0][0])} to "
-            f"{number_text(places[-1][1])} at {number_text(places[-1][0])}"
+            f"{curve.label}: {number_text(first.value)} at {number_text(x)} to "
+            f"{number_text(last.value)} at {number_text(y)}"
             for curve, places in drawn[example]
+            for (x, first), (y, last) in [(places[0], places[-1])]
         )
         return drawing(figure, f"Error of the displacement over {title}, {example}. {said}.")
-
-
-def _bars(curves: Sequence[tuple[Curve, Places]]) -> Iterator[tuple[float, float]]:
-    """Yield places below the errors whose half-width is wide enough for a band."""
-    for curve, places in curves:
-        for point, (x, y) in zip(curve.points, places, strict=False):
-            if point.uncertainty > y / 30:
-                yield x, point.uncertainty / 1.5
-
-
-def _drawable(curve: Curve, at: Callable[[Point], float | None]) -> Places:
-    return [
-        (x, p.value)
-        for p in curve.points
-        if (x := at(p)) and p.value > max(p.uncertainty, ROUND_OFF)
-    ]
 
 
 def _energies(results: Sequence[CaseResult], palette: Palette) -> Drawing | None:
@@ -310,10 +284,7 @@ def _energies(results: Sequence[CaseResult], palette: Palette) -> Drawing | None
     if not curves:
         return None
     every = [place for _, places in curves for place in places]
-    with panel("relative change of the total energy", _WIDTH, _HEIGHT, legend=False) as (
-        figure,
-        axes,
-    ):
+    with _small("relative change of the total energy") as (figure, axes):
         log_axis(axes, "y", log_range([y for _, y in every]))
         plain_axis(axes, "x", (0.0, 1.0))
         axes.set_xlabel("time over duration")
@@ -332,7 +303,7 @@ def _slivers(results: Sequence[CaseResult], palette: Palette) -> Drawing | None:
     if not curves:
         return None
     every = [place for curve in curves for place in curve.places]
-    with panel("over that at the largest ε", _WIDTH, _HEIGHT, legend=False) as (figure, axes):
+    with _small("over that at the largest ε") as (figure, axes):
         _log_axes(axes, "ε, in elements", every, every)
         for curve in curves:
             style = palette[solver_title(curve.solver)]

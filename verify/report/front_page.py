@@ -1,6 +1,5 @@
 """Front pages of the results and of the ranked run: answers and figures."""
 
-import re
 import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,7 +14,6 @@ from verify.report.rendering import Beside as Pictures
 from verify.report.rendering import in_markdown
 
 PICTURES = "front-pictures"
-MOST_WORDS = 500
 _STEPS = (
     "xfem", "snapping_subdivision", "xfem mass=gevs", "xfem mass=consistent", "subdivision",
     MEASURE,
@@ -26,7 +24,6 @@ _OF_THE_ARENA = ("Accuracy at rest", "Accuracy at a tip", "A moving body, a blad
 _RATIOS = {"Accuracy at rest": "through", "Accuracy at a tip": "tip",
            "A moving body, a blade, real time": "motion"}  # fmt: skip
 _SCENES = {"through": "Cuts that go through", "tip": "Cuts that end inside", "motion": "In motion"}
-_LINK = re.compile(r"\(([\w./-]+)\)")
 
 
 def write_front(
@@ -68,13 +65,6 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
             told = " ".join(one.text for one in own.found.values() if one.source == "arena")
             lines += [f"- **{own.question}**: {told}"] if told else []
     return [*lines, "", " ".join(figure[0] for figure in shown.values())]
-
-
-def words_in(page: str) -> int:
-    """Count the words that a reader of a page sees before anything is unfolded."""
-    shown = re.sub(r"<details>.*?</details>", "", page, flags=re.DOTALL)
-    shown = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", shown)
-    return len(re.findall(r"[^\W_][\w'’.×−/-]*", _LINK.sub("", shown)))
 
 
 def figures(evidence: Evidence) -> dict[str, Drawing | None]:

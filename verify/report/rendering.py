@@ -33,34 +33,15 @@ from verify.errors import InputError
 from verify.files import read_json, whole_file, write_json, write_whole
 from verify.printable import words_of
 from verify.processes import die_with_parent
+from verify.report import notation
+from verify.report import run_directory as directories
 from verify.report.bodies import draw
 from verify.report.case_view import CaseView, case_view, show_pictures
-from verify.report.notation import (
-    Cell,
-    Drawing,
-    Table,
-    error_title,
-    metric_title,
-    number,
-    printable,
-    seconds_text,
-    signed,
-    solver_title,
-    spread_text,
-)
+from verify.report.notation import Cell, Drawing, Table, printable, solver_title
 from verify.report.page import page_view
 from verify.report.pictures import CasePictures, case_pictures
 from verify.report.plots import Palette, Style
-from verify.report.run_directory import (
-    CaseEntry,
-    Run,
-    all_results,
-    csv_rows,
-    junit_document,
-    load_entry,
-    load_record,
-    load_run,
-)
+from verify.report.run_directory import CaseEntry, Run, load_run
 from verify.report.which import rank
 
 PICTURES = "report-pictures"
@@ -155,16 +136,10 @@ def _environment(kind: str) -> Environment:
     )  # fmt: skip
     made.globals |= {"table": Table, "cell": Cell}
     made.filters |= {
-        "number": number,
-        "seconds": seconds_text,
-        "metric": metric_title,
-        "error": error_title,
-        "form": format,
-        "rank": rank,
-        "solver": solver_title,
-        "signed": signed,
-        "spread": spread_text,
-    }
+        "number": notation.number, "seconds": notation.seconds_text, "form": format, "rank": rank,
+        "metric": notation.metric_title, "error": notation.error_title, "solver": solver_title,
+        "signed": notation.signed, "spread": notation.spread_text,
+    }  # fmt: skip
     return made
 
 
@@ -304,9 +279,9 @@ def _written(run: Run, directory: Path, drawings: Path | None) -> tuple[Path, di
         for case in cases:
             show_pictures(case)
         view, text = page()
-    write_json(all_results(run), directory / "results.json")
-    write_whole(directory / "results.csv", csv_rows(run))
-    write_whole(directory / "junit.xml", junit_document(run))
+    write_json(directories.all_results(run), directory / "results.json")
+    write_whole(directory / "results.csv", directories.csv_rows(run))
+    write_whole(directory / "junit.xml", directories.junit_document(run))
     target = directory / "report.html"
     write_whole(target, text)
     return target, view
@@ -319,7 +294,7 @@ def _summary(run: Run, directory: Path) -> Path:
     view["origin"] = [fact for fact in view["origin"] if fact[0] in _PUBLISHED]
     target = directory / "summary.md"
     write_whole(target, as_markdown("report.j2", directory, "summary-pictures", **view))
-    write_whole(directory / "results.csv", csv_rows(run))
+    write_whole(directory / "results.csv", directories.csv_rows(run))
     return target
 
 
@@ -356,8 +331,10 @@ def main(folder: Path) -> NoReturn:
         for question in sorted(folder.glob("*.json")):
             asked = read_json(question)
             root = Path(asked["root"])
-            palette = run_palette(load_record(root)[0])
-            drawn = drawn_case(root, asked["index"], load_entry(root / asked["folder"]), palette)
+            palette = run_palette(directories.load_record(root)[0])
+            drawn = drawn_case(
+                root, asked["index"], directories.load_entry(root / asked["folder"]), palette
+            )
             write_whole(Path(asked["target"]), pickle.dumps(drawn))
             question.unlink()
         sleep(_LOOK_SECONDS)

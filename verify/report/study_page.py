@@ -1,18 +1,18 @@
 """The page of a study: findings as sentences, then tables and curves, then where it comes from."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
 from verify.files import read_json, write_whole
 from verify.printable import shown
-from verify.report.iterations_page import iterations_lead, iterations_panels
 from verify.report.notation import (
     NORMS,
     Cell,
     Drawing,
+    Lead,
     Table,
     metric_title,
     number,
@@ -32,17 +32,14 @@ from verify.report.plots import (
 )
 from verify.report.rendering import as_html, as_markdown, print_page
 from verify.report.sliver_page import listed, sliver_families, sliver_lead
-from verify.report.thesis_page import thesis_view
 
-_STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations",
-            "positions", "claims")  # fmt: skip
 _SCHEMA = 1
 _ALL = "all"  # scenes, of a study of positions
 
 
 def studies_in(directory: Path) -> list[str]:
     """Return the kinds of the studies whose records lie in `directory`."""
-    return [kind for kind in _STUDIES if (directory / f"{kind}.json").is_file()]
+    return [kind for kind in _VIEWS if (directory / f"{kind}.json").is_file()]
 
 
 def render_study(directory: Path, kind: str, form: str = "html") -> Path:
@@ -70,7 +67,8 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         "counts": Counter(finding["verdict"] or "SHOWN" for finding in record["findings"]),
         "origin": origin_facts(record),
         "answer": record.get("answer", []),
-        **study_view(kind, record),
+        "lead": None,
+        **_VIEWS[kind](record),
     }
     template = "claims.j2" if kind == "claims" else "study.j2"
     if form == "markdown":
@@ -80,28 +78,6 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
     page = directory / f"{kind}.html"
     write_whole(page, as_html(template, **view))
     return print_page(page) if form == "pdf" else page
-
-
-def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the template of a study shows beside its record."""
-    views: dict[str, Callable[[], dict[str, Any]]] = {
-        "slivers": lambda: {
-            "lead": sliver_lead(record),
-            "families": sliver_families(record),
-        },
-        "energy": lambda: {},
-        "claims": lambda: {},
-        "cost": lambda: {"running": _running(record), "precision": _precision(record)},
-        "budget": lambda: {"bars": [_bars(budget) for budget in record["budgets"]]},
-        "calibration": lambda: {"scatters": _scatters(record["trials"])},
-        "thesis": lambda: thesis_view(record),
-        "iterations": lambda: {
-            "lead": iterations_lead(record),
-            "panels": iterations_panels(record["settings"], "iteration_error"),
-        },
-        "positions": lambda: _positions(record),
-    }
-    return {"lead": None, **views[kind]()}
 
 
 def _positions(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -192,3 +168,193 @@ def _scatters(trials: Sequence[Mapping[str, Any]]) -> list[tuple[int, Drawing | 
         found.append((degree, scatter(title, "true error, relative", marks, (1.0, 10.0), palette,
                                       said) if shown else None))  # fmt: skip
     return found
+
+
+def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the figures of the thesis with ours beside them."""
+    face, steps, delays = record["face"], record["steps"], record["delays"]
+    cuts = [0.0, *(float(row["asked"]) for row in face)]
+    added = {
+        "thesis, XFEM": ("thesis", "xfem"),
+        "thesis, S + S": ("thesis", "snapping_subdivision"),
+        "XFEM": ("added", "xfem"),
+        "S + S, 0.02": ("added", "snapping_subdivision 0.02"),
+        "S + S, 0.2": ("added", "snapping_subdivision 0.2"),
+    }
+    nodes = [
+        (name, [0.0, *(row[part][method] for row in face)])
+        for name, (part, method) in added.items()
+    ]
+    asked = [float(cut) for cut in dict.fromkeys(row["asked_cuts"] for row in steps)]
+    sizes = [float(size) for size in dict.fromkeys(row["tetrahedra"] for row in delays)]
+
+    def grouped(rows: Any, by: str, key: str, factor: float = 1.0) -> list[Any]:
+        return [
+            (f"{name} tets" if isinstance(name, int) else name,
+             [factor * row[key] for row in rows if row[by] == name])
+            for name in dict.fromkeys(row[by] for row in rows)
+        ]  # fmt: skip
+
+    def over_cuts(title: str, key: str, factor: float = 1.0) -> Drawing:
+        curves = grouped(steps, "asked_tetrahedra", key, factor)
+        return profile_panel(title, asked, curves, x_title="cuts")
+
+    def over_sizes(title: str, key: str) -> Drawing:
+        return profile_panel(title, sizes, grouped(delays, "speed_name", key), x_title="tetrahedra")
+
+    unknowns = [profile_panel("nodes added", cuts, nodes, x_title="cut elements")]
+    caption = "Nodes added by cuts that grow; S + S is snapping and subdivision with its threshold."
+    return {
+        "lead": Lead(
+            "Which claims of the thesis hold?", _said(record["findings"]), unknowns, caption
+        ),
+        "times": [
+            over_cuts("thesis: s per simulated s", "thesis_per_second"),
+            over_cuts("here: ms per simulated s", "per_second", 1e3),
+            over_cuts("here: nodes", "nodes"),
+            over_cuts("thesis: nodes", "thesis_nodes"),
+        ],
+        "delays": [
+            over_sizes("thesis: delay, s", "thesis"),
+            over_sizes("size over speed: delay, s", "delay"),
+        ],
+    }
+
+
+def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say whose claims hold and whose fail, each by what it demands."""
+    said = []
+    for whose, words in (
+        ("the thesis", "claims of the thesis"),
+        ("this project", "claims of this project"),
+    ):
+        own = [finding for finding in findings if finding.get("whose") == whose]
+        if not own:
+            continue
+        held = sum(finding["verdict"] == "PASS" for finding in own)
+        text = f"Of {len(own)} {words}, {held} hold."
+        for verdict, lead in (("FAIL", "Not"), ("UNDECIDED", "Not told by this run")):
+            open_ones = [
+                f"{finding['topic']} ({finding['expected']})"
+                for finding in own
+                if finding["verdict"] == verdict
+            ]
+            if open_ones:
+                text += f" {lead}: {'; '.join(open_ones)}."
+        said.append(text)
+    return said or ["No claim was judged."]
+
+
+Settings = Sequence[Mapping[str, Any]]
+
+_NEARER = 0.8  # of the other error: less than a fifth apart is no difference that one would pay for
+
+
+def iterations_lead(record: Mapping[str, Any]) -> Lead:
+    """Return what the study answers, its work counted in iterations in a step of a case."""
+    settings = record["settings"]
+    cases = list(dict.fromkeys(one["case"] for one in settings))
+    return Lead(
+        f"How many iterations does {record['solver']} need on a cut body, and do substeps help?",
+        [_said_of_iterations(record, cases), _said_of_substeps(settings, cases)],
+        iterations_panels(settings, "whole_error"),
+        "Distance from the smallest steps, solved, over the largest displacement (RMS over nodes), "
+        "against iterations in a step of the case: those of all its substeps.",
+    )
+
+
+def iterations_panels(settings: Settings, error: str) -> list[Drawing | None]:
+    """Return a panel per case: an error over the work, a line for each number of substeps."""
+    palette, panels = Palette(), []
+    for case, own in _by_case(settings):
+        places: dict[int, list[tuple[Any, Any]]] = {}
+        for one in own:
+            if one["iterations"]:
+                place = one["iterations"] * one["substeps"], one[error]
+                places.setdefault(one["substeps"], []).append(place)
+        series = [
+            Series(f"{count} substep{'s' if count > 1 else ''}", curve)
+            for count, curve in places.items()
+        ]
+        title = f"{case}: {error.replace('_', ' ')}, relative"
+        panels.append(loglog(title, "iterations in a step of the case", series, palette))
+    return panels
+
+
+def _by_case(settings: Settings) -> Iterator[tuple[str, Settings]]:
+    for case in dict.fromkeys(one["case"] for one in settings):
+        yield case, [one for one in settings if one["case"] == case]
+
+
+def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
+    """Say the least work with which the same steps are met, for each case."""
+    tolerance, met, missed = record["tolerance"], [], []
+    for case, own in _by_case(record["settings"]):
+        tried = [(one["iterations"] * one["substeps"], one) for one in own if one["iterations"]]
+        good = [
+            (work, one["iterations"], one["substeps"])
+            for work, one in tried
+            if one["iteration_error"] is not None and one["iteration_error"] <= tolerance
+        ]
+        if good:
+            work, count, parts = min(good)
+            each = f", {count} in each of {parts} substeps" if parts > 1 else ""
+            met.append(f"{work} ({case}{each})")
+        elif tried:
+            missed.append(f"{max(work for work, _ in tried)} are not enough on {case}")
+    within = f"within {100 * tolerance:.2g} % of its own steps, solved"
+    if not met:
+        return f"Not {within}, on any of {len(cases)} cut cases: {'; '.join(missed)}."
+    said = f"To be {within}, it takes so many iterations in a step: {', '.join(met)}"
+    return f"{said}; {'; '.join(missed)}." if missed else f"{said}."
+
+
+def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
+    """Compare the fewest and the most substeps at the largest work that both had."""
+    better: list[str] = []
+    worse: list[str] = []
+    level: list[str] = []
+    for case, own in _by_case(settings):
+        errors = {
+            (one["substeps"], one["iterations"] * one["substeps"]): one["whole_error"]
+            for one in own
+            if one["iterations"] and one["whole_error"] is not None
+        }
+        few, many = min((s for s, _ in errors), default=1), max((s for s, _ in errors), default=1)
+        common = {w for s, w in errors if s == few} & {w for s, w in errors if s == many}
+        if few == many or not common:
+            continue
+        work = max(common)
+        one, other = errors[few, work], errors[many, work]
+        text = (
+            f"{case}, {work} iterations: {number(other, 2)} with {many} substeps, "
+            f"{number(one, 2)} with {few}"
+        )
+        chosen = better if other < _NEARER * one else worse if one < _NEARER * other else level
+        chosen.append(text)
+    compared = len(better) + len(worse) + len(level)
+    if not compared:
+        return "No two settings have the same work with different substeps: nothing is compared."
+    shown = "; ".join([*better, *worse, *level])
+    if len(better) == compared:
+        said = f"Substeps pay at equal work, on all {compared} cases"
+    elif not better:
+        said = f"Substeps do not pay at equal work on any of {compared} cases"
+    else:
+        said = f"Substeps pay at equal work on {len(better)} of {compared} cases"
+    return f"{said}. Error of the whole: {shown}."
+
+
+_VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+    "slivers": lambda r: {"lead": sliver_lead(r), "families": sliver_families(r)},
+    "energy": lambda r: {},
+    "cost": lambda r: {"running": _running(r), "precision": _precision(r)},
+    "budget": lambda r: {"bars": [_bars(budget) for budget in r["budgets"]]},
+    "thesis": thesis_view,
+    "calibration": lambda r: {"scatters": _scatters(r["trials"])},
+    "iterations": lambda r: {
+        "lead": iterations_lead(r), "panels": iterations_panels(r["settings"], "iteration_error"),
+    },
+    "positions": _positions,
+    "claims": lambda r: {},
+}  # fmt: skip

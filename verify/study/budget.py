@@ -114,18 +114,11 @@ def budget_study(
     candidates = find_candidates(chain, times, metric, solve, quick)
     _, choice = cheapest_adequate(candidates, tolerance, metric, _contention(chain))
     return BudgetStudy(
-        case=scene.name,
-        level=level,
-        tolerance=tolerance,
-        metric=metric,
-        chain=[answer.name for answer in chain.answers],
-        budgets=budgets,
-        candidates=candidates,
+        case=scene.name, level=level, tolerance=tolerance, metric=metric, budgets=budgets,
+        chain=[answer.name for answer in chain.answers], candidates=candidates,
         findings=[choice, *(_finding(budget) for budget in budgets)],
-        missing=chain.missing,
-        notes=chain.notes,
-        quick=quick,
-    )
+        missing=chain.missing, notes=chain.notes, quick=quick,
+    )  # fmt: skip
 
 
 def _asked_for(
@@ -171,8 +164,4 @@ def _finding(budget: Budget) -> Finding:
 def _said(part: Part) -> str:
     if part.round_off:
         return "round-off"
-    return f"{_percent(part.value)} ± {_percent(part.uncertainty)}"
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.3g} %".replace("-", "−")
+    return f"{100 * part.value:.3g} % ± {100 * part.uncertainty:.3g} %".replace("-", "−")

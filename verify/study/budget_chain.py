@@ -160,10 +160,8 @@ class References:
         -------
         reference, title, kinematics
         """
-        titles = {
-            "corotational": "the problem: finite rotations, cut as asked",
-            "linear": "the problem: linear kinematics, cut as asked",
-        }
+        titles = {"corotational": "the problem: finite rotations, cut as asked",
+                  "linear": "the problem: linear kinematics, cut as asked"}  # fmt: skip
         try:
             return self._as_asked(first), titles[first], first
         except InputError as problem:

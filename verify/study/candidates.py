@@ -16,8 +16,7 @@ from verify.judge.cost import paid_times
 from verify.judge.models import at_rest, with_kinematics
 from verify.judge.quantities import Measured
 from verify.judge.reference import Reference, size_of
-from verify.result import SolveRecord, Status, Verdict
-from verify.scene import Scene
+from verify.result import Status, Verdict
 from verify.solution import Solution
 from verify.study.budget_chain import JUDGED, Chain, Solve
 from verify.study.budget_parts import Times, distances, norm_names
@@ -85,9 +84,8 @@ def cheapest_adequate(
         best = min(known, key=lambda c: c.high, default=None)
         text = f"None of the {len(candidates)} models tried is certain to be within the tolerance."
         if best is not None:
-            text += (
-                f" The best is {best.title}: {100 * best.error:.3g} % (to {100 * best.high:.3g})."
-            )
+            said = f"{best.title}: {100 * best.error:.3g} % (to {100 * best.high:.3g})."
+            text += f" The best is {said}"
         excluded = bool(known) and all(c.low > tolerance for c in known)
         return None, Finding(topic, text, wanted, Verdict.FAIL if excluded else Verdict.UNDECIDED)
     first = adequate[0]
@@ -112,23 +110,15 @@ def _of_the_others(
     first: Candidate, adequate: Sequence[Candidate], known: Sequence[Candidate], axis: str
 ) -> str:
     """Say of the models that differ from the chosen one along an axis what they cost or lack."""
-    own = getattr(first, axis)
-    word = "kinematics" if axis == "kinematics" else "analysis"
-    for other in adequate:
-        name = getattr(other, axis)
-        if name != own:
-            return (
-                f" {name.capitalize()} {word} needs {1e3 * other.seconds:.3g} ms "
-                f"(h = {other.size:.3g} m) for the same."
-            )
-    rest = [c for c in known if getattr(c, axis) != own]
+    rest = [c for c in known if getattr(c, axis) != getattr(first, axis)]
     if not rest:
         return ""
+    other = next((c for c in adequate if c in rest), None)
+    name = f" {getattr(other or rest[0], axis).capitalize()} {axis}"
+    if other is not None:
+        return f"{name} needs {1e3 * other.seconds:.3g} ms (h = {other.size:.3g} m) for the same."
     least = min(c.error for c in rest)
-    return (
-        f" {getattr(rest[0], axis).capitalize()} {word} is not adequate on any mesh tried "
-        f"({100 * least:.3g} % at best)."
-    )
+    return f"{name} is not adequate on any mesh tried ({100 * least:.3g} % at best)."
 
 
 _STANDARD = "trapezoidal, side-wise mass"
@@ -193,63 +183,40 @@ def find_candidates(
 
 
 def _measured(tried: Sequence[_Tried], chain: Chain, times: Times, metric: str) -> list[Candidate]:
-    found = []
-    law = hooke(chain.scene.material)
+    found, law = [], hooke(chain.scene.material)
     for one in tried:
+        model = partial(Candidate, one.kinematics, one.choices, analysis=one.analysis)
         for record in sorted(one.solved.result.solves, key=lambda r: r.level):
             if record.solver != JUDGED:
                 continue
             solution = one.solved.solutions.get(JUDGED, {}).get(record.level)
             if record.status is not Status.SOLVED or solution is None:
-                failed = Candidate(one.kinematics, one.choices, record.level,
-                                   reason=record.reason or str(record.status),
-                                   analysis=one.analysis)  # fmt: skip
-                found.append(failed)
+                found.append(model(record.level, reason=record.reason or str(record.status)))
                 continue
-            error = _error(one, solution, chain.known, chain.body, metric, law, times)
-            found.append(_candidate(one, record, solution, error))
+            error, width = _error(one, solution, chain.known, chain.body, metric, law, times)
+            totals = paid_times(record) or [nan]
+            found.append(model(
+                record.level, size_of(solution), solution.unknowns, error, max(error - width, 0.0),
+                error + width, median(totals), min(totals), max(totals),
+            ))  # fmt: skip
     return found
 
 
-def _candidate(
-    one: _Tried, record: SolveRecord, solution: Solution, error: tuple[float, float]
-) -> Candidate:
-    value, width = error
-    totals = paid_times(record) or [nan]
-    return Candidate(
-        one.kinematics, one.choices, record.level, size_of(solution), solution.unknowns, value,
-        max(value - width, 0.0), value + width, median(totals), min(totals), max(totals),
-        analysis=one.analysis,
-    )  # fmt: skip
-
-
 def _error(
-    tried: _Tried,
-    solution: Solution,
-    known: Reference,
-    body: AnyBody,
-    metric: str,
-    law: Law,
+    tried: _Tried, solution: Solution, known: Reference, body: AnyBody, metric: str, law: Law,
     times: Times,
-) -> tuple[float, float]:
+) -> tuple[float, float]:  # fmt: skip
     """Relative error against the user's problem, and its half-width."""
-    scene = tried.solved.scene
     if metric not in norm_names(times):
-        return _error_of_quantity(scene, solution, known, body, metric)
+        scene, (value, width) = tried.solved.scene, known.quantities[metric]
+        asked = next(q for q in scene.quantities if q.name == metric)
+        found = Measured(solution, body, law_of(scene), scene).quantity(asked)
+        return abs(found - value) / abs(value), width / abs(value)
     own: Motion = SolutionMotion(solution, body)
     if len(times) > 1 and tried.analysis == "static":
         own = ExactMotion(own.at())  # the same at all times
     family = rules(body, size_of(solution), 3 if len(times) == 1 else 2)
     values, scale = distances([known.motion.afresh(), own], [(1, 0)], times, family, law).of(metric)
-    found = spread_of([ErrorNorm(float(v), scale) for v in values[0]], body.dimension)
-    error = found.norm.relative
-    return error, known.norms.get(metric, 0.0) / scale * (1 + error) + found.integration_error
-
-
-def _error_of_quantity(
-    scene: Scene, solution: Solution, known: Reference, body: AnyBody, metric: str
-) -> tuple[float, float]:
-    value, width = known.quantities[metric]
-    asked = next(q for q in scene.quantities if q.name == metric)
-    one = Measured(solution, body, law_of(scene), scene)
-    return abs(one.quantity(asked) - value) / abs(value), width / abs(value)
+    spread = spread_of([ErrorNorm(float(v), scale) for v in values[0]], body.dimension)
+    error = spread.norm.relative
+    return error, known.norms.get(metric, 0.0) / scale * (1 + error) + spread.integration_error

@@ -8,13 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.judge.cost import (
-    WorkPoint,
-    pareto_front,
-    time_at,
-    why_times_are_no_sample,
-    work_points,
-)
+from verify.judge import cost
+from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
 from verify.judge.models import changed
 from verify.result import REFERENCE, CaseResult, Status, Verdict, ranked_solvers
 from verify.scene import PolylineCut, Scene
@@ -96,19 +91,15 @@ def cost_study(case: str, results: Sequence[CaseResult], metric: str) -> CostStu
             _add(running.setdefault(name, []), step, once[name])
     last = [record for record in results[-1].solves if record.solver != REFERENCE]
     final = work_points(last, metric)
-    contended = "; ".join(why_times_are_no_sample(results, ranked_solvers(results)))
+    contended = "; ".join(cost.why_times_are_no_sample(results, ranked_solvers(results)))
     unsolved = [r for result in results for r in result.solves if r.status is not Status.SOLVED]
     return CostStudy(
-        case=case,
-        metric=metric,
-        steps=steps,
-        running=running,
+        case=case, metric=metric, steps=steps, running=running, contended=contended,
         points=[asdict(point) for point in final],
         front=[(p.solver, p.level) for p in pareto_front(final)],
         left_out=[{name: getattr(r, name) for name in _LEFT_OUT} for r in unsolved],
         findings=list(_findings(running, steps, metric, contended, final)),
-        contended=contended,
-    )
+    )  # fmt: skip
 
 
 def _add(sums: list[_Times | None], step: _Times | None, once: float) -> None:
