@@ -1,4 +1,4 @@
-"""Error budget: differences are found with their source; opening late, and what it is worth."""
+"""Error budget: differences are found with their source; the cheapest adequate model."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,6 @@ from verify.compare.hooke import hooke
 from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
-from verify.solvers import find_solver
-from verify.study.budget_chain import mean_wait
 from verify.study.budget_parts import Answer, error_budget
 from verify.study.candidates import Candidate, cheapest_adequate
 
@@ -133,79 +131,3 @@ def test_segments_in_any_order_and_direction_become_the_polylines_they_are():
         assert sizes == [2, 2, 3]  # the middle of the straight part is no corner
         total = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
         assert total == pytest.approx(2 + 1 + np.sqrt(2) + 1)
-
-
-SPEED = 0.6
-PLATE = """title = "A stretched plate under a blade"
-requirement = "It shall open behind the blade."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 0.5]
-[mesh]
-cells = [[16, 8], [32, 16], [64, 32]]
-[material]
-young = 1.0e4
-poisson = 0.3
-density = 1000.0
-plane = "strain"
-[analysis]
-kind = "dynamic"
-duration = 2.0
-time_step = 0.025
-outputs = 5
-opening = "late"
-[initial]
-kind = "equilibrium"
-[[supports]]
-where = "bottom"
-displacement = [0.0, -0.01]
-[[supports]]
-where = "top"
-displacement = [0.0, 0.01]
-[[cuts]]
-kind = "tool_path"
-points = [[-0.05, 0.27], [1.1, 0.27]]
-speed = 0.6
-"""
-
-
-def scene_of(folder, *changes):
-    text = PLATE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "plate.toml").write_text(text)
-    return load_scene(folder / "plate.toml")
-
-
-@pytest.mark.parametrize("level", [0, 1])
-def test_a_place_waits_on_average_for_half_of_its_element(tmp_path, level):
-    """In a row of halved squares the blade crosses chords a and h − a, each in c ÷ speed."""
-    scene = scene_of(tmp_path)
-    solution = find_solver("xfem").solve(scene, level, 0, scheme="implicit_euler")
-    h = 1 / 16 / 2**level
-    below = (0.27 % h) / h  # share of the square below the path
-    chords = h * np.array([below, 1.0 - below])
-    expected = (chords**2).sum() / chords.sum() / 2 / SPEED
-    assert mean_wait(scene, body_of(scene), solution) == pytest.approx(expected, rel=1e-9)
-    swept = scene_of(tmp_path, ('opening = "late"', 'opening = "swept"'))
-    assert mean_wait(swept, body_of(swept), solution) is None
-
-
-@pytest.mark.fenicsx
-def test_opening_late_is_an_error_of_first_order_in_the_delay(tmp_path):
-    """The tip lags by v τ; ∂u/∂a is square integrable there, so the change of u is of order τ."""
-    scene = scene_of(tmp_path, ("[[16, 8], [32, 16], [64, 32]]", "[[32, 16]]"))
-    solver = find_solver("conforming")
-    choice = {"scheme": "generalised_alpha", "spectral_radius": 0.5}
-    intime = solver.solve(scene, 0, 0, **choice)
-    changes = []
-    for facets in (4, 2, 1):
-        delay = facets / 32 / SPEED
-        late = solver.solve(scene, 0, 0, delay=delay, **choice)
-        np.testing.assert_array_equal(late.points, intime.points)
-        changes.append(np.linalg.norm(late.displacement[2] - intime.displacement[2]))
-    orders = np.log2(np.array(changes[:-1]) / changes[1:])
-    assert (orders > 0.7).all(), orders
-    assert (orders < 1.3).all(), orders
