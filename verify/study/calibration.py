@@ -16,11 +16,7 @@ from verify.compare.body import AnyBody, body_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import Law, law_of
 from verify.judge.quantities import Measured
-from verify.judge.reference import (
-    conforming_reference,
-    exact_reference,
-    size_of,
-)
+from verify.judge.reference import conforming_reference, exact_reference, size_of
 from verify.result import Verdict
 from verify.runner.tasks import Task
 from verify.scene import Scene
@@ -151,15 +147,11 @@ def calibration_study(making: Making, quick: bool, seed: int) -> CalibrationStud
     making.announce(f"seed {seed}")
     found = [one for family in series_families(quick) for one in family.trials(seed)]
     tasks = [
-        Task(
-            f"{family.name}, scene {index}",
-            trials_of,
-            {"family": family.name, "index": index, "seed": seed},
-            ("reference",),
-        )
+        Task(f"{family.name}, scene {index}", trials_of,
+             {"family": family.name, "index": index, "seed": seed}, ("reference",))
         for family in families(quick)
         for index in range(family.scenes)
-    ]
+    ]  # fmt: skip
     found += chain.from_iterable(making.parts("calibration", tasks))
     findings = calibration_findings(found, quick)
     return CalibrationStudy(findings=findings, trials=found, quick=quick, seed=seed)
@@ -176,10 +168,9 @@ def calibration_findings(found: Sequence[Trial], quick: bool = False) -> list[Fi
     worst = f"; worst: {_named(missed[0])}, {_short(missed[0])}" if missed else ""
     widest = max(counted, key=lambda one: one.ratio)
     near = sum(one.ratio < WASTED for one in counted)
-    kinds = [
-        (name, [one for one in counted if (one.quantity in NORMS) == norms])
-        for name, norms in (("norms of the error", True), ("quantities of interest", False))
-    ]
+    of_norms = [one for one in counted if one.quantity in NORMS]
+    rest = [one for one in counted if one.quantity not in NORMS]
+    kinds = [("norms of the error", of_norms), ("quantities of interest", rest)]
     return [
         Finding(
             "coverage",

@@ -12,20 +12,7 @@ import numpy as np
 
 from verify.judge.convergence import extrapolate
 from verify.scene import Scene
-from verify.study.calibration_scenes import (
-    airy,
-    arc_through,
-    ball_and_shell,
-    bar,
-    blade_strip,
-    curved_crack,
-    griffith,
-    ring_and_disc,
-    smooth,
-    solid_smooth,
-    sudden_crack,
-    tip,
-)
+from verify.study import calibration_scenes as scenes
 
 Content = dict[str, Any]
 
@@ -122,24 +109,24 @@ def families(quick: bool) -> list[Family]:
     """Return the families of the study; quick: two scenes each of those that are cheap."""
     n = _QUICK_SCENES if quick else _SCENES
     found = [
-        Family("airy", airy, (3, 7), n),
-        Family("smooth", smooth, (3, 7), n),
-        Family("tip", tip, (2, 5), n),
-        Family("griffith", griffith, (3, 5), n),
-        Family("ring and disc", ring_and_disc, (3, 7), n),
-        Family("arc through", arc_through, (3, 7), n),
-        Family("arc crack", curved_crack, (3, 5), n),
-        Family("bar in motion", bar, (8, 12), n, degrees=(2,)),
+        Family("airy", scenes.airy, (3, 7), n),
+        Family("smooth", scenes.smooth, (3, 7), n),
+        Family("tip", scenes.tip, (2, 5), n),
+        Family("griffith", scenes.griffith, (3, 5), n),
+        Family("ring and disc", scenes.ring_and_disc, (3, 7), n),
+        Family("arc through", scenes.arc_through, (3, 7), n),
+        Family("arc crack", scenes.curved_crack, (3, 5), n),
+        Family("bar in motion", scenes.bar, (8, 12), n, degrees=(2,)),
     ]
     if quick:
         return found
     return [
         *found,
-        Family("sudden crack", sudden_crack, (4, 5), degrees=(2,)),
-        Family("blade strip", blade_strip, (6, 8), degrees=(1,)),
+        Family("sudden crack", scenes.sudden_crack, (4, 5), degrees=(2,)),
+        Family("blade strip", scenes.blade_strip, (6, 8), degrees=(1,)),
         # linear elements: levels of quadratic ones would take most of the study's time
-        Family("solid smooth", solid_smooth, (1.5, 2.5), degrees=(1,)),
-        Family("ball and shell", ball_and_shell, (1.5, 2.5), degrees=(1,)),
+        Family("solid smooth", scenes.solid_smooth, (1.5, 2.5), degrees=(1,)),
+        Family("ball and shell", scenes.ball_and_shell, (1.5, 2.5), degrees=(1,)),
     ]
 
 

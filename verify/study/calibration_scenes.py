@@ -19,8 +19,9 @@ Random = np.random.Generator
 
 
 def plane_scene(
-    random: Random, geometry: Content, exact: tuple[str, Content], cut: Content, at: float
-) -> Content:
+    random: Random, geometry: Content, exact: tuple[str, Content], cut: Content, at: float,
+    ends: tuple[str, ...] = (),
+) -> Content:  # fmt: skip
     """Return the content of a plane scene, its boundary held as the exact solution says.
 
     Parameters
@@ -34,12 +35,20 @@ def plane_scene(
         One cut.
     at : float
         Place of the opening that is measured, as a fraction of the cut's length.
+    ends : tuple of str
+        Of the cut, at which both stress-intensity factors are measured.
     """
     place = random_point(random, geometry, cut)
     opening = {"kind": "opening", "name": "opening", "at": at}
     poisson = float(random.uniform(0.0, 0.45))
     material = {"poisson": poisson, "plane": str(random.choice(["strain", "stress"]))}
-    return scene_of(geometry, [8, 8], exact, cut, material, opening, place)
+    scene = scene_of(geometry, [8, 8], exact, cut, material, opening, place)
+    scene["quantities"] += [
+        {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}
+        for end in ends
+        for mode in ("I", "II")
+    ]
+    return scene
 
 
 def scene_of(
@@ -64,15 +73,6 @@ def scene_of(
         ],
         "exact": {"solution": exact[0], "parameters": exact[1]},
     }
-
-
-def intensities(ends: tuple[str, ...]) -> list[Content]:
-    """Return both stress-intensity factors at each end of the cut, as quantities."""
-    return [
-        {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}
-        for end in ends
-        for mode in ("I", "II")
-    ]
 
 
 def random_point(random: Random, geometry: Content, cut: Content) -> list[float]:
@@ -121,16 +121,20 @@ def airy(random: Random) -> Content:
 
 def smooth(random: Random) -> Content:
     """Return sinusoids with a body force on both sides of a cut through a square."""
-    above, below = (
-        np.column_stack([
-            random.uniform(0.03, 0.1, 2) * random.choice([-1.0, 1.0], 2),
-            random.uniform(2.0, 6.0, 2),
-            random.uniform(-180.0, 180.0, 2),
-        ]).tolist()
-        for _ in "ab"
-    )  # fmt: skip
-    scene = _through(random, "smooth", {"above": above, "below": below})
+    scene = _through(random, "smooth", _sinusoids(random, 2, (2.0, 6.0), 2))
     return {**scene, "loads": [{"kind": "body_force", "force": "exact"}]}
+
+
+def _sinusoids(random: Random, d: int, waves: tuple[float, float], shape: Any) -> Content:
+    """Return amplitude, wave numbers and phase of each component on both sides of a cut."""
+    return {
+        side: np.column_stack([
+            random.uniform(0.03, 0.1, d) * random.choice([-1.0, 1.0], d),
+            random.uniform(*waves, shape),
+            random.uniform(-180.0, 180.0, d),
+        ]).tolist()
+        for side in ("above", "below")
+    }  # fmt: skip
 
 
 def tip(random: Random) -> Content:
@@ -141,8 +145,7 @@ def tip(random: Random) -> Content:
     cut = {"kind": "polyline", "points": [(at - _LONG * along).tolist(), at.tolist()]}
     parameters = {"tip": at.tolist(), "angle": angle, "intensity": intensity}
     opened = 1.0 - float(random.uniform(0.15, 0.5)) / _LONG
-    scene = plane_scene(random, around(np.zeros(2), 1.0), ("tip", parameters), cut, opened)
-    return {**scene, "quantities": scene["quantities"] + intensities(("end",))}
+    return plane_scene(random, around(np.zeros(2), 1.0), ("tip", parameters), cut, opened, ("end",))
 
 
 def griffith(random: Random) -> Content:
@@ -159,8 +162,8 @@ def griffith(random: Random) -> Content:
     }  # fmt: skip
     ends = [(centre - a * along).tolist(), (centre + a * along).tolist()]
     cut, at = {"kind": "polyline", "points": ends}, float(random.uniform(0.2, 0.8))
-    scene = plane_scene(random, around(np.zeros(2), 2.0), ("griffith", parameters), cut, at)
-    return {**scene, "quantities": scene["quantities"] + intensities(("start", "end"))}
+    exact = "griffith", parameters
+    return plane_scene(random, around(np.zeros(2), 2.0), exact, cut, at, ("start", "end"))
 
 
 def _through(random: Random, name: str, sides: Content) -> Content:
@@ -203,15 +206,15 @@ def arc_through(random: Random) -> Content:
     # the tips are at least 0.9 radii from the middle of the arc, the corners 0.71 at most
     geometry = around(middle, 0.5 * min(radius, 1.0))
     at = 0.5 + float(random.uniform(-0.1, 0.1))
-    return plane_scene(random, geometry, scene[0], scene[1], at)
+    return plane_scene(random, geometry, *scene, at)
 
 
 def curved_crack(random: Random) -> Content:
     """Return a crack along an arc inside a square, under a remote stress that opens it."""
     scene, middle, radius = _arc(random, (30.0, 65.0), (0.8, 1.3))
     geometry = around(middle + random.uniform(-0.2, 0.2, 2), 2.0 * radius)
-    made = plane_scene(random, geometry, scene[0], scene[1], float(random.uniform(0.2, 0.8)))
-    return {**made, "quantities": made["quantities"] + intensities(("start", "end"))}
+    at = float(random.uniform(0.2, 0.8))
+    return plane_scene(random, geometry, *scene, at, ("start", "end"))
 
 
 def _arc(
@@ -239,22 +242,16 @@ def solid_smooth(random: Random) -> Content:
     corners = [
         point + 2.0 * (s * first + t * second) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))
     ]
-    above, below = (
-        np.column_stack([
-            random.uniform(0.03, 0.1, 3) * random.choice([-1.0, 1.0], 3),
-            random.uniform(-2.0, 2.0, (3, 2)),
-            random.uniform(-180.0, 180.0, 3),
-        ]).tolist()
-        for _ in "ab"
-    )  # fmt: skip
+    sides = _sinusoids(random, 3, (-2.0, 2.0), (3, 2))
     while True:
         at = random.uniform(0.15, 0.85, 3)
         if abs(float((at - point) @ normal)) > 0.05:
             break
     parameters = {
-        "point": point.tolist(), "normal": normal.tolist(), "axis": first.tolist(),
-        "above": above, "below": below,
-    }  # fmt: skip
+        "point": point.tolist(),
+        "normal": normal.tolist(),
+        "axis": first.tolist(),
+    } | sides
     cut = {"kind": "polygon", "points": [corner.tolist() for corner in corners]}
     scene = _scene(random, ("solid_smooth", parameters), cut, at, point)
     return {**scene, "loads": [{"kind": "body_force", "force": "exact"}]}

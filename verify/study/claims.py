@@ -132,12 +132,9 @@ class ClaimsStudy(Study):
     def rows(self) -> list[dict[str, Any]]:
         """Return a line for each number."""
         return [
-            {
-                "claim": one.claim.measure,
-                "judgement": str(one.judgement),
-                **asdict(limit),
-                **asdict(n),
-            }
+            {"claim": one.claim.measure, "judgement": str(one.judgement)}
+            | asdict(limit)
+            | asdict(n)
             for one in self.judged
             for limit, n in zip(one.claim.limits, one.numbers, strict=True)
         ]
@@ -154,14 +151,11 @@ def claims_study(making: Making) -> ClaimsStudy:
     every = claims()
     groups = [every[at : at + _TOGETHER] for at in range(0, len(every), _TOGETHER)]
     tasks = [
-        Task(
-            f"{group[0].measure} to {group[-1].measure}",
-            claims_measured.measured,
-            {"names": [one.measure for one in group]},
-            tuple(sorted({name for one in group for name in one.solvers})),
-        )
+        Task(f"{group[0].measure} to {group[-1].measure}", claims_measured.measured,
+             {"names": [one.measure for one in group]},
+             tuple(sorted({name for one in group for name in one.solvers})))
         for group in groups
-    ]
+    ]  # fmt: skip
     judged = []
     for group, found in zip(groups, making.parts("claims", tasks, may_fail=True), strict=True):
         lost = [Number(None, note=found.reason)] if isinstance(found, Failure) else []

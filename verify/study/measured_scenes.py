@@ -162,14 +162,10 @@ def measured_families(
     """
     parts = [(v, scene) for rows in families.values() for v in variants for scene in rows]
     tasks = [
-        Task(
-            f"{scene.name} {variant.label}",
-            measure,
-            {"variant": asdict(variant), "content": scene_content(scene)},
-            (variant.label,),
-        )
+        Task(f"{scene.name} {variant.label}", measure,
+             {"variant": asdict(variant), "content": scene_content(scene)}, (variant.label,))
         for variant, scene in parts
-    ]
+    ]  # fmt: skip
     found = making.parts(study, tasks, may_fail=True)
     rows = []
     for (variant, scene), own in zip(parts, found, strict=True):

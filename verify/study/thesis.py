@@ -5,7 +5,7 @@ and that of claims.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -55,36 +55,18 @@ class ThesisStudy(Study):
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the entries of the tables, one a line: what it is here and in the thesis."""
-        return [
-            *(
-                _line("4.3", row.cuts, name, added, row.thesis.get(name.split()[0]), "nodes added")
-                for row in self.measured.face
-                for name, added in row.added.items()
-            ),
-            *(
-                _line("4.4", row.tetrahedra, f"{row.cuts} cuts", row.per_second,
-                      row.thesis_per_second, "s per simulated s")
-                for row in self.measured.steps
-            ),
-            *(
-                _line("4.5", row.tetrahedra, f"{row.cuts} cuts", row.nodes, row.thesis_nodes,
-                      "nodes")
-                for row in self.measured.steps
-            ),
-            *(
-                _line("4.6", row.tetrahedra, row.speed_name, row.delay, row.thesis, "s")
-                for row in self.measured.delays
-            ),
+        m, names = self.measured, ("table", "row", "column", "here", "thesis", "unit")
+        entries = [
+            *(("4.3", row.cuts, name, added, row.thesis.get(name.split()[0], ""), "nodes added")
+              for row in m.face for name, added in row.added.items()),
+            *(("4.4", row.tetrahedra, f"{row.cuts} cuts", row.per_second, row.thesis_per_second,
+               "s per simulated s") for row in m.steps),
+            *(("4.5", row.tetrahedra, f"{row.cuts} cuts", row.nodes, row.thesis_nodes, "nodes")
+              for row in m.steps),
+            *(("4.6", row.tetrahedra, row.speed_name, row.delay, row.thesis, "s")
+              for row in m.delays),
         ]  # fmt: skip
-
-
-def _line(
-    table: str, row: int, column: str, here: float, thesis: float | None, unit: str
-) -> dict[str, Any]:
-    return {
-        "table": table, "row": row, "column": column, "here": here,
-        "thesis": "" if thesis is None else thesis, "unit": unit,
-    }  # fmt: skip
+        return [dict(zip(names, entry, strict=True)) for entry in entries]
 
 
 def thesis_study(making: Making, quick: bool) -> ThesisStudy:
@@ -115,15 +97,14 @@ def _tables(quick: bool) -> dict[str, Task]:
     frames = {"tetrahedra": tetrahedra, "other": TETRAHEDRA[0 if quick else -1],
               "frames": (1 / 240, 1 / 15, 0.5)}  # fmt: skip
     lengths = (1, 2, 7, 50) if quick else (1, 2, 3, 7, 50, 500)
-    asked: dict[str, tuple[str, Callable[..., Any], dict[str, Any]]] = {
-        "steps": ("Tables 4.4 and 4.5, time of a step", step_times,
-                  {"tetrahedra": tetrahedra, "cuts": cuts}),
-        "hand": ("real time", timed_hand, {}),
-        "strips": ("Table 4.3, strips", count_strips, {"lengths": lengths}),
-        "face": ("Table 4.3, face", count_face, {"rows": rows}),
-        "waits": ("Table 4.6, delays", waits, frames),
+    return {
+        "steps": Task("Tables 4.4 and 4.5, time of a step", step_times,
+                      {"tetrahedra": tetrahedra, "cuts": cuts}),
+        "hand": Task("real time", timed_hand, {}),
+        "strips": Task("Table 4.3, strips", count_strips, {"lengths": lengths}),
+        "face": Task("Table 4.3, face", count_face, {"rows": rows}),
+        "waits": Task("Table 4.6, delays", waits, frames),
     }  # fmt: skip
-    return {key: Task(*one) for key, one in asked.items()}
 
 
 def timed_hand() -> tuple[RealTime, str]:
