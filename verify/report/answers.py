@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from verify.report.curves import Curve, Point, error_curves
 from verify.report.notation import ROUND_OFF, number, solver_title
@@ -83,38 +83,28 @@ def energy(results: Sequence[CaseResult]) -> Answer:
     takes is known from the outputs alone, as a sum over the spans between them: what the sum misses
     is as large as a drift, and no scheme's.
     """
-    worst: dict[str, tuple[float, float, str]] = {}
-    cases = set()
-    for result, solve in moving(results):
-        drift = solve.metric("energy_drift")
-        if drift is None:
-            continue
-        cases.add(result.case)
-        known = worst.get(solve.solver)
-        if known is None or drift.value > known[0]:
-            worst[solve.solver] = drift.value, drift.value + drift.uncertainty, result.case
+    drifts = [(s.solver, d, r.case) for r, s in moving(results) if (d := s.metric("energy_drift"))]
+    cases = {case for *_, case in drifts}
+    worst: dict[str, tuple[Any, str]] = {}
+    for name, drift, case in drifts:
+        if name not in worst or drift.value > worst[name][0].value:
+            worst[name] = drift, case
     others = {what: {result.case for result, _ in moving(results, what)} for what in _TAKERS}
-    said = [
-        f"{len(c)} case{'s' * (len(c) != 1)} in which {w} takes energy"
-        for w, c in others.items()
-        if c
-    ]
+    said = [f"{len(c)} case{'s' * (len(c) != 1)} in which {what} takes energy"
+            for what, c in others.items() if c]  # fmt: skip
     left = f" Left out: {', '.join(said)}." if said else ""
     if not worst:
         return Answer("Energy", f"No energy was followed: a case in motion would tell.{left}")
-    order = sorted(worst, key=lambda name: (name == BASELINE, worst[name][0]))
     parts = []
-    for name in order[:_NAMED]:
-        value, most, where = worst[name]
-        bounds = [f"at most {number(most, 2)}"] if number(most, 2) != number(value, 2) else []
-        bounds += [where] if len(cases) > 1 else []
+    for name in sorted(worst, key=lambda name: (name == BASELINE, worst[name][0].value))[:_NAMED]:
+        drift, where = worst[name]
+        value, most = (number(drift.value + width, 2) for width in (0.0, drift.uncertainty))
+        bounds = [f"at most {most}"] * (most != value) + [where] * (len(cases) > 1)
         inside = f" ({', '.join(bounds)})" if bounds else ""
-        parts.append(f"{solver_title(name)} {number(value, 2)}{inside}")
+        parts.append(f"{solver_title(name)} {value}{inside}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
-    return Answer(
-        "Energy",
-        f"Largest relative change of the total energy in {where}: {'; '.join(parts)}.{left}",
-    )
+    told = f"Largest relative change of the total energy in {where}: {'; '.join(parts)}.{left}"
+    return Answer("Energy", told)
 
 
 def slivers(results: Sequence[CaseResult]) -> Answer:

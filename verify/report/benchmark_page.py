@@ -1,6 +1,5 @@
 """The benchmark's table of scenes and discretisations, and its plots of time against error."""
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
@@ -42,10 +41,7 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     OSError
         If it cannot be written.
     """
-    place = folder / PICTURES
-    shutil.rmtree(place, ignore_errors=True)  # of an earlier run
-    place.mkdir(parents=True)
-    beside = Beside(place)
+    beside = Beside(folder / PICTURES)
     scenes = benchmark_scenes(evidence.results)
     drawn = [plot for label, own in scenes.items() if (plot := time_plot(label, own))]
     figures = [f"![{plot.alt}]({beside.drawing(plot)})" for plot in drawn]

@@ -91,14 +91,9 @@ def deformed_bodies(solution: Solution, scale: float, steps: Sequence[int] = (-1
     """Return the body displaced by `scale` times its displacement at times, coloured by |u|."""
     cells = _straight(solution.cells, solution.cell_type)
     still = _body(solution.points, cells, np.zeros(len(solution.points)), solution.cells)
-    return [
-        replace(
-            still,
-            points=_in_space(solution.points + scale * solution.displacement[step]),
-            values=np.linalg.norm(solution.displacement[step], axis=1),
-        )
-        for step in steps
-    ]
+    moves = (solution.displacement[step] for step in steps)
+    return [replace(still, points=_in_space(solution.points + scale * u),
+                    values=np.linalg.norm(u, axis=1)) for u in moves]  # fmt: skip
 
 
 def error_body(path: Path) -> Body:
@@ -285,14 +280,8 @@ def common_view(
     centre = (low + high) / 2
     half = np.array([max(width, height * ratio), max(height, width / ratio)]) / 2
     (x0, y0), (x1, y1) = centre - half, centre + half
-    return View(
-        axis,
-        (float(x0), float(x1), float(y0), float(y1)),
-        size,
-        colours,
-        (0.0, top if top > 0 else 1.0),
-        beyond=most > top,
-    )
+    window = float(x0), float(x1), float(y0), float(y1)
+    return View(axis, window, size, colours, (0.0, top if top > 0 else 1.0), beyond=most > top)
 
 
 _DPI = 100
@@ -358,12 +347,8 @@ def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollect
     colours = np.concatenate([colour for _, colour, _, _ in kinds])
     widths = np.concatenate([np.full(len(corners), width) for corners, _, width, _ in kinds])
     order = np.argsort(depth, kind="stable")
-    return PolyCollection(
-        shapes[order],
-        facecolors=colours[order],
-        edgecolors=colours[order],
-        linewidths=widths[order],
-    )
+    return PolyCollection(shapes[order], facecolors=colours[order], edgecolors=colours[order],
+                          linewidths=widths[order])  # fmt: skip
 
 
 def _quartered(facets: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -389,6 +374,7 @@ def colour_bar(view: View, title: str) -> Drawing:
     power = math.floor(math.log10(high)) if drawable else 0
     power = 0 if -3 <= power < 4 else power
     top = high / 10.0**power if drawable else 1.0
+    unit = f"10{str(power).translate(RAISED)} m" if power else "m"
     shades = [to_hex(colour) for colour in colormaps[view.colours](np.linspace(0, 1, 17))]
     stops = "".join(f'<stop offset="{k / 16:g}" stop-color="{c}"/>' for k, c in enumerate(shades))
     left, wide = 16.0, 248.0
@@ -396,7 +382,7 @@ def colour_bar(view: View, title: str) -> Drawing:
     parts = [
         f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>',
         f'<rect x="{left}" y="18" width="{wide}" height="10" fill="url(#scale)"/>',
-        _text(left + wide / 2, 12, f"{title}, {_unit(power)}"),
+        _text(left + wide / 2, 12, f"{title}, {unit}"),
     ]
     if view.beyond:  # an arrow of the last colour
         parts.append(f'<path d="M{end} 18L{end + 10} 23L{end} 28z" fill="{shades[-1]}"/>')
@@ -411,10 +397,6 @@ def colour_bar(view: View, title: str) -> Drawing:
 
 def _text(x: float, y: float, words: str) -> str:
     return f'<text x="{x:.2f}" y="{y:g}" text-anchor="middle" font-size="10.5">{words}</text>'
-
-
-def _unit(power: int) -> str:
-    return f"10{str(power).translate(RAISED)} m" if power else "m"
 
 
 def _ticks(high: float) -> list[float]:
@@ -456,18 +438,12 @@ def packed(body: Body, view: View) -> dict[str, str]:
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2, (depth.min() + depth.max()) / 2])
     middle = centre @ view.axes
     head: dict[str, Any] = {
-        "low": low.tolist(),
-        "span": span.tolist(),
-        "axes": view.axes.ravel().tolist(),
-        "middle": middle.tolist(),
-        "half": [(x1 - x0) / 2, (y1 - y0) / 2],
+        "low": low.tolist(), "span": span.tolist(), "axes": view.axes.ravel().tolist(),
+        "middle": middle.tolist(), "half": [(x1 - x0) / 2, (y1 - y0) / 2],
         "depth": float(np.linalg.norm(points - middle, axis=1).max()) * 1.05,
-        "size": list(view.size),
-        "outer": int((~inside).sum()),
-        "triangles": len(triangles),
-        "edges": len(edges),
-        "outline": len(body.edges),
-    }
+        "size": list(view.size), "outer": int((~inside).sum()), "triangles": len(triangles),
+        "edges": len(edges), "outline": len(body.edges),
+    }  # fmt: skip
     colours = colormaps[view.colours](np.linspace(0, 1, 64))[:, :3]
     cut = 3 * len(triangles)
     return {

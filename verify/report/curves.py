@@ -98,9 +98,8 @@ def error_curves(result: CaseResult, metric: str) -> list[Curve]:
     """
     groups: dict[tuple[str, str], list[SolveRecord]] = {}
     for solve in result.solves:
-        groups.setdefault((solve.solver, json.dumps(solve.parameters, sort_keys=True)), []).append(
-            solve
-        )
+        parameters = json.dumps(solve.parameters, sort_keys=True)
+        groups.setdefault((solve.solver, parameters), []).append(solve)
     rates = {rate.solver: rate for rate in result.rates if rate.metric == metric}
     curves = []
     for (solver, parameters), solves in groups.items():

@@ -1,6 +1,5 @@
 """Front pages of the results and of the ranked run: answers and figures."""
 
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -139,10 +138,7 @@ def coverage(evidence: Evidence) -> dict[str, Drawing | None]:
 
 
 def _pictures(folder: Path, drawn: dict[str, Drawing | None]) -> dict[str, list[str]]:
-    place = folder / PICTURES
-    shutil.rmtree(place, ignore_errors=True)  # of an earlier run
-    place.mkdir(parents=True)
-    written = Pictures(place)
+    written = Pictures(folder / PICTURES)
     return {
         question: [f"![{in_markdown(one.alt)}]({written.drawing(one)})", ""]
         for question, one in drawn.items() if one is not None

@@ -253,11 +253,10 @@ def family_views(run: Run, palette: Palette) -> list[dict[str, Any]]:
 
 
 def _family(name: str, results: list[CaseResult], palette: Palette) -> dict[str, Any]:
-    rows = sorted(results, key=lambda result: -_row_value(result))
-    assert rows[0].row is not None
-    parameter, parts = rows[0].row["parameter"], []
+    rows = sorted(results, key=lambda result: -_row(result)["value"])
+    parameter, parts = _row(rows[0])["parameter"], []
     for metric in dict.fromkeys(metric for row in rows for metric in metric_names(row)):
-        found = {_row_value(row): _finest(row, metric) for row in rows}
+        found = {float(_row(row)["value"]): _finest(row, metric) for row in rows}
         solvers = list(dict.fromkeys(label for one in found.values() for label in one))
         title, panel = error_title(metric), None
         if sum(x > 0 for x in found) > 1:
@@ -272,9 +271,8 @@ def _family(name: str, results: list[CaseResult], palette: Palette) -> dict[str,
     return {"name": name, "parameter": parameter, "parts": parts}
 
 
-def _row_value(result: CaseResult) -> float:
-    assert result.row is not None
-    return float(result.row["value"])
+def _row(result: CaseResult) -> Mapping[str, Any]:
+    return result.row or {}
 
 
 def _finest(result: CaseResult, metric: str) -> dict[str, Point]:

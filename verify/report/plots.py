@@ -120,13 +120,9 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
     """Return a figure as SVG, without what only a file of its own needs."""
     buffer = io.StringIO()
     with rc_context(_RC):  # type: ignore[arg-type]
-        figure.savefig(
-            buffer,
-            format="svg",
-            transparent=True,
-            metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
-        )
-    text = buffer.getvalue()  # fmt: skip
+        none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure.savefig(buffer, format="svg", transparent=True, metadata=none)
+    text = buffer.getvalue()
     body = text[text.index(">", text.index("<svg")) + 1 : text.rindex("</svg>")]
     body = re.sub(
         r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", "", body, flags=re.DOTALL
@@ -142,11 +138,14 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
     return Drawing(body, (72.0 * inches[0], 72.0 * inches[1]), alt, kind)
 
 
+def _lines(label: str, width: int) -> list[str]:
+    return [s for line in printable(label).split("\n") for s in wrap(line, width) or [""]]
+
+
 def legend(axes: Axes) -> None:
     """Name the curves right of the axes, long names in several lines; many make room for all."""
     handles, found = axes.get_legend_handles_labels()
-    labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 20) or [""])
-              for label in found]  # fmt: skip
+    labels = ["\n".join(_lines(label, 20)) for label in found]
     if not handles:
         return
     axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
@@ -173,10 +172,7 @@ def _named(axes: Axes) -> None:
     if len(curves) < len(handles) or len(curves) > _FEW:
         legend(axes)
         return
-    names = [
-        [s for line in printable(label).split("\n") for s in wrap(line, 23) or [""]]
-        for _, label in curves
-    ]
+    names = [_lines(label, 23) for _, label in curves]
     figure = axes.get_figure(root=True)
     assert figure is not None
     needed = sum(_LINE * len(lines) + _GAP for lines in names) / 72 + 0.78  # inches
@@ -458,14 +454,10 @@ _PARTS = tuple(
 
 
 def profile_panel(
-    title: str,
-    along: Sequence[float],
-    curves: Sequence[tuple[str, Sequence[float]]],
-    palette: Palette | None = None,
-    marks: Sequence[float] = (),
-    x_title: str = "time, s",
+    title: str, along: Sequence[float], curves: Sequence[tuple[str, Sequence[float]]],
+    palette: Palette | None = None, marks: Sequence[float] = (), x_title: str = "time, s",
     band: tuple[Sequence[float], Sequence[float]] | None = None,
-) -> Drawing:
+) -> Drawing:  # fmt: skip
     """Return a figure of several curves over a common abscissa.
 
     Parameters

@@ -86,10 +86,7 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
 
 def _cuts(scene: dict[str, Any]) -> list[float]:
     """Return the instants at which cuts open after the start, s."""
-    cuts = scene.get("cuts")
-    times = (
-        [c.get("opens_at") for c in cuts if isinstance(c, dict)] if isinstance(cuts, list) else []
-    )
+    times = [cut.get("opens_at") for cut in scene.get("cuts") or [] if isinstance(cut, dict)]
     return sorted({float(t) for t in times if isinstance(t, int | float) and 0.0 < t < math.inf})
 
 
@@ -110,11 +107,8 @@ def _over_time(
         halves = [m.uncertainty for s in shown if (m := s.metric(f"{name}_max")) is not None]
         times = shown[0].series["time"] if shown else []
         band = (times, [0.0] * len(times), [max(halves)] * len(times)) if halves else None
-        yield (
-            metric_title(name),
-            [(s.solver, s.series["time"], s.series[name]) for s in shown],
-            band,
-        )
+        curves = [(s.solver, s.series["time"], s.series[name]) for s in shown]
+        yield metric_title(name), curves, band
     levels = [s for s in result.solves if s.solver == REFERENCE and s.status is Status.SOLVED]
     levels = sorted(levels, key=lambda s: s.level)[-2:]
 
@@ -155,8 +149,12 @@ def _between(levels: Sequence[tuple[list[float], list[float]]]) -> Band | None:
         return None
     (_, coarse), (times, fine) = levels
     halves = [abs(a - b) for a, b in zip(coarse, fine, strict=True)]
-    low, high = ([v + s * w for v, w in zip(fine, halves, strict=True)] for s in (-1, 1))
-    return times, low, high
+    return (times, *_edges(fine, halves))
+
+
+def _edges(middle: Sequence[float], half: Sequence[float]) -> tuple[list[float], list[float]]:
+    low, high = ([v + s * w for v, w in zip(middle, half, strict=True)] for s in (-1, 1))
+    return low, high
 
 
 def _blade_forces(solves: Sequence[SolveRecord]) -> Iterator[tuple[str, str]]:
@@ -300,11 +298,7 @@ def _panel(
         return None
     band = None
     if reference is not None and any(half := getattr(reference, f"{part}_band")):
-        middle = getattr(reference, part)
-        band = (
-            [v - w for v, w in zip(middle, half, strict=True)],
-            [v + w for v, w in zip(middle, half, strict=True)],
-        )
+        band = _edges(getattr(reference, part), half)
     title = f"{profile.cut}: {'pressure, Pa' if part == 'pressure' else f'{part} jump, m'}"
     return profile_panel(title, profile.arc, curves, palette, x_title="arc length, m", band=band)
 

@@ -71,10 +71,8 @@ def as_markdown(template: str, folder: Path, pictures: str = PICTURES, **view: A
     OSError
         If they cannot be written.
     """
-    target = folder / pictures
-    shutil.rmtree(target, ignore_errors=True)
-    target.mkdir(parents=True)
-    text = _environment("markdown").get_template(template).render(assets=Beside(target), **view)
+    beside = Beside(folder / pictures)
+    text = _environment("markdown").get_template(template).render(assets=beside, **view)
     return re.sub(r"[ \t]+\n", "\n", re.sub(r"\n\s*\n", "\n\n", text)).strip() + "\n"
 
 
@@ -175,10 +173,12 @@ class _Inline:
 
 
 class Beside:
-    """Drawings and images as files: SVG and PNG."""
+    """Drawings and images as files, SVG and PNG, in a folder that is made anew."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.count = folder, 0
+        shutil.rmtree(folder, ignore_errors=True)  # of an earlier run
+        folder.mkdir(parents=True)
 
     def drawing(self, drawing: Drawing) -> Markup:
         """Write an SVG file; return its path from the Markdown."""

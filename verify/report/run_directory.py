@@ -227,9 +227,7 @@ def junit_document(run: Run) -> str:
                 for n in entry.result.notices
             )
             ElementTree.SubElement(suite, "system-out").text = printable(said)
-        walls = [
-            solve.wall for solve in (entry.result.solves if entry.result else []) if solve.wall
-        ]
+        walls = (solve.wall or 0.0 for solve in (entry.result.solves if entry.result else ()))
         suite.set("time", f"{sum(walls):.3f}")
     _count(root)
     ElementTree.indent(root)
@@ -271,14 +269,9 @@ def _test_name(record: VerdictRecord) -> str:
 
 
 def _testcase(
-    suite: ElementTree.Element,
-    entry: CaseEntry,
-    name: str,
-    verdict: Verdict,
-    reason: str,
-    known: str = "",
-    badge: str = "",
-) -> None:
+    suite: ElementTree.Element, entry: CaseEntry, name: str, verdict: Verdict, reason: str,
+    known: str = "", badge: str = "",
+) -> None:  # fmt: skip
     """Add a verdict; a known finding does not count as a failure, as in the exit code."""
     classname = printable(entry.name).replace("/", ".")
     case = ElementTree.SubElement(suite, "testcase", name=printable(name), classname=classname)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -175,72 +176,53 @@ def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
     face, steps, delays = record["face"], record["steps"], record["delays"]
     cuts = [0.0, *(float(row["asked"]) for row in face)]
     added = {
-        "thesis, XFEM": ("thesis", "xfem"),
-        "thesis, S + S": ("thesis", "snapping_subdivision"),
-        "XFEM": ("added", "xfem"),
-        "S + S, 0.02": ("added", "snapping_subdivision 0.02"),
+        "thesis, XFEM": ("thesis", "xfem"), "thesis, S + S": ("thesis", "snapping_subdivision"),
+        "XFEM": ("added", "xfem"), "S + S, 0.02": ("added", "snapping_subdivision 0.02"),
         "S + S, 0.2": ("added", "snapping_subdivision 0.2"),
-    }
-    nodes = [
-        (name, [0.0, *(row[part][method] for row in face)])
-        for name, (part, method) in added.items()
-    ]
-    asked = [float(cut) for cut in dict.fromkeys(row["asked_cuts"] for row in steps)]
-    sizes = [float(size) for size in dict.fromkeys(row["tetrahedra"] for row in delays)]
+    }  # fmt: skip
+    nodes = [(name, [0.0, *(row[part][method] for row in face)])
+             for name, (part, method) in added.items()]  # fmt: skip
 
-    def grouped(rows: Any, by: str, key: str, factor: float = 1.0) -> list[Any]:
-        return [
+    def over(
+        rows: Any, x: str, x_title: str, by: str, title: str, key: str, factor: float = 1.0
+    ) -> Drawing:
+        curves = [
             (f"{name} tets" if isinstance(name, int) else name,
              [factor * row[key] for row in rows if row[by] == name])
             for name in dict.fromkeys(row[by] for row in rows)
         ]  # fmt: skip
+        along = [float(place) for place in dict.fromkeys(row[x] for row in rows)]
+        return profile_panel(title, along, curves, x_title=x_title)
 
-    def over_cuts(title: str, key: str, factor: float = 1.0) -> Drawing:
-        curves = grouped(steps, "asked_tetrahedra", key, factor)
-        return profile_panel(title, asked, curves, x_title="cuts")
-
-    def over_sizes(title: str, key: str) -> Drawing:
-        return profile_panel(title, sizes, grouped(delays, "speed_name", key), x_title="tetrahedra")
-
+    over_cuts = partial(over, steps, "asked_cuts", "cuts", "asked_tetrahedra")
+    over_sizes = partial(over, delays, "tetrahedra", "tetrahedra", "speed_name")
     unknowns = [profile_panel("nodes added", cuts, nodes, x_title="cut elements")]
     caption = "Nodes added by cuts that grow; S + S is snapping and subdivision with its threshold."
+    question, said = "Which claims of the thesis hold?", _said(record["findings"])
     return {
-        "lead": Lead(
-            "Which claims of the thesis hold?", _said(record["findings"]), unknowns, caption
-        ),
+        "lead": Lead(question, said, unknowns, caption),
         "times": [
             over_cuts("thesis: s per simulated s", "thesis_per_second"),
             over_cuts("here: ms per simulated s", "per_second", 1e3),
-            over_cuts("here: nodes", "nodes"),
-            over_cuts("thesis: nodes", "thesis_nodes"),
+            over_cuts("here: nodes", "nodes"), over_cuts("thesis: nodes", "thesis_nodes"),
         ],
-        "delays": [
-            over_sizes("thesis: delay, s", "thesis"),
-            over_sizes("size over speed: delay, s", "delay"),
-        ],
-    }
+        "delays": [over_sizes("thesis: delay, s", "thesis"),
+                   over_sizes("size over speed: delay, s", "delay")],
+    }  # fmt: skip
 
 
 def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
     """Say whose claims hold and whose fail, each by what it demands."""
     said = []
-    for whose, words in (
-        ("the thesis", "claims of the thesis"),
-        ("this project", "claims of this project"),
-    ):
-        own = [finding for finding in findings if finding.get("whose") == whose]
+    for whose in ("the thesis", "this project"):
+        own = listed(findings, whose=whose)
         if not own:
             continue
-        held = sum(finding["verdict"] == "PASS" for finding in own)
-        text = f"Of {len(own)} {words}, {held} hold."
+        held = len(listed(own, verdict="PASS"))
+        text = f"Of {len(own)} claims of {whose}, {held} hold."
         for verdict, lead in (("FAIL", "Not"), ("UNDECIDED", "Not told by this run")):
-            open_ones = [
-                f"{finding['topic']} ({finding['expected']})"
-                for finding in own
-                if finding["verdict"] == verdict
-            ]
-            if open_ones:
-                text += f" {lead}: {'; '.join(open_ones)}."
+            rest = [f"{one['topic']} ({one['expected']})" for one in listed(own, verdict=verdict)]
+            text += f" {lead}: {'; '.join(rest)}." if rest else ""
         said.append(text)
     return said or ["No claim was judged."]
 
@@ -283,7 +265,7 @@ def iterations_panels(settings: Settings, error: str) -> list[Drawing | None]:
 
 def _by_case(settings: Settings) -> Iterator[tuple[str, Settings]]:
     for case in dict.fromkeys(one["case"] for one in settings):
-        yield case, [one for one in settings if one["case"] == case]
+        yield case, listed(settings, case=case)
 
 
 def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
@@ -311,9 +293,7 @@ def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
 
 def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
     """Compare the fewest and the most substeps at the largest work that both had."""
-    better: list[str] = []
-    worse: list[str] = []
-    level: list[str] = []
+    told: dict[int, list[str]] = {1: [], -1: [], 0: []}  # better, worse, neither
     for case, own in _by_case(settings):
         errors = {
             (one["substeps"], one["iterations"] * one["substeps"]): one["whole_error"]
@@ -330,19 +310,16 @@ def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
             f"{case}, {work} iterations: {number(other, 2)} with {many} substeps, "
             f"{number(one, 2)} with {few}"
         )
-        chosen = better if other < _NEARER * one else worse if one < _NEARER * other else level
-        chosen.append(text)
-    compared = len(better) + len(worse) + len(level)
+        told[(other < _NEARER * one) - (one < _NEARER * other)].append(text)
+    compared, better = sum(map(len, told.values())), len(told[1])
     if not compared:
         return "No two settings have the same work with different substeps: nothing is compared."
-    shown = "; ".join([*better, *worse, *level])
-    if len(better) == compared:
-        said = f"Substeps pay at equal work, on all {compared} cases"
-    elif not better:
-        said = f"Substeps do not pay at equal work on any of {compared} cases"
-    else:
-        said = f"Substeps pay at equal work on {len(better)} of {compared} cases"
-    return f"{said}. Error of the whole: {shown}."
+    where = f", on all {compared}" if better == compared else f" on {better} of {compared}"
+    said = (
+        f"pay at equal work{where}" if better else f"do not pay at equal work on any of {compared}"
+    )
+    shown = "; ".join(text for own in told.values() for text in own)
+    return f"Substeps {said} cases. Error of the whole: {shown}."
 
 
 _VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {

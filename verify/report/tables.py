@@ -40,13 +40,8 @@ from verify.result import (
 )
 
 MANY = 4  # solvers beyond which they stand side by side
-_CHECKS = {
-    "rate": "order of the",
-    "error": "",
-    "ratio": "worst ratio of the",
-    "value": "",
-    "excess": "excess of the",
-}
+_CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": "",
+           "excess": "excess of the"}  # fmt: skip
 
 
 def case_tables(result: CaseResult) -> dict[str, Table | None]:
@@ -66,9 +61,7 @@ def check_text(record: VerdictRecord, named: bool = True) -> str:
     """Return what a check looks at in words, after whom it judges if `named`."""
     name = (metric_title if record.check in ("value", "excess") else error_title)(record.metric)
     what = f"{_CHECKS.get(record.check, record.check)} {name}".strip()
-    return (
-        f"{solver_title(record.solver) if record.solver else 'nobody'}: {what}" if named else what
-    )
+    return f"{solver_title(record.solver or 'nobody')}: {what}" if named else what
 
 
 def check_row(record: VerdictRecord, unit: str = "") -> list[Any]:
@@ -79,12 +72,8 @@ def check_row(record: VerdictRecord, unit: str = "") -> list[Any]:
         observed = number(record.observed, _digits_to_judge(record)) + unit
         limit = limit.replace(" ±", f"{unit} ±", 1)
     known = f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
-    return [
-        check_text(record),
-        observed,
-        scientific(limit),
-        Cell(record.badge, scientific(known), verdict=str(record.verdict)),
-    ]
+    verdict = Cell(record.badge, scientific(known), verdict=str(record.verdict))
+    return [check_text(record), observed, scientific(limit), verdict]
 
 
 def _digits_to_judge(record: VerdictRecord) -> int:
@@ -118,9 +107,7 @@ def _checks_table(result: CaseResult) -> Table | None:
     solvers = list(dict.fromkeys(record.solver for record in result.verdicts))
     units = _units(result)
     if len(solvers) <= MANY:
-        head = ["check", "observed [interval]", "limit", "verdict"]
-        rows = [check_row(record, units.get(record.metric, "")) for record in result.verdicts]
-        return Table("Verdicts", head, rows, "verdicts")
+        return _rows_of("Verdicts", result.verdicts, units)
     checks: dict[tuple[str, str], dict[str | None, Cell]] = {}
     for record in result.verdicts:
         _, observed, limit, cell = check_row(record, units.get(record.metric, ""))
@@ -138,9 +125,12 @@ def _reasons_table(result: CaseResult) -> Table | None:
     """Return, for many solvers, why checks did not pass."""
     few = len({record.solver for record in result.verdicts}) <= MANY
     bad = [r for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
-    rows = [check_row(r, _units(result).get(r.metric, "")) for r in bad]
-    head = ["check", "observed [interval]", "limit", "verdict"]
-    return Table("Not passed", head, rows, "verdicts") if rows else None
+    return _rows_of("Not passed", bad, _units(result)) if bad else None
+
+
+def _rows_of(title: str, records: Sequence[VerdictRecord], units: Mapping[str, str]) -> Table:
+    rows = [check_row(record, units.get(record.metric, "")) for record in records]
+    return Table(title, ["check", "observed [interval]", "limit", "verdict"], rows, "verdicts")
 
 
 def _errors_table(result: CaseResult) -> Table | None:
@@ -206,17 +196,12 @@ def _times_table(result: CaseResult) -> Table | None:
             continue
         whole = duration(solve)
         iterations = ", ".join(f"{name} {count}" for name, count in solve.iterations.items())
-        rows.append(
-            [
-                *_named(solve),
-                *(_spread(solve.timings.get(phase, [])) for phase in phases),
-                seconds_text(whole.median) if whole else "–",
-                seconds_text(solve.wall),
-                bytes_text(solve.peak_memory),
-                *([iterations or "–"] if iterative else []),
-                *([solve.notes.get(CRITICAL_STEP, "–")] if stepping else []),
-            ]
-        )
+        rows.append([
+            *_named(solve), *(_spread(solve.timings.get(phase, [])) for phase in phases),
+            seconds_text(whole.median) if whole else "–", seconds_text(solve.wall),
+            bytes_text(solve.peak_memory), *([iterations or "–"] if iterative else []),
+            *([solve.notes.get(CRITICAL_STEP, "–")] if stepping else []),
+        ])  # fmt: skip
     return Table("Wall times: median (smallest to largest repetition)", head, rows)
 
 
@@ -246,17 +231,13 @@ def cuts_table(result: CaseResult) -> Table | None:
         of_ends, of_swept = ("m", "m²") if cut.dimension == 2 else ("m²", "m³")
         judged = f"{'with' if cut.continued else 'partly without'} continuation"
         judged += ", under-resolved" if cut.under_resolved else ""
-        rows.append(
-            [
-                *_named(solve),
-                _in_elements(cut.asked_to_realised, solve),
-                _in_elements(cut.realised_to_asked, solve),
-                *(f"{number(amount, 2)} {of_ends}" for amount in (cut.missing, cut.surplus)),
-                f"{number(cut.swept, 2)} {of_swept}",
-                judged,
-                number(cut.errors.get("displacement_l2"), 2),
-            ]
-        )
+        rows.append([
+            *_named(solve), _in_elements(cut.asked_to_realised, solve),
+            _in_elements(cut.realised_to_asked, solve),
+            *(f"{number(amount, 2)} {of_ends}" for amount in (cut.missing, cut.surplus)),
+            f"{number(cut.swept, 2)} {of_swept}", judged,
+            number(cut.errors.get("displacement_l2"), 2),
+        ])  # fmt: skip
     head = [
         "solver", "level", "beside it: as asked", "as realised", "missing", "too much", "swept",
         "judged", "L² error that is not",
@@ -292,15 +273,9 @@ def reference_facts(reference: ReferenceRecord) -> list[tuple[str, str]]:
 
 def reference_tables(reference: ReferenceRecord, units: Mapping[str, str]) -> list[Table]:
     """Return the levels of a reference, what it knows of each metric, and the errors it judges."""
-    return [
-        table
-        for table in (
-            _levels_table(reference),
-            _known_table(reference.metrics or {}, units),
-            _judged_table(reference.judged_errors or {}),
-        )
-        if table.rows
-    ]
+    tables = (_levels_table(reference), _known_table(reference.metrics or {}, units),
+              _judged_table(reference.judged_errors or {}))  # fmt: skip
+    return [table for table in tables if table.rows]
 
 
 def _levels_table(reference: ReferenceRecord) -> Table:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact import exact_of
-from verify.conformance.scenes import held, line, pull, unit_scene, weight
+from verify.conformance.scenes import held, pull, unit_scene, weight
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.accuracy import assess_accuracy
 from verify.judge.convergence import observed_rate
@@ -27,7 +27,7 @@ from verify.simulator.thesis import FaceCount, count_face, count_strips, delays
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh
 from verify.study.measured_scenes import measured_scene, variant_of
-from verify.system import condition_numbers, critical_step, lowest_frequency, with_uncut_twin
+from verify.system import critical_step, lowest_frequency, with_uncut_twin
 
 Array = NDArray[np.float64]
 Cut = tuple[Array, NDArray[np.int64], Array, Array]  # points, cells, point and normal of a plane
@@ -96,8 +96,8 @@ def _quotient(one: Metric, other: Metric, note: str = "") -> Number:
 
 
 @cache
-def _systems(family: str, method: str) -> list[tuple[float, float, float]]:
-    """Critical step over the uncut body's, condition number, and that scaled by the diagonal."""
+def _shares(family: str, method: str) -> list[float]:
+    """Critical steps over the uncut body's, for every sliver of a family."""
     variant, found = variant_of(method), []
     for scene in load_scenes(family):
         if scene.row is None or not 0.0 < scene.row.value < 0.5:
@@ -107,12 +107,12 @@ def _systems(family: str, method: str) -> list[tuple[float, float, float]]:
             own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
         except UnsupportedSceneError:
             continue
-        found.append((critical_step(own) / critical_step(whole), *condition_numbers(own)))
+        found.append(critical_step(own) / critical_step(whole))
     return found
 
 
 def _least_over_slivers(method: str) -> Number:
-    found = [step for family in _FAMILIES for step, *_ in _systems(family, method)]
+    found = [share for family in _FAMILIES for share in _shares(family, method)]
     return _extreme(found, min, f"ε = 0.1 to 1e-12 in {' and '.join(_FAMILIES)}")
 
 
@@ -227,27 +227,6 @@ def diagonal_step() -> list[Number]:
         _extreme(ratios, min, f"{len(ratios)} cut triangles and tetrahedra"),
         _least_over_slivers("xfem mass=thesis"),
     ]
-
-
-def rigid_motion() -> list[Number]:
-    """Let a freed half fall: distance of its fall from g t²/2, relative."""
-    found, heights = [], (0.5, 0.3, 0.03, 1e-6)
-    for mass in ("sidewise", "thesis"):
-        off = []
-        for height in heights:
-            level, end = 0.5 + height / 8.0, 0.1
-            scene = unit_scene(
-                "falls", mesh={"cells": [[8, 8]]}, cuts=[line((-0.1, level), (1.1, level))],
-                material=_ELASTIC | {"young": 1e9, "plane": "strain"},
-                supports=[held("top", [0.0, 0.0])], loads=[weight(0.0, -_GRAVITY)],
-                analysis={"kind": "dynamic", "duration": end, "time_step": 0.01, "outputs": 2},
-            )  # fmt: skip
-            solution = variant_of("xfem").found().solve(scene, 0, repetitions=1, mass=mass)
-            lowest = solution.points[:, 1] == 0.0
-            fallen = float(solution.displacement[-1, lowest, 1].mean())
-            off.append(abs(fallen / (-0.5 * _GRAVITY * end**2) - 1.0))
-        found.append(_extreme(off, max, "cuts at 0.5, 0.3, 0.03 and 1e-6 of an element"))
-    return found
 
 
 def fewer_unknowns() -> list[Number]:
@@ -509,16 +488,6 @@ def springs() -> list[Number]:
     errors = [_solved(case, "mass_spring fit=van_gelder", k)[1][_L2] for k in range(2)]
     note = f"{errors[0].value:.2g} and {errors[1].value:.2g} at h = 1/8 and 1/16"
     return [within(errors[1].value, errors[1].uncertainty, note), _quotient(errors[1], errors[0])]
-
-
-def diagonal_scaling() -> list[Number]:
-    """Condition numbers over ε, largest over least, scaled by the diagonal; and the raw largest."""
-    found = []
-    for family in _FAMILIES:
-        _, raw, scaled = zip(*_systems(family, "xfem"), strict=True)
-        note = f"{min(scaled):.3g} to {max(scaled):.3g}; unscaled up to {max(raw):.1e}"
-        found.append(exactly(max(scaled) / min(scaled), note))
-    return found
 
 
 def measured(names: list[str]) -> dict[str, list[Number]]:

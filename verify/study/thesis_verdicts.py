@@ -123,12 +123,8 @@ def _steps(steps: Sequence[StepTime]) -> Iterator[Finding]:
         held(min(faster) >= _BEATEN),
         PROJECT,
     )
-    pairs = [
-        (cut, bare)
-        for cut in column
-        for bare in steps
-        if bare.asked_cuts == 0 and bare.asked_tetrahedra == cut.asked_tetrahedra
-    ]
+    uncut = {row.asked_tetrahedra: row for row in steps if row.asked_cuts == 0}
+    pairs = [(cut, uncut[cut.asked_tetrahedra]) for cut in column]
     dearer = [cut.step / bare.step for cut, bare in pairs]
     known = [cut.thesis_per_second / bare.thesis_per_second for cut, bare in pairs]
     yield Finding(
@@ -157,12 +153,11 @@ def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
         yield Finding(
             f"real time: every step within {name}",
             f"{hand.within[name]:.1%} of {hand.steps} steps in processor time of one thread "
-            f"({hand.within_wall[name]:.1%} in wall time; medians of replays), "
-            f"median {1e3 * hand.resting['step']:.2f} "
-            f"ms, {1e3 * hand.cutting['step']:.2f} ms of the {hand.cutting_steps} that cut, "
-            f"slowest {1e3 * hand.slowest:.2f} ms; "
-            f"{hand.tetrahedra} tetrahedra, {hand.cuts} cut, "
-            f"inner surface, mapping and collision included; kernel {1e3 * hand.kernel:.1f} ms"
+            f"({hand.within_wall[name]:.1%} in wall time; medians of replays), median "
+            f"{1e3 * hand.resting['step']:.2f} ms, {1e3 * hand.cutting['step']:.2f} ms of the "
+            f"{hand.cutting_steps} that cut, slowest {1e3 * hand.slowest:.2f} ms; "
+            f"{hand.tetrahedra} tetrahedra, {hand.cuts} cut, inner surface, "
+            f"mapping and collision included; kernel {1e3 * hand.kernel:.1f} ms"
             + (f" ({contended})" if contended else ""),
             f"all steps within {name}, on one core",
             held(None if doubted else kept),
@@ -196,14 +191,12 @@ def _delays(delays: Sequence[Delay], frames: Sequence[Frames]) -> Iterator[Findi
     )
     size = [row.delay * row.speed / row.edge for row in delays]
     spread = max(size) / min(size) - 1.0
+    known = {row.speed_name: row.speed for row in delays}
+    speeds = ", ".join(f"{name} {1e3 * speed:.1f} mm/s" for name, speed in known.items())
     yield Finding(
         "Table 4.6: delay is size over speed",
         f"delay × speed is {min(size):.3f} to {max(size):.3f} of the mean edge over "
-        f"{len({row.tetrahedra for row in delays})} meshes and three speeds, "
-        + ", ".join(
-            f"{name} {1e3 * speed:.1f} mm/s"
-            for name, speed in {row.speed_name: row.speed for row in delays}.items()
-        ),
+        f"{len({row.tetrahedra for row in delays})} meshes and three speeds, {speeds}",
         f"one number within {_ROUND:.0%}",
         held(spread <= _ROUND),
         PROJECT,
@@ -231,9 +224,7 @@ def _fall(delays: Sequence[Delay], name: str) -> tuple[float, float]:
 
 
 def _face(row: FaceCount) -> Finding:
-    said = ", ".join(
-        f"{name} {step:.2g} ({row.smallest[name]:.1e})" for name, step in row.step.items()
-    )
+    said = ", ".join(f"{n} {step:.2g} ({row.smallest[n]:.1e})" for n, step in row.step.items())
     divided = [step for name, step in row.step.items() if "subdivision" in name]
     kept = row.step["xfem"] >= _KEPT and row.step["xfem"] > max(divided)
     return Finding(
