@@ -1,7 +1,7 @@
 """The study of the thesis: its tables measured again, judged, and as plain data.
 
-What ways to cut do to errors and explicit steps is judged by the ranked run, the study of slivers
-and that of claims.
+What ways to cut do to errors and explicit steps is judged by the ranked run, and by the studies of
+slivers and claims.
 """
 
 import os
