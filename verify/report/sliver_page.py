@@ -1,4 +1,4 @@
-"""The page of a sliver study: what its numbers answer, its figure, then worst values and curves.
+"""The page of a sliver study: what its numbers answer, its figure, then tables and curves.
 
 If one solver takes part with many values of one number, the question is what that number does.
 """
@@ -189,14 +189,28 @@ def _times(ratio: float) -> str:
 
 
 def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return name, worst values and curves of each family of scenes."""
+    """Return name, tables and curves of each family of scenes."""
     palette = Palette.of(solver_title(m["solver"]) for m in record["measurements"])
     families = []
     for family in dict.fromkeys(m["family"] for m in record["measurements"]):
         measured = listed(record["measurements"], family=family)
+        solvers = list(dict.fromkeys(m["solver"] for m in measured))
+        steps = {s: {size: v for v, size in _shares(measured, family, s)} for s in solvers}
+        scaled = {s: _values(measured, family, s, _SCALED) for s in solvers}
+        tables = [_worst(measured, family, solvers),
+                  _over_sizes("Critical explicit step over that of the uncut body", steps),
+                  _over_sizes("Condition number, scaled by the diagonal", scaled)]  # fmt: skip
         curves = _curves(measured, listed(record["growths"], family=family), palette)
-        families.append({"name": family, "worst": _worst(measured, family), "curves": curves})
+        families.append({"name": family, "tables": tables, "curves": curves})
     return families
+
+
+def _over_sizes(title: str, values: Mapping[str, Mapping[float, float]]) -> Table:
+    """Return a row for each solver that has a value, and a column for each size."""
+    sizes = sorted({size for own in values.values() for size in own}, reverse=True)
+    rows = [[solver_title(solver), *(number(own.get(size), 2) for size in sizes)]
+            for solver, own in values.items() if own]  # fmt: skip
+    return Table(title, ["ε =", *(f"{size:g}" for size in sizes)], rows, named=True)
 
 
 def listed(records: Records, **fixed: Any) -> list[Mapping[str, Any]]:
@@ -204,9 +218,9 @@ def listed(records: Records, **fixed: Any) -> list[Mapping[str, Any]]:
     return [r for r in records if all(r.get(key) == value for key, value in fixed.items())]
 
 
-def _worst(measured: Records, family: str) -> Table | None:
+def _worst(measured: Records, family: str, solvers: Sequence[str]) -> Table:
     """Return the table of the worst value of each solver over ε, beside the conforming mesh."""
-    solvers, rows = list(dict.fromkeys(m["solver"] for m in measured)), []
+    rows = []
     for solver in solvers if _MEASURE in solvers else ():
         least = _least(_shares(measured, family, solver))
         errors = [_ratios(measured, family, solver, name).values() for name in _ERRORS]
@@ -223,7 +237,7 @@ def _worst(measured: Records, family: str) -> Table | None:
     heads = ["method", "least step over the uncut body's", "largest L² error over conforming",
              "largest energy-norm error over conforming", "lowest frequency off conforming",
              "largest scaled condition number"]  # fmt: skip
-    return Table("Worst over ε", heads, rows, named=True) if rows else None
+    return Table("Worst over ε", heads, rows, named=True)
 
 
 def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawing | None]:

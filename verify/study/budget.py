@@ -63,14 +63,9 @@ class BudgetStudy(Study):
 
 
 def budget_study(
-    scene: Scene,
-    level: int | None,
-    tolerance: float,
-    metric: str | None,
-    exact: ExactField | None,
-    solve: Solve,
-    quick: bool = False,
-) -> BudgetStudy:
+    scene: Scene, level: int | None, tolerance: float, metric: str | None,
+    exact: ExactField | None, solve: Solve, quick: bool = False,
+) -> BudgetStudy:  # fmt: skip
     """Take the answer of level `level` apart, and find the cheapest adequate model.
 
     Parameters

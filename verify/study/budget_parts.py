@@ -193,13 +193,9 @@ class Budget:
 
 
 def error_budget(
-    chain: Sequence[Answer],
-    body: AnyBody,
-    size: float,
-    law: Hooke,
-    units: Mapping[str, str],
+    chain: Sequence[Answer], body: AnyBody, size: float, law: Hooke, units: Mapping[str, str],
     times: Times = (None,),
-) -> list[Budget]:
+) -> list[Budget]:  # fmt: skip
     """Split the difference between the first and the last link of `chain`.
 
     Parameters

@@ -60,13 +60,9 @@ def trials(family: Family, index: int, seed: int) -> list[Trial]:
 
 
 def _judged(
-    scene: Scene,
-    levels: Mapping[int, Solution],
-    body: AnyBody,
-    law: Law,
-    exact: ExactSolution | None,
-    values: Mapping[str, tuple[float, float]],
-) -> list[Trial]:
+    scene: Scene, levels: Mapping[int, Solution], body: AnyBody, law: Law,
+    exact: ExactSolution | None, values: Mapping[str, tuple[float, float]],
+) -> list[Trial]:  # fmt: skip
     finest = levels[max(levels)]
     size = size_of(finest) * (1 if scene.dimension == 2 else 2)  # of the quadrature
     stated = conforming_reference(scene, levels, body, law, Rules(body, size))
@@ -84,9 +80,8 @@ def _judged(
         if value == 0.0 or name not in stated.quantities:
             continue
         at, half = stated.quantities[name]
-        found.append(
-            Trial("", 0, 0, name, half / abs(value), abs(at / value - 1), width / abs(value))
-        )
+        off, known = abs(at / value - 1), width / abs(value)
+        found.append(Trial("", 0, 0, name, half / abs(value), off, known))
     return found
 
 

@@ -116,13 +116,9 @@ class IterationsStudy(Study):
 
 
 def iterations_study(
-    scenes: Sequence[Scene],
-    variant: Variant,
-    truth: Variant,
-    grid: Grid,
-    tolerance: float,
+    scenes: Sequence[Scene], variant: Variant, truth: Variant, grid: Grid, tolerance: float,
     making: Making,
-) -> IterationsStudy:
+) -> IterationsStudy:  # fmt: skip
     """Solve the coarsest level of each scene by every setting, one after the other.
 
     Parameters
