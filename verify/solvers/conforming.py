@@ -9,7 +9,7 @@ from reference.elasticity import linear_system, solve_linear, wants_pressure
 from reference.exact import exact_of
 from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places, place_text
-from reference.installation import import_dolfinx
+from reference.installation import all_ranks, import_dolfinx
 from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.law import energy_of
 from reference.meshing import ConformingMesh
@@ -197,7 +197,8 @@ def _solve(
 ) -> Solution:
     if reason := solver.refuses(scene):
         raise UnsupportedSceneError(reason)
-    exact, comm = exact_of(scene), _comm()
+    exact, (ranks, _) = exact_of(scene), all_ranks()
+    comm = ranks if ranks.size > 1 else None  # over which a scene is distributed
 
     def run(made: tuple[ConformingMesh, float, int], trial: bool) -> Solution:
         mesh, size, level = made
@@ -218,14 +219,6 @@ def _solve(
 
     # a trial on the coarsest mesh compiles the forms
     return repeated(repetitions, lambda: made(level), run, lambda: made(0))
-
-
-def _comm() -> Any:
-    """Communicator over which a scene is distributed, or None where there is one process only."""
-    from reference.installation import all_ranks
-
-    ranks, _ = all_ranks()
-    return ranks if ranks.size > 1 else None
 
 
 def _equilibrium(

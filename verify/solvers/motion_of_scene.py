@@ -287,11 +287,6 @@ class CutMotion:
         """Time of the state, s."""
         return self.state.time
 
-    @property
-    def largest(self) -> float:
-        """Largest time step of the body as it is cut now, s."""
-        return self._largest
-
     def open(self, time: float) -> bool:
         """Cut the body by the cuts as they are at a time, and carry the state over."""
         before, self._entered = self._entered, time + self.timeline.close
@@ -376,8 +371,8 @@ class CutMotion:
         self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
         self._instants, self._taken = list[tuple[int, dict[str, float]]](), 0
         scheme, factor = self.integration.scheme, self.integration.step_factor
-        found = largest_step(self.scene, body, scheme, factor)
-        self._largest, self.record.notes["step from"] = found
+        self.largest, how = largest_step(self.scene, body, scheme, factor)  # as it is cut now
+        self.record.notes["step from"] = how
 
     def _leave(self) -> None:
         """Enter what has happened to the body."""
