@@ -8,7 +8,7 @@ from solid_meshes import height, inclined, sliver_body, solid_scene, stacked
 
 from verify.compare.body import body_of
 from verify.compare.cut_rule import membrane_cut_rule, surface_rule
-from verify.compare.hooke import MembraneLaw, hooke
+from verify.compare.hooke import Corotated, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.realised import field_of
 from verify.scene import Material
@@ -37,7 +37,7 @@ class Sheet(_Halves):
 
     shape: Shape
     levels = (4, 6)
-    law = MembraneLaw(0.7, 0.4)
+    law = Corotated(0.7, 0.4)
     round_off = 1e-15  # of the width of a sliver, a difference of numbers near .5 on a slope
     cut_rule = staticmethod(membrane_cut_rule)
     cut = "cut0"

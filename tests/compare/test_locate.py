@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
-from verify.compare import cell_tree, locate, mass, sides
+from verify.compare import cell_tree, locate, sides
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate import SolutionField
 from verify.compare.mass import kinetic
@@ -16,7 +16,7 @@ RNG = np.random.default_rng(1)
 @pytest.fixture(autouse=True, params=[True, False], ids=["kernels", "numpy"])
 def compiled(request, monkeypatch):
     """Try both forms of the search: the compiled one, and that of an environment without numba."""
-    for module in (cell_tree, locate, mass, sides):
+    for module in (cell_tree, locate, sides):
         monkeypatch.setattr(module, "COMPILED", request.param)
 
 

@@ -196,7 +196,7 @@ def test_of_many_cells_some_are_looked_at_and_enough_to_find_what_is_outside():
     one = interpolant(101)  # more cells than are looked at
     beside = replace(one, points=one.points + np.array([0.3, 0.0]))
     for found, share in ((one, 0.0), (beside, 0.3)):
-        assert Measured(found, body, None).outside == pytest.approx(share, abs=0.01)
+        assert Measured(found, body, None, None).outside == pytest.approx(share, abs=0.01)
 
 
 def test_an_energy_that_is_zero_is_known_as_far_as_strains_are():

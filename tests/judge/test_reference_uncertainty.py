@@ -33,7 +33,7 @@ def test_the_stated_uncertainty_of_the_reference_covers_its_true_error(name):
     body = body_of(case, exact.singular_points)
     stated = conforming_reference(case, levels, body, law, Rules(body, h / 8))
     truth = exact_reference(case, exact, body, law)
-    finest = Measured(levels[2], body, law)
+    finest = Measured(levels[2], body, law, case)
     area, line = area_rule(body, h / 24, grading=0.3), cut_rule(body, h / 64)
     errors = {
         "displacement_l2": displacement_error(finest.field, exact, area),

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from verify.compare.sides import distance_to_cut, distance_to_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, membrane_of, solid_of
+from verify.compare.simplices import places_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
-from verify.geometry.planar import inside_polygon
+from verify.geometry.planar import inside_polygon, polygon_area
 from verify.geometry.simplices import distance_to_outline
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 
@@ -70,13 +71,7 @@ class Body:
     @property
     def measure(self) -> float:
         """Area, m²."""
-        area = 0.0
-        for k, loop in enumerate(self.loops):
-            x, y = (loop - loop[0]).T
-            others = self.loops[:k] + self.loops[k + 1 :]
-            sign = -1.0 if _inside(loop[:1], others)[0] else 1.0
-            area += sign * abs(float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-        return area
+        return abs(sum(map(polygon_area, self.loops)))  # holes go round the other way
 
     @property
     def edges(self) -> list[Piece]:
@@ -144,8 +139,9 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
     tips, special = tips[~_on(tips, loops, size)], special[~_on(special, loops, size)]
     # an exact field is smooth up to the outline
     corners = [] if scene.judged_by_exact else [_kinks(loop) for loop in loops]
-    found = _distinct(np.vstack([special, extra, *corners]), size)
-    return Body(loops, cuts, parts, found, tips)
+    found = np.vstack([special, extra, *corners])
+    distinct = np.unique(places_of(found, 1e-12 * size), return_index=True)[1]
+    return Body(loops, cuts, parts, found[distinct], tips)
 
 
 def _loops(scene: Scene) -> tuple[Array, ...]:
@@ -226,22 +222,8 @@ def _ends(parts: list[CutPart], size: float) -> tuple[Array, Array]:
 
 
 def _inside(points: Array, loops: tuple[Array, ...]) -> NDArray[np.bool_]:
-    inside = np.zeros(len(points), dtype=bool)
-    for loop in loops:
-        inside ^= inside_polygon(points, loop)
-    return inside
+    return np.logical_xor.reduce([inside_polygon(points, loop) for loop in loops])
 
 
 def _on(points: Array, loops: tuple[Array, ...], size: float) -> NDArray[np.bool_]:
-    on = np.zeros(len(points), dtype=bool)
-    for loop in loops:
-        on |= distance_to_outline(points, loop) <= 1e-12 * size
-    return on
-
-
-def _distinct(points: Array, size: float) -> Array:
-    kept: list[Array] = []
-    for point in points:
-        if all(np.linalg.norm(point - other) > 1e-12 * size for other in kept):
-            kept.append(point)
-    return np.array(kept).reshape(-1, 2)
+    return np.any([distance_to_outline(points, loop) <= 1e-12 * size for loop in loops], axis=0)

@@ -25,7 +25,7 @@ from verify.compare.body import Body
 from verify.compare.cell_tree import morton_order
 from verify.compare.locate import Field, squares
 from verify.compare.simplex_bodies import SimplexBody
-from verify.compare.simplices import bisect, heights, in_frames, points_in, split_at_level
+from verify.compare.simplices import KUHN, bisect, heights, in_frames, points_in, split_at_level
 from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
@@ -66,32 +66,6 @@ class Rule:
         return gradient if self.frames is None else in_frames(gradient, self.frames)
 
 
-@dataclass(frozen=True)
-class _Monotone:
-    """A piece between two heights, x as a function of y."""
-
-    low: float
-    high: float
-    piece: Piece
-    bulge: float  # arcs: +1 right half, -1 left half
-    outline: bool
-
-    def row(self) -> list[float]:
-        """Return it as kernels take it: with the ends of a segment, or centre, radius and bulge."""
-        ends = [self.low, self.high, float(self.outline)]
-        if isinstance(self.piece, Segment):
-            return [*ends, 0.0, *self.piece.start, *self.piece.end]
-        return [*ends, 1.0, *self.piece.centre, self.piece.radius, self.bulge]
-
-    def poles(self) -> list[float]:
-        """Compute heights, at an end or close beyond it, at which x(y) is like a square root."""
-        if isinstance(self.piece, Segment):
-            return []
-        middle, radius = float(self.piece.centre[1]), self.piece.radius
-        reached = [(y - middle) / radius for y in (self.low, self.high)]
-        return [middle + radius * np.sign(s) for s in reached if abs(s) >= 0.95]
-
-
 def area_rule(
     body: Body,
     spacing: float,
@@ -127,19 +101,20 @@ def area_rule(
     pieces += [
         (_part(part.piece, part.start, part.end).rotated(turn), False) for part in body.parts
     ]
-    curves = [m for piece, outline in pieces for m in _monotone(piece, outline)]
+    rows = np.array([row for piece, outline in pieces for row in _monotone(piece, outline)])
     singular, tips = body.singular @ turn.T, body.tips @ turn.T
-    ends = np.array([[m.low, m.high] for m in curves]).ravel()
-    poles = [y for m in curves for y in m.poles()]
-    ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing)
+    ends, (middle, radius) = rows[:, :2], rows[:, 5:7].T[..., None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reached = np.where(rows[:, 3:4] > 0.0, (ends - middle) / radius, 0.0)
+    poles = (middle + radius * np.sign(reached))[np.abs(reached) >= 0.95]
+    ys = graded_breaks(ends.ravel(), singular[:, 1], spacing, depth * spacing)
     ys = graded_breaks(ys, tips[:, 1], spacing, depth * spacing, grading)
-    if poles:  # x(y) is like a square root there
-        ys = graded_breaks(ys, np.array(poles), spacing, 1e-4 * spacing)
+    if len(poles):  # x(y) is like a square root at a pole of an arc, or close beyond it
+        ys = graded_breaks(ys, poles, spacing, 1e-4 * spacing)
     corners = body.corners @ turn.T
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
     xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
-    rows = np.array([curve.row() for curve in curves])
     strips = _strips(rows, ys, xs, ROUND_OFF * body.size)
     points, weights = _in_strips(rows, ys, xs, strips, *_gauss(order), *_gauss(max(order, 6)))
     return Rule(points @ turn, weights)
@@ -186,19 +161,13 @@ def graded_breaks(
     step, start = np.repeat(np.diff(base) / count, count), np.repeat(base[:-1], count)
     low = start + (np.arange(last[-1]) - np.repeat(last - count, count)) * step
     open_cells, done = np.column_stack([low, np.append(low[1:], base[-1])]), [base]
-    singular = np.unique(singular)
     while len(open_cells):
         done.append(open_cells.ravel())
         if not len(singular):
             break
-        after = np.clip(np.searchsorted(singular, open_cells[:, 0], "right"), 0, len(singular))
-        left = open_cells[:, 0] - singular[np.maximum(after - 1, 0)]
-        left = np.where(after > 0, left, np.inf)
-        at = np.minimum(np.searchsorted(singular, open_cells[:, 1], "left"), len(singular) - 1)
-        right = singular[at] - open_cells[:, 1]
-        right = np.where(right >= 0, right, np.inf)
-        length = open_cells[:, 1] - open_cells[:, 0]
-        split = length > np.maximum(grading * np.minimum(left, right), smallest) * (1 + 1e-9)
+        low, high = open_cells.T
+        away = np.maximum(low - singular[:, None], singular[:, None] - high).min(axis=0)
+        split = high - low > np.maximum(grading * away, smallest) * (1 + 1e-9)
         low, high = open_cells[split].T
         middle = 0.5 * (low + high)
         open_cells = np.vstack([np.column_stack([low, middle]), np.column_stack([middle, high])])
@@ -213,10 +182,16 @@ def _part(piece: Piece, start: float, end: float) -> Piece:
     return Arc(piece.centre, piece.radius, angle, (end - start) * piece.sweep)
 
 
-def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
+def _monotone(piece: Piece, outline: bool) -> list[list[float]]:
+    """Divide a piece into curves with x as a function of y, as kernels take them.
+
+    A row has the lowest and the highest y, and whether it is of the outline. A segment has 0 and
+    its ends, an arc 1, its centre, its radius, and 1 on the right, −1 on the left.
+    """
     if isinstance(piece, Segment):
         low, high = sorted((float(piece.start[1]), float(piece.end[1])))
-        return [_Monotone(low, high, piece, 0.0, outline)] if high > low else []
+        row = [low, high, float(outline), 0.0, *piece.start, *piece.end]
+        return [row] if high > low else []
     # split at the poles, at odd multiples of a quarter turn
     first = np.ceil((piece.start_angle - np.pi / 2) / np.pi)
     stop = piece.start_angle + piece.sweep
@@ -231,7 +206,7 @@ def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
         ys = sorted(piece.centre[1] + piece.radius * np.sin([a, b]))
         bulge = 1.0 if np.cos(0.5 * (a + b)) > 0 else -1.0
         if ys[1] > ys[0]:
-            found.append(_Monotone(float(ys[0]), float(ys[1]), piece, bulge, outline))
+            found.append([*ys, float(outline), 1.0, *piece.centre, piece.radius, bulge])
     return found
 
 
@@ -429,15 +404,8 @@ def _shaken_grid(box: Array, spacing: float, random: np.random.Generator) -> Arr
     grid = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
     first = np.stack([i.ravel() for i in grid], axis=1)
     points = box[0] + (nodes + shift) / shape * (box[1] - box[0])
-    paths = ([0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0])
-    cells = []
-    for path in paths:
-        corner, row = first.copy(), [first]
-        for axis in path:
-            corner = corner + np.eye(3, dtype=int)[axis]
-            row.append(corner)
-        cells.append(np.stack([points[tuple(c.T)] for c in row], axis=1))
-    return np.concatenate(cells)
+    at = np.moveaxis(KUHN.astype(int)[:, None] + first[:, None], 3, 0)
+    return points[tuple(at)].reshape(-1, 4, 3)
 
 
 def _divided(corners: Array, random: np.random.Generator) -> Array:
@@ -445,9 +413,6 @@ def _divided(corners: Array, random: np.random.Generator) -> Array:
     count = corners.shape[1]
     weight = random.dirichlet(np.full(count, 8.0), len(corners))
     inner = np.einsum("mk,mka->ma", weight, corners)
-    parts = []
-    for k in range(count):
-        part = corners.copy()
-        part[:, k] = inner
-        parts.append(part)
-    return np.concatenate(parts)
+    parts = np.tile(corners, (count, 1, 1, 1))
+    parts[range(count), :, range(count)] = inner
+    return parts.reshape(-1, *corners.shape[1:])

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
@@ -21,8 +19,8 @@ from verify.compare.cut_rule import CutRule
 from verify.compare.error_norm import cut_rule_of
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
-from verify.compare.simplex_bodies import MembraneBody, SolidBody
-from verify.compare.simplices import cells_of, heights, points_in
+from verify.compare.simplex_bodies import MembraneBody, SolidBody, deep_inside
+from verify.compare.simplices import cells_of, heights, places_of, points_in
 from verify.geometry.curves import Arc
 from verify.result import CutRecord
 from verify.solution import Solution
@@ -126,12 +124,7 @@ def continued_where(
 def welded(facets: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
     """Merge corners of facets (f, k, d) within `reach` m: corners (c, d), and numbers (f, k)."""
     points = facets.reshape(-1, facets.shape[-1])
-    if not len(points):
-        return points, np.zeros(facets.shape[:2], dtype=np.int64)
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, number = connected_components(link.tocsr(), directed=False)
-    _, first, number = np.unique(number, return_index=True, return_inverse=True)
+    _, first, number = np.unique(places_of(points, reach), return_index=True, return_inverse=True)
     return points[first], number.reshape(facets.shape[:2]).astype(np.int64)
 
 
@@ -200,11 +193,7 @@ def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
     free = corners[distinct[count == 1]]
     if isinstance(body, MembraneBody):
         return np.asarray(free)
-    middle = free.mean(axis=1)
-    within = np.ones(len(free), dtype=bool)
-    for way in _STEP * body.size * np.eye(middle.shape[1]):
-        within &= body.inside(middle + way) & body.inside(middle - way)
-    return np.asarray(free[within])
+    return np.asarray(free[deep_inside(free.mean(axis=1), body.inside, _STEP * body.size)])
 
 
 def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, Array, Ints]:
@@ -284,10 +273,8 @@ def triangles_of(facets: Array) -> Array:
     """
     corners, number = _welded(facets, _CLOSE)
     triangles = corners[number]
-    edges = triangles[:, 1:] - triangles[:, :1]
-    doubled = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
-    return np.asarray(triangles[doubled > _CLOSE * longest**2])
+    return np.asarray(triangles[heights(triangles) > _CLOSE * longest])
 
 
 def _welded(facets: Array, tolerance: float) -> tuple[Array, NDArray[np.int64]]:

@@ -117,10 +117,9 @@ def _in_plane(body: Body, cut: str) -> ProfileLine:
         if part.cut != cut:
             continue
         t = part.start + (part.end - part.start) * _towards_ends()
-        tangent = part.piece.tangent(t)
         arcs.append(starts[id(part.piece)] + t * part.piece.length)
         points.append(part.piece.point(t))
-        normals.append(np.column_stack([-tangent[:, 1], tangent[:, 0]]))
+        normals.append(part.piece.facing(points[-1]))
     arc = np.concatenate(arcs)
     order = np.argsort(arc, kind="stable")
     return _line(body, cut, "arc length along the cut", arc[order],

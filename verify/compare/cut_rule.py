@@ -1,8 +1,9 @@
 """Quadrature on cuts as asked, graded to their ends and fronts; each point has two sides."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.body_rule import graded_breaks
 from verify.compare.cell_tree import morton_order
-from verify.compare.sides import nearest_segments
+from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
 from verify.compare.simplices import divide, points_in, split_at_level
 from verify.geometry.patches import Patch, PlanePatch
@@ -79,10 +80,11 @@ def cut_rule(body: Body, spacing: float) -> CutRule:
     found = []
     for part in body.parts:
         ends = np.array([part.start, part.end])
-        at_end = _is_special(part.piece.point(ends), body)
+        away = distance_to_segments(part.piece.point(ends), np.stack([body.singular] * 2, axis=1))
+        at_end = away <= 1e-12 * body.size
         t, weights, away = along_cut(ends, part.piece.length, at_end, body.size, spacing)
-        normals = _left_of(part.piece.tangent(t))
-        found.append(CutRule.beside(part.piece.point(t), weights, normals, away))
+        points = part.piece.point(t)
+        found.append(CutRule.beside(points, weights, part.piece.facing(points), away))
     return CutRule.joined(found, 2)
 
 
@@ -125,19 +127,8 @@ def place_on_cut(body: Body, cut: str, fraction: float) -> CutRule:
     where = fraction * starts[-1]
     index = min(int(np.searchsorted(starts[1:], where)), len(pieces) - 1)
     t = np.array([np.clip((where - starts[index]) / lengths[index], 0.0, 1.0)])
-    point, normal = pieces[index].point(t), _left_of(pieces[index].tangent(t))
-    return CutRule.beside(point, np.ones(1), normal, AWAY * body.size)
-
-
-def _left_of(tangents: Array) -> Array:
-    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
-
-
-def _is_special(points: Array, body: Body) -> NDArray[np.bool_]:
-    if not len(body.singular):
-        return np.zeros(len(points), dtype=bool)
-    away = np.linalg.norm(points[:, None] - body.singular[None], axis=2).min(axis=1)
-    return away <= 1e-12 * body.size
+    point = pieces[index].point(t)
+    return CutRule.beside(point, np.ones(1), pieces[index].facing(point), AWAY * body.size)
 
 
 _WHOLE = np.array([0.0, 1.0])
@@ -218,19 +209,12 @@ def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutR
 
 def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:
     """Take the point of a cut that is nearest to `point` (3,), as a rule of weight 1."""
-    best: CutRule | None = None
-    smallest = np.inf
-    for patch in body.cuts[cut]:
-        foot, _ = patch.nearest(point[None])
-        if (distance := float(np.linalg.norm(foot[0] - point))) < smallest:
-            smallest = distance
-            step = 1e-3 * body.size  # the level's slope is the normal, also on a cylinder
-            ends = [patch.level(foot + s * step * np.eye(3)) for s in (1.0, -1.0)]
-            normal = (ends[0] - ends[1])[None]
-            normal /= np.linalg.norm(normal)
-            best = CutRule.beside(foot, np.ones(1), normal, AWAY * body.size)
-    assert best is not None
-    return best
+    _, foot, which = distance_to_cut(body.cuts[cut], point[None])
+    patch, step = body.cuts[cut][which[0]], 1e-3 * body.size
+    # the level's slope is the normal, also on a cylinder
+    ends = [patch.level(foot + s * step * np.eye(3)) for s in (1.0, -1.0)]
+    normal = (ends[0] - ends[1])[None]
+    return CutRule.beside(foot, np.ones(1), normal / np.linalg.norm(normal), AWAY * body.size)
 
 
 def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple[Array, Array]:
@@ -246,8 +230,8 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
 
     cells, border = patch.cells, np.inf if patch.plane else _BORDER * spacing
     if body.box is not None and patch.plane:
-        for axis, end, sign in _faces(body.box):
-            face = _depth_below(patch, axis, end, sign)
+        for end, axis in product((0, 1), range(3)):
+            face = partial(_depth, patch, axis, float(body.box[end, axis]), 1 - 2 * end)
             cells, side = split_at_level(cells, face)
             cells = cells[side > 0]
     elif isinstance(patch, PlanePatch):
@@ -315,11 +299,6 @@ def _height(corner: Array, inward: Array, places: Array) -> Array:
     return np.asarray((places - corner) @ inward)
 
 
-def _faces(box: Array) -> list[tuple[int, float, float]]:
-    """List axis, place and inward direction of the six faces of a box (2, 3)."""
-    return [(a, float(box[k, a]), s) for k, s in ((0, 1.0), (1, -1.0)) for a in range(3)]
-
-
-def _depth_below(patch: Patch, axis: int, end: float, sign: float) -> Callable[[Array], Array]:
-    """Return the distance from a face of a box, positive inside, by a patch's parameters."""
-    return lambda uv: sign * (patch.point(uv)[:, axis] - end)
+def _depth(patch: Patch, axis: int, face: float, inward: int, uv: Array) -> Array:
+    """Return distances (n,) from a face of a box, positive inwards, by a patch's parameters."""
+    return np.asarray(inward * (patch.point(uv)[:, axis] - face))

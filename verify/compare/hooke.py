@@ -64,19 +64,11 @@ class Hooke:
     def piola(self, gradient: Array) -> Array:
         """Compute the first Piola-Kirchhoff stress, work-conjugate to the gradient, in its shape.
 
-        In Pa, of a membrane N/m.
+        In Pa, of a membrane N/m: λ tr(ε) I + 2μ ε of ε = sym ∇u.
         """
-        return self._stress(gradient)
-
-    def power_density(self, gradient: Array, rate: Array) -> Array:
-        """Compute the power (n,) in W/m³ of stresses on velocity gradients."""
-        return np.einsum("nij,nij->n", self.piola(gradient), rate)
-
-    def _stress(self, slope: Array) -> Array:
-        """Compute λ tr(ε) I + 2μ ε (n, k, k) of ε = sym slope."""
-        stress = np.reshape(self.shear, (-1, 1, 1)) * (slope + np.swapaxes(slope, 1, 2))
-        trace = self.lame * np.einsum("nii->n", slope)
-        return np.asarray(stress + trace[:, None, None] * np.eye(slope.shape[1]))
+        stress = np.reshape(self.shear, (-1, 1, 1)) * (gradient + np.swapaxes(gradient, 1, 2))
+        trace = self.lame * np.einsum("nii->n", gradient)
+        return np.asarray(stress + trace[:, None, None] * np.eye(gradient.shape[1]))
 
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Compute energy density (n,) of the difference of a gradient from an `expected` one."""
@@ -94,28 +86,30 @@ class Hooke:
 
 @dataclass(frozen=True)
 class Corotated(Hooke):
-    """The same constants, with the energy of the stretch."""
+    """The same constants, with the energy of the stretch.
+
+    Gradients of a membrane are (n, 3, 2): along two orthonormal tangents, with components along
+    these and across the surface, as `verify.compare.simplices.triangle_frames` has them. Its
+    energy is in J/m².
+    """
 
     def energy_density(self, gradient: Array) -> Array:
-        """Compute μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
-        return self._density(_principal_stretches(gradient) - 1.0)
+        """Compute μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, k)."""
+        stretch = _stretches_less_one(gradient)
+        density: Array = self.shear * np.sum(stretch**2, axis=1)
+        density += 0.5 * self.lame * np.sum(stretch, axis=1) ** 2
+        return density
 
     def piola(self, gradient: Array) -> Array:
         """Compute R (2μ(U − I) + λ tr(U − I) I), as gradients."""
-        turn, unit = self._turn(gradient), np.eye(*gradient.shape[1:])
+        turn, unit = _rotations(gradient), np.eye(*gradient.shape[1:])
         strain = np.swapaxes(turn, 1, 2) @ (unit + gradient) - np.eye(gradient.shape[2])
-        return np.asarray(turn @ self._stress(strain))
+        return np.asarray(turn @ Hooke.piola(self, strain))
 
     def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
         """Return `error_density`, `energy_density`, and squares, as of linear elasticity."""
         difference = self.error_density(found - expected, expected)
         return difference, self.energy_density(expected), squares(expected)
-
-    def _density(self, stretch: Array) -> Array:
-        """Compute the energy density (n,) of principal stretches less one (n, k)."""
-        density: Array = self.shear * np.sum(stretch**2, axis=1)
-        density += 0.5 * self.lame * np.sum(stretch, axis=1) ** 2
-        return density
 
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Compute energy density (n,) of sym(Rᵀ δ), δ the difference and R the expected rotation.
@@ -123,32 +117,8 @@ class Corotated(Hooke):
         It is the linear one in the frame that turns with the expected field: it does not
         change if both fields are turned, and is the exact one to second order.
         """
-        turned = np.swapaxes(self._turn(expected), 1, 2) @ difference
+        turned = np.swapaxes(_rotations(expected), 1, 2) @ difference
         return Hooke.energy_density(self, turned)
-
-    def _turn(self, gradient: Array) -> Array:
-        """Compute the rotations R of displacement gradients, shaped alike."""
-        return _rotations(gradient)
-
-
-@dataclass(frozen=True)
-class MembraneLaw(Corotated):
-    """The corotated energy of a membrane, J/m².
-
-    Gradients are (n, 3, 2): along two orthonormal tangents, with components along these and
-    across the surface, as `verify.compare.simplices.triangle_frames` has them.
-    """
-
-    def energy_density(self, gradient: Array) -> Array:
-        """Compute μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m² of displacement gradients (n, 3, 2)."""
-        along = gradient[:, :2]
-        strain = along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
-        return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
-
-    def _turn(self, gradient: Array) -> Array:
-        """Compute the rotations R (n, 3, 2) of the tangent plane."""
-        left, _, right = np.linalg.svd(np.eye(3)[:, :2] + gradient, full_matrices=False)
-        return np.asarray(left @ right)
 
 
 @dataclass(frozen=True)
@@ -189,33 +159,30 @@ class NeoHookean(Corotated):
         return np.asarray(stress + slope[:, None, None] * _cofactors(F))
 
 
-Law = Hooke | Corotated | MembraneLaw | NeoHookean
+Law = Hooke | Corotated | NeoHookean
 
 
 def hooke(material: Material) -> Hooke:
     """Make Hooke's law of a scene's material."""
-    return Hooke(*_constants(material), _if_several(material))
+    return Hooke(*_given(material))
 
 
 def corotated(material: Material) -> Corotated:
     """Make the corotated law of a scene's material."""
-    return Corotated(*_constants(material), _if_several(material))
+    return Corotated(*_given(material))
 
 
 def law_of(scene: Scene) -> Law:
     """Choose the law of elasticity of a scene."""
-    if scene.cell_dimension < scene.dimension:
-        return MembraneLaw(*_constants(scene.material), _if_several(scene.material))
-    model = scene.material.model
-    if model != "hooke":
-        law = NeoHookean(*_constants(scene.material), _if_several(scene.material))
-        return replace(law, stable=model == "stable_neo_hookean")
-    make = corotated if scene.analysis.kinematics == "corotational" else hooke
-    return make(scene.material)
+    material, is_solid = scene.material, scene.cell_dimension == scene.dimension
+    if is_solid and material.model != "hooke":
+        return NeoHookean(*_given(material), stable=material.model == "stable_neo_hookean")
+    turns = scene.analysis.kinematics == "corotational" or not is_solid
+    return (corotated if turns else hooke)(material)
 
 
-def _if_several(material: Material) -> Material | None:
-    return None if material.is_uniform else material
+def _given(material: Material) -> tuple[float, float, Material | None]:
+    return *_constants(material), None if material.is_uniform else material
 
 
 def _constants(material: Material) -> tuple[float, float]:
@@ -231,25 +198,36 @@ def _constants(material: Material) -> tuple[float, float]:
     return thickness * lame, thickness * shear
 
 
-def _principal_stretches(gradient: Array) -> Array:
-    """Compute principal stretches (n, d); the smallest is negative where the material is inverted.
+def _stretches_less_one(gradient: Array) -> Array:
+    """Compute principal stretches (n, k) less one; the smallest of inverted material is negative.
 
     With a sum and a difference from the gradient itself in the plane, and from C − I, not from
     C, in space: 1 is never added to a small strain before it counts.
     """
-    d = gradient.shape[1]
-    if d == 2:
+    if gradient.shape[1] == 2:
         (a, b), (c, e) = gradient[:, 0].T, gradient[:, 1].T
         # σ₁ ± σ₂ = |F ± cof F|; hypot(2 + s, t) − 2 without cancellation
         s, t = a + e, c - b
         total = (s * (4.0 + s) + t * t) / (np.hypot(2.0 + s, t) + 2.0)
         apart = np.hypot(a - e, b + c)
-        return 1.0 + 0.5 * np.column_stack([total - apart, total + apart])
-    strain = gradient + np.swapaxes(gradient, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
-    excess = np.maximum(np.linalg.eigvalsh(strain), -1.0)
-    stretch = 1.0 + _less_one(excess)
-    stretch[:, 0] *= np.where(np.linalg.det(np.eye(d) + gradient) < 0.0, -1.0, 1.0)
-    return np.asarray(stretch)
+        return 0.5 * np.column_stack([total - apart, total + apart])
+    return _less_one(np.linalg.eigvalsh(_excess(gradient)), gradient)
+
+
+def _excess(gradient: Array) -> Array:
+    """Compute C − I (n, k, k) of displacement gradients (n, d, k)."""
+    along = gradient[:, : gradient.shape[2]]
+    return np.asarray(along + along.swapaxes(1, 2) + gradient.swapaxes(1, 2) @ gradient)
+
+
+def _less_one(excess: Array, gradient: Array) -> Array:
+    """Compute stretches less one of ascending eigenvalues (n, k) of C − I."""
+    excess = np.maximum(excess, -1.0)
+    found: Array = excess / (1.0 + np.sqrt(1.0 + excess))
+    if gradient.shape[1] == gradient.shape[2]:
+        inverted = np.linalg.det(np.eye(gradient.shape[1]) + gradient) < 0.0
+        found[inverted, 0] = -2.0 - found[inverted, 0]
+    return found
 
 
 def _volume_change(gradient: Array) -> Array:
@@ -268,23 +246,18 @@ def _cofactors(F: Array) -> Array:
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
-def _less_one(excess: Array) -> Array:
-    """Compute the stretches less one of eigenvalues of C − I."""
-    return np.asarray(excess / (1.0 + np.sqrt(1.0 + excess)))
-
-
 def _rotations(gradient: Array) -> Array:
-    """Compute proper rotations (n, d, d) of the polar decomposition of I + gradient."""
-    d = gradient.shape[1]
-    deformation = np.eye(d) + gradient
-    if d == 2:
+    """Compute proper rotations R (n, d, k) of the polar decomposition of I + gradient."""
+    deformation = np.eye(*gradient.shape[1:]) + gradient
+    if gradient.shape[1] == 2:
         angle = np.arctan2(
             deformation[:, 1, 0] - deformation[:, 0, 1], deformation[:, 0, 0] + deformation[:, 1, 1]
         )
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    left, _, right = np.linalg.svd(deformation)
-    left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
+    left, _, right = np.linalg.svd(deformation, full_matrices=False)
+    if gradient.shape[2] == 3:
+        left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
     return np.asarray(left @ right)
 
 
@@ -324,17 +297,8 @@ def _biot_strain(gradient: Array) -> Array:
 
     The smallest stretch of a cell that is inside out is negative, as in the energy.
     """
-    k = gradient.shape[2]
-    along = gradient[:, :k]
-    excess, axes = np.linalg.eigh(
-        along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
-    )
-    excess = np.maximum(excess, -1.0)
-    less_one = excess / (1.0 + np.sqrt(1.0 + excess))
-    if gradient.shape[1] == k:
-        inverted = np.linalg.det(np.eye(k) + gradient) < 0.0
-        less_one[inverted, 0] = -2.0 - less_one[inverted, 0]
-    return np.asarray(np.einsum("nik,nk,njk->nij", axes, less_one, axes))
+    excess, axes = np.linalg.eigh(_excess(gradient))
+    return np.asarray(np.einsum("nik,nk,njk->nij", axes, _less_one(excess, gradient), axes))
 
 
 Density = float | Array
@@ -349,12 +313,7 @@ def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
     corotated energy of a quadratic field is no polynomial: there the rule is of degree 7. A cell
     across an interface of materials is integrated by that rule too, each point in its own.
     """
-    return nodal_strain_energy(SolutionField(solution, step), law)
-
-
-def nodal_strain_energy(field: SolutionField, law: Law) -> float:
-    """Compute the energy of the cells of a solution's field, J (2D: per metre)."""
-    return float(cell_strain_energies(field, law).sum())
+    return float(cell_strain_energies(SolutionField(solution, step), law).sum())
 
 
 def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
@@ -366,7 +325,7 @@ def stress_power(rate: SolutionField, displacement: SolutionField, law: Law) -> 
     """Compute power of the stresses of a displacement on a velocity, ∫ P:∇w, W (2D: per metre)."""
 
     def density(at: Array, gradient: Callable[[SolutionField], Array]) -> Array:
-        return law.at(at).power_density(gradient(displacement), gradient(rate))
+        return np.einsum("nij,nij->n", law.at(at).piola(gradient(displacement)), gradient(rate))
 
     return float(_integrated(rate, density, law).sum())
 

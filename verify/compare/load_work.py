@@ -10,9 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from verify.compare.mass import boundary_facets, shape_functions
-from verify.compare.simplices import facet_nodes, simplex_rule
+from verify.compare.simplices import nodes_of_facets, simplex_rule
 from verify.errors import InputError
 from verify.geometry.simplices import measures
 from verify.scene import BodyForce, Scene, Traction
@@ -56,21 +57,19 @@ def load_work(
 def _worked(times: Array, history: object, place: Array, rate: Array) -> tuple[Array, Array]:
     """Integrate the factor over q, by intervals between outputs and kinks of the history."""
     table: list[tuple[float, float]] = list(history or [])  # type: ignore[call-overload]
+    if len(times) < 2:
+        return np.zeros(1), np.zeros(1)
+    rates = CubicHermiteSpline(times, place, rate).derivative()
+    steps, (at, weights) = np.diff(place) / np.diff(times), _GAUSS
     work, width = np.zeros((2, len(times)))
-    for k in range(len(times) - 1):
-        a, b = times[k], times[k + 1]
-        span, gain = b - a, place[k + 1] - place[k]
-        knots = np.unique([a, *(t for t, _ in table if a < t < b), b])
+    for k, (a, b) in enumerate(pairwise(times)):
         cubic = line = 0.0
-        for start, end in pairwise(knots):
-            for at, weight in zip(*_GAUSS, strict=True):
-                time = 0.5 * (start + end) + 0.5 * (end - start) * at
-                s = (time - a) / span
-                slope = 6 * s * (1 - s) * gain / span
-                slope += (1 - 4 * s + 3 * s**2) * rate[k] + (3 * s**2 - 2 * s) * rate[k + 1]
-                share = 0.5 * (end - start) * weight * factor_at(table or None, float(time))
-                cubic += share * slope
-                line += share * gain / span
+        for start, end in pairwise(np.unique([a, *(t for t, _ in table if a < t < b), b])):
+            when = 0.5 * (start + end) + 0.5 * (end - start) * at
+            factors = np.array([factor_at(table or None, float(time)) for time in when])
+            shares = 0.5 * (end - start) * weights * factors
+            cubic += float(shares @ rates(when))
+            line += float(shares.sum() * steps[k])
         work[k + 1] = work[k] + cubic
         width[k + 1] = width[k] + abs(cubic - line)
     return work, width
@@ -140,11 +139,8 @@ def spread(
 
 def boundary_nodes_of_facets(solution: Solution) -> Ints:
     """Find nodes (b, f) of the facets of the outer boundary: corners first, then edges."""
-    k = solution.cell_dimension
     cell, opposite = boundary_facets(solution)
-    columns = np.array([facet_nodes(k, corner, solution.order) for corner in range(k + 1)])
-    nodes: Ints = np.take_along_axis(solution.cells[cell], columns[opposite], axis=1)
-    return nodes
+    return nodes_of_facets(solution.cells[cell], opposite)
 
 
 # Of the largest displacement that supports prescribe: nodes that are nearer follow it; of others,

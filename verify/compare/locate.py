@@ -216,11 +216,6 @@ class SolutionField:
     step : int
         Output time that is evaluated; default the last.
 
-    Attributes
-    ----------
-    degenerate_cells : int
-        Cells of no volume, which were left out.
-
     Raises
     ------
     InputError
@@ -231,7 +226,6 @@ class SolutionField:
         self.solution = solution
         self._cells = np.ascontiguousarray(solution.cells)
         self.shape = _checked(solution)
-        self.degenerate_cells = int(self.shape.degenerate.sum())
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
         self._origin = np.ascontiguousarray(self.shape.corners[:, 0])
         membrane = solution.cell_dimension < solution.dimension

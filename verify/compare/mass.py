@@ -8,7 +8,6 @@ moves with a lumped mass keeps the energy of that mass, which for short waves is
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
-from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
+from verify.compare.simplices import EDGES, cells_of, kept_with, nodes_of_facets, simplex_rule
 from verify.errors import InputError
+from verify.geometry.simplices import boundary_facets as alone
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solution_checks import CONSISTENT
@@ -177,14 +177,6 @@ def _lumping(solution: Solution, density: float | Array) -> tuple[Array, Array]:
     return np.array(kinetic), np.array(moment)
 
 
-def nodal_weights(solution: Solution, density: float | Array) -> Array:
-    """Compute the integrals ∫ρ N_i (n,) in kg of the shape functions of a solution's nodes."""
-    k = solution.cell_dimension
-    shares = _consistent(k, solution.order).sum(axis=1)
-    mass = (density * cells_of(solution).volume)[:, None] * shares
-    return np.bincount(solution.cells.ravel(), mass.ravel(), minlength=len(solution.points))
-
-
 def consistent_mass(solution: Solution, density: float | Array) -> csr_array:
     """Compute the masses ∫ρ N_i N_j (n, n) in kg of a solution's nodes."""
     nodes, count = solution.cells, len(solution.points)
@@ -311,10 +303,12 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
 @kept_with
 def _connected(solution: Solution) -> list[Ints]:
     """Find cells of each part."""
-    facets, cell = _facets(solution.cells[:, : solution.cell_dimension + 1])
+    cells = solution.cells[:, : solution.cell_dimension + 1]
+    count, k = cells.shape
+    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(k)]), axis=1)
     _, number = np.unique(facets, axis=0, return_inverse=True)
-    link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel())))
-    link = link.tocsr()
+    cell = np.tile(np.arange(count), k)
+    link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel()))).tocsr()
     _, label = connected_components(link @ link.T, directed=False)
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
@@ -329,9 +323,9 @@ def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
 def boundary_nodes(solution: Solution) -> NDArray[np.bool_]:
     """Tell whether nodes (n,) are corners of a facet of outer boundary, not of faces of cuts."""
     cell, opposite = boundary_facets(solution)
-    corners = solution.cells[cell, : solution.cell_dimension + 1]
     found = np.zeros(len(solution.points), dtype=bool)
-    found[corners[np.arange(corners.shape[1]) != opposite[:, None]]] = True
+    corners = solution.cells[:, : solution.cell_dimension + 1]
+    found[nodes_of_facets(corners[cell], opposite)] = True
     return found
 
 
@@ -340,23 +334,12 @@ def boundary_facets(solution: Solution) -> tuple[Ints, Ints]:
 
     On the faces of a cut two facets have the same place; on the outer boundary each is alone.
     """
-    corners = solution.cells[:, : solution.cell_dimension + 1]
-    facets, cell = _facets(corners)
-    distinct, first, times = np.unique(facets, axis=0, return_index=True, return_counts=True)
-    alone = times == 1
-    middle = solution.points[distinct[alone]].mean(axis=1)
+    facets, cell, opposite = alone(solution.cells[:, : solution.cell_dimension + 1])
+    middle = solution.points[facets].mean(axis=1)
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     near = cKDTree(middle).query(middle, k=2, distance_upper_bound=10 * ROUND_OFF * size)[0]
-    chosen = first[alone][~np.isfinite(near[:, 1])]
-    return cell[chosen], chosen % corners.shape[1]
-
-
-def _facets(corners: Ints) -> tuple[Ints, Ints]:
-    """Compute sorted nodes (f, k) of all facets of all cells, and their cell (f,)."""
-    k = corners.shape[1]
-    rest = [[j for j in range(k) if j != i] for i in range(k)]
-    facets = np.sort(corners[:, rest].reshape(-1, k - 1), axis=1)
-    return facets, np.repeat(np.arange(len(corners)), k)
+    outside = ~np.isfinite(near[:, 1])
+    return cell[outside], opposite[outside]
 
 
 def _part(cells: Ints, corners: Array, mass: Array) -> Part:
@@ -433,18 +416,22 @@ def inertia_of(
     parts : sequence of Part
         All separated parts.
     """
-    weights = nodal_weights(solution, density)
     known = np.zeros_like(whole.energy), np.zeros((len(whole.energy), solution.dimension))
     consistent = consistent_mass(solution, density)
+    weights = np.asarray(consistent.sum(axis=1)).ravel()
     if isinstance(solution.mass, str):
         assert solution.mass == CONSISTENT
         note = "the consistent mass, as declared"
         return Inertia(whole.energy, known[0], weights, known[1], consistent, note)
     wrong = "no mass is declared"
     if solution.mass is not None:
-        matrix = _matrix(solution.mass)
+        own_mass, velocity = solution.mass, solution.velocity
+        assert velocity is not None
+        matrix = csr_array(
+            own_mass if issparse(own_mass) else diags_array(np.asarray(own_mass, float))
+        )
         own = np.asarray(matrix.sum(axis=1)).ravel()
-        energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in _velocities(solution)])
+        energy = np.array([0.5 * float(np.sum(v * (matrix @ v))) for v in velocity])
         off = _off(solution, own, weights, parts)
         wrong = _outside(solution, energy, whole)
         if off > _WRONG:
@@ -452,7 +439,7 @@ def inertia_of(
         if not wrong:
             moved = solution.displacement - solution.displacement[0]
             moment = off * np.abs(np.einsum("n,tna->ta", own, moved))
-            width = off * energy + _round_off(solution, matrix)
+            width = off * energy + _round_off(velocity, matrix)
             return Inertia(energy, width, own, moment, matrix, "the declared mass", off)
         wrong = f"the declared mass is not taken: {wrong}"
     width, moment = _lumping(solution, density)
@@ -461,20 +448,11 @@ def inertia_of(
     return Inertia(whole.energy, width, weights, moment, consistent, note, lumped=lumped)
 
 
-def _velocities(solution: Solution) -> Array:
-    assert solution.velocity is not None
-    return solution.velocity
-
-
-def _round_off(solution: Solution, matrix: csr_array) -> Array:
+def _round_off(velocity: Array, matrix: csr_array) -> Array:
     """Bound the error (t,) of kinetic energies by round-off: in thin pieces large terms cancel."""
-    sizes = np.abs(_velocities(solution))
+    sizes = np.abs(velocity)
     products = np.array([float(np.sum(v * (abs(matrix) @ v))) for v in sizes])
     return 4.0 * np.finfo(float).eps * products
-
-
-def _matrix(mass: Any) -> csr_array:
-    return csr_array(mass if issparse(mass) else diags_array(np.asarray(mass, dtype=float)))
 
 
 def _off(solution: Solution, own: Array, weights: Array, parts: Sequence[Part]) -> float:

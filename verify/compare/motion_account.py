@@ -325,8 +325,6 @@ class MotionAccount:
         The solver's own ledger, J; empty if it has none.
     strain : (t, parts) array
         Strain energies of the parts, integrated from the displacements, J.
-    strain_of_all : (t,) array
-        Strain energy of the whole body, J.
     whole : Kinetic or None
         Of the whole body; None without velocities.
     parts : list of Part
@@ -341,7 +339,6 @@ class MotionAccount:
     energies: Energies
     stated: Mapping[str, Array]
     strain: Array
-    strain_of_all: Array
     whole: Kinetic | None
     parts: list[Part]
     motions: list[Kinetic]
@@ -370,10 +367,8 @@ def motion_account(scene: Scene, solution: Solution, law: Law) -> MotionAccount:
     if whole is not None:
         energies = measured_energies(scene, solution, law, total, whole, density, every)
     stated = {name: np.asarray(part, dtype=float) for name, part in solution.ledger.items()}
-    return MotionAccount(
-        solution.times, energies, stated, strain, total, whole, parts, motions,
-        len(every) - len(parts),
-    )  # fmt: skip
+    lighter = len(every) - len(parts)
+    return MotionAccount(solution.times, energies, stated, strain, whole, parts, motions, lighter)
 
 
 def uniform_force(scene: Scene) -> Array | None:

@@ -22,9 +22,9 @@ from verify.compare.cell_tree import (
     pairs_met,
 )
 from verify.compare.locate import ROUND_OFF, SolutionField
-from verify.compare.simplices import Simplices, facet_nodes, facet_normals, simplices
+from verify.compare.simplices import Simplices, heights, nodes_of_facets, simplices
 from verify.errors import UnsupportedSceneError
-from verify.geometry.simplices import distances
+from verify.geometry.simplices import boundary_facets, distances, unit_normals
 from verify.solution import Solution
 
 Ints = NDArray[np.int64]
@@ -78,14 +78,12 @@ class DeformedCells:
     nodes : (m, d + 1) int array
     shape : Simplices
         Of the deformed corners.
-    upright : (m,) bool array
-        Whether a cell has a volume and is not inside out; others are in no tree.
     tree : CellTree
+        Of those that have a volume and are not inside out.
     """
 
     nodes: Ints
     shape: Simplices
-    upright: NDArray[np.bool_]
     tree: CellTree
 
 
@@ -100,19 +98,11 @@ def faces_of(solution: Solution, field: SolutionField) -> Faces:
         may have nodes that are double without a cut.
     """
     d, cells = solution.dimension, solution.cells
-    opposite = range(d + 1)
-    local = [facet_nodes(d, corner, solution.order) for corner in opposite]
-    nodes = np.concatenate([cells[:, own] for own in local])
-    behind = np.tile(np.arange(len(cells)), d + 1)
-    apex = np.concatenate([cells[:, corner] for corner in opposite])
-    _, which, count = np.unique(
-        np.sort(nodes[:, :d], axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    single = count[which.ravel()] == 1
-    nodes, behind, apex = nodes[single], behind[single], apex[single]
+    _, behind, opposite = boundary_facets(cells[:, : d + 1])
+    nodes, apex = nodes_of_facets(cells[behind], opposite), cells[behind, opposite]
     corners = solution.points[nodes[:, :d]]
     inward = solution.points[apex] - corners[:, 0]
-    normals = facet_normals(corners)
+    normals = unit_normals(corners)
     turned = np.sum(normals * inward, axis=1) > 0.0
     nodes[turned] = nodes[turned][:, _swapped(d, solution.order)]
     normals[turned] *= -1.0
@@ -148,7 +138,7 @@ def deformed_cells(
     upright = ~shape.degenerate & (_turn(places[nodes]) * _turn(solution.points[nodes]) > 0.0)
     lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
     tree = build_cell_tree(np.where(upright[:, None], lower, np.nan), upper)
-    return DeformedCells(nodes, shape, upright, tree)
+    return DeformedCells(nodes, shape, tree)
 
 
 def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[np.bool_]:
@@ -169,11 +159,7 @@ def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[
 
 def _turn(corners: Array) -> Array:
     """Compute the signed volume (m,), up to a factor."""
-    edges = np.moveaxis(corners[:, 1:] - corners[:, :1], (1, 2), (0, 1))
-    if len(edges) == 2:
-        return np.asarray(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
-    a, (b, c, d), (e, f, g) = edges
-    return np.asarray(a[0] * (c * g - d * f) + a[1] * (d * e - b * g) + a[2] * (b * f - c * e))
+    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
 
 
 def _swapped(d: int, order: int) -> list[int]:
@@ -281,8 +267,8 @@ class OverlapSearch:
     ) -> tuple[Array, Array, NDArray[np.int64]]:
         """Return penetration (n,) of points of faces, shares (n, d) of corners, and facets (n,)."""
         corners = places[faces.nodes]
-        normals = facet_normals(corners)
-        height = _smallest_height(corners)
+        normals = unit_normals(corners)
+        height = heights(corners)
         whole = (height > _SMALL * self._size) & np.isfinite(normals).all(axis=1)
         sound = np.flatnonzero(whole)
         normals = np.nan_to_num(normals)
@@ -327,21 +313,11 @@ class OverlapSearch:
         places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
         corners = self.solution.points[faces.nodes]
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
-        return nearest_before(places, tree, corners, np.nan_to_num(facet_normals(corners)))
+        return nearest_before(places, tree, corners, np.nan_to_num(unit_normals(corners)))
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
         searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
         return holding_cells(points, searched, _INSIDE * self._size, nearest=False)
-
-
-def _smallest_height(corners: Array) -> Array:
-    """Compute length (f,) of segments (f, 2, 2), or smallest height of triangles (f, 3, 3), m."""
-    edges = np.roll(corners, -1, axis=1) - corners
-    longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    if corners.shape[2] == 2:
-        return np.asarray(longest)
-    twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    return np.asarray(twice / np.maximum(longest, 1e-300))
 
 
 # A ray through an edge must not slip between two facets.

@@ -29,7 +29,8 @@ from verify.compare.cut_deviation import RealisedCut
 from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.sides import AskedCut, asked_sides, distance_to_cut
 from verify.compare.simplex_bodies import MembraneBody
-from verify.compare.simplices import Simplices, facet_normals
+from verify.compare.simplices import Simplices
+from verify.geometry.simplices import unit_normals
 from verify.solution import Solution
 
 Ints = NDArray[np.int64]
@@ -67,7 +68,7 @@ def sides_of_cells(
     nodes = np.ascontiguousarray(solution.cells[:, : shape.corners.shape[1]])
     facets = solution.cut_facets
     cell, corner, facet = _cells_on_facets(solution.points, nodes, facets, same)
-    normal = np.nan_to_num(facet_normals(facets))  # 0 of a point
+    normal = np.nan_to_num(unit_normals(facets))  # 0 of a point
     beside = _beside_facets(shape, cell, corner, facet, facets, normal)
     cut, along, margin = _orientations(facets, normal, cuts, 0.5 * reach, same)
     centre = shape.corners.mean(axis=1)

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.cell_tree import axes_of
 from verify.compiled import COMPILED, njit
 from verify.geometry.curves import Piece
 from verify.geometry.patches import Patch
+from verify.geometry.simplices import feet, nearest_parts
 
 Array = NDArray[np.float64]
 Sides = NDArray[np.int8]
@@ -29,28 +31,14 @@ def nearest_segments(
 
     Without any segment the distance is infinite, the foot the point, and the segment −1.
     """
+    starts, ends = (np.ascontiguousarray(segments[:, k]) for k in (0, 1))
+    if not COMPILED and len(segments):
+        distance, which = nearest_parts(points, segments)
+        return distance, feet(points, starts[which], ends[which]), which
     distance, foot = np.empty(len(points)), np.array(points, dtype=float)
     which = np.empty(len(points), dtype=np.int64)
-    starts, ends = (np.ascontiguousarray(segments[:, k]) for k in (0, 1))
-    if not COMPILED:
-        return _nearest_in_numpy(points, starts, ends)
-    axes = tuple(range(points.shape[1]))  # a loop over a tuple is unrolled
+    axes = axes_of(points.shape[1])
     _nearest(np.ascontiguousarray(points), starts, ends, axes, distance, foot, which)
-    return distance, foot, which
-
-
-def _nearest_in_numpy(
-    points: _Floats, starts: _Floats, ends: _Floats
-) -> tuple[_Floats, _Floats, NDArray[np.int64]]:
-    distance, foot = np.full(len(points), np.inf), np.array(points, dtype=float)
-    which = np.full(len(points), -1)
-    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        length2 = float((end - start) @ (end - start))
-        t = ((points - start) @ (end - start) / (length2 or 1.0)).clip(0.0, 1.0)[:, None]
-        on_it = (1 - t) * start + t * end
-        away = np.linalg.norm(points - on_it, axis=1)
-        nearer = away < distance
-        distance[nearer], foot[nearer], which[nearer] = away[nearer], on_it[nearer], k
     return distance, foot, which
 
 
@@ -105,32 +93,18 @@ def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, Array, NDAr
     return away[nearest, rows], feet[nearest, rows], np.asarray(nearest)
 
 
-def _distance(piece: Piece | Patch, points: Array) -> Array:
-    return np.asarray(np.linalg.norm(points - piece.foot(points), axis=1))
-
-
 def _sides_of(pieces: AskedCut, points: Array, reach: Array, size: float) -> Sides:
-    levels = [piece.level(points) for piece in pieces]
-    within = [np.abs(level) <= reach for level in levels]  # no foot is nearer than its level
-    rows = np.flatnonzero(np.any(within, axis=0))
-    sides = np.zeros(len(points), dtype=np.int8)
-    close = [level[rows] for level in levels]
-    sides[rows] = _sides_beside(pieces, close, points[rows], reach[rows], size)
-    return sides
-
-
-def _sides_beside(
-    pieces: AskedCut, levels: Sequence[Array], points: Array, reach: Array, size: float
-) -> Sides:
-    found = []
-    nearest = np.full(len(points), np.inf)
-    for piece, level in zip(pieces, levels, strict=True):
+    levels = np.array([piece.level(points) for piece in pieces])
+    # no foot is nearer than its level
+    rows = np.flatnonzero((np.abs(levels) <= reach).any(axis=0))
+    points, reach, sides = points[rows], reach[rows], np.zeros(len(points), dtype=np.int8)
+    found, nearest = [], np.full(len(rows), np.inf)
+    for piece, level in zip(pieces, levels[:, rows], strict=True):
         at = np.flatnonzero(np.abs(level) <= reach)
-        away = _distance(piece, points[at])
+        away = np.linalg.norm(points[at] - piece.foot(points[at]), axis=1)
         found.append((at, level[at], away))
         nearest[at] = np.minimum(nearest[at], away)
-    met = np.zeros(len(points), dtype=np.int64)
-    height = np.zeros(len(points))
+    met, height = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows))
     for at, level, away in found:
         tied = away <= nearest[at] + _SAME * size
         met[at[tied]] += 1
@@ -138,6 +112,6 @@ def _sides_beside(
         height[at[higher]] = level[higher]
     with np.errstate(invalid="ignore"):
         beyond = (met == 1) & (np.abs(height) < (1 - _NORMAL) * nearest - _SAME * size)
-    sides: Sides = np.where(height >= 0.0, 1, -1).astype(np.int8)
-    sides[(met == 0) | (nearest > reach) | beyond] = 0
+    sides[rows] = np.where(height >= 0.0, 1, -1)
+    sides[rows[(met == 0) | (nearest > reach) | beyond]] = 0
     return sides

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import build_cell_tree, holding_cells
 from verify.compare.locate import nearest_of_triangles
 from verify.compare.sides import distance_to_segments, nearest_segments
-from verify.compare.simplices import simplices, triangle_frames
+from verify.compare.simplices import KUHN, simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.geometry.patches import Patch, PlanePatch
 from verify.geometry.simplices import feet, measures, rim_edges
@@ -139,7 +139,7 @@ def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
             within = (points >= box[0] - margin) & (points <= box[1] + margin)
             return np.asarray(within.all(axis=1))
 
-        return _box_tetrahedra(box), box, in_box
+        return box[0] + KUHN * (box[1] - box[0]), box, in_box
     if not isinstance(geometry, MeshFile):
         raise UnsupportedSceneError(
             f"comparison on a body of kind '{geometry.kind}' is not possible yet; boxes and mesh "
@@ -147,13 +147,6 @@ def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
         )
     points, cells = read_mesh(scene)
     return points[cells], None, _in_mesh(points, cells)
-
-
-def _box_tetrahedra(box: Array) -> Array:
-    """Divide a box into six tetrahedra (6, 4, 3) around its diagonal (Kuhn)."""
-    unit = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=float)
-    paths = [[0, *path, 7] for path in ([1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6])]
-    return np.asarray((box[0] + unit * (box[1] - box[0]))[np.array(paths)])
 
 
 def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
@@ -178,12 +171,13 @@ def _trimmed(rim: Array, inside: Inside, size: float) -> Array:
     if not pieces:
         return np.zeros((0, 2, 3))
     found = np.concatenate(pieces)
-    middle = found.mean(axis=1)
-    step = 1e-6 * size
-    within = inside(middle)
-    for way in step * np.vstack([np.eye(3), -np.eye(3)]):
-        within &= inside(middle + way)
-    return found[within]
+    return found[deep_inside(found.mean(axis=1), inside, 1e-6 * size)]
+
+
+def deep_inside(points: Array, inside: Inside, step: float) -> NDArray[np.bool_]:
+    """Tell whether points (n, d) that are moved by a step along any axis, m, stay inside."""
+    ways = step * np.eye(points.shape[1])
+    return np.all([inside(points + way) for way in (*ways, *-ways)], axis=0)
 
 
 Cells = NDArray[np.int64]

@@ -9,12 +9,15 @@ Volumes add up to round-off.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, wraps
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 from math import factorial
 from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
@@ -142,25 +145,15 @@ def in_frames(gradient: Array, frames: Array) -> Array:
     return np.asarray(frames @ gradient @ np.swapaxes(frames[:, :2], 1, 2))
 
 
-def facet_normals(corners: Array) -> Array:
-    """Return unit normals (f, d) of facets (f, d, d), by the order of their corners."""
-    edges = corners[:, 1:] - corners[:, :1]
-    if corners.shape[2] == 2:
-        across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
-    else:
-        across = np.cross(edges[:, 0], edges[:, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
-
-
-def facet_nodes(d: int, corner: int, order: int) -> list[int]:
-    """Compute local nodes of the facet opposite to a corner; of order 2 with its mid-edge nodes."""
-    own = [k for k in range(d + 1) if k != corner]
-    if order == 1:
-        return own
-    ends = [(own[0], own[1])] if d == 2 else [(own[0], own[1]), (own[1], own[2]), (own[0], own[2])]
-    pairs = [tuple(sorted(edge)) for edge in EDGES[d]]
-    return own + [d + 1 + pairs.index(edge) for edge in ends]
+def nodes_of_facets(cells: NDArray[np.int64], opposite: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Take the nodes (f, j), corners first, of facets of cells (f, n) opposite to corners (f,)."""
+    count = _CORNERS[cells.shape[1]]
+    edges = {frozenset(edge): count + k for k, edge in enumerate(EDGES[count - 1])}
+    columns = [[k for k in range(count) if k != corner] for corner in range(count)]
+    if cells.shape[1] > count:
+        for own in columns:
+            own += [edges[frozenset((own[a], own[b]))] for a, b in EDGES[count - 2]]
+    return np.take_along_axis(cells, np.array(columns)[opposite], axis=1)
 
 
 def straight_or_raise(points: Array, cells: NDArray[np.int64]) -> None:
@@ -213,6 +206,21 @@ def simplex_rule(k: int, order: int) -> tuple[Array, Array]:
         weights = np.repeat(weights, order) * np.tile(w, len(weights))
         left = np.repeat(left, order) - step
     return np.column_stack([left, points]), weights
+
+
+# Corners (6, 4, 3) of six tetrahedra around the diagonal of a cube (Kuhn)
+KUHN = np.array(
+    [np.cumsum([np.zeros(3), *np.eye(3)[list(path)]], axis=0) for path in permutations(range(3))]
+)
+
+
+def places_of(points: Array, reach: float) -> NDArray[np.int64]:
+    """Give each of points (n, d) the number (n,) of its place: one within a `reach`, m."""
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+    return np.asarray(connected_components(link.tocsr(), directed=False)[1], dtype=np.int64)
 
 
 def points_in(corners: Array, order: int) -> tuple[Array, Array]:

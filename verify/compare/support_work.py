@@ -30,16 +30,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg, splu
-from scipy.spatial import cKDTree
 
 from verify.compare.hooke import Law, stress_power, viscous_power
 from verify.compare.load_work import PrescribedNodes, nodal_forces, prescribed_nodes
 from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.mass import assembled
-from verify.compare.simplices import EDGES, cells_of, simplex_rule
+from verify.compare.simplices import EDGES, cells_of, places_of, simplex_rule
 from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.physics import factor_at
@@ -127,9 +126,7 @@ class Extension:
         """Number (n,) of the place of each node: the copies on the faces of a cut share one."""
         points = self.solution.points
         near = 10 * ROUND_OFF * float(np.linalg.norm(np.ptp(points, axis=0)))
-        pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
-        same = csr_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-        return np.asarray(connected_components(same, directed=False)[1], dtype=np.int64)
+        return places_of(points, near)
 
     @cached_property
     def _stiffness(self) -> csr_array:
@@ -172,30 +169,17 @@ class _Known(NamedTuple):
 def _rigid(points: Array) -> Array:
     """Return translations and rotations (q, n, d), all of size one."""
     n, d = points.shape
-    turns = [(i, j) for i in range(d) for j in range(i)]
-    modes = np.zeros((d + len(turns), n, d))
-    away = _scaled(points)
-    for i in range(d):
-        modes[i, :, i] = 1.0
-    for mode, (i, j) in zip(modes[d:], turns, strict=True):
-        mode[:, i], mode[:, j] = away[:, j], -away[:, i]
-    return modes
+    modes = _affine(points).reshape(d, d + 1, n, d)
+    turns = [modes[i, 1 + j] - modes[j, 1 + i] for i in range(d) for j in range(i)]
+    return np.concatenate([modes[:, 0], turns])
 
 
 def _affine(points: Array) -> Array:
     """Compute fields (q, n, d) that are affine in the points."""
     n, d = points.shape
-    away = np.column_stack([np.ones(n), _scaled(points)])
-    modes = np.zeros((d, d + 1, n, d))
-    for i in range(d):
-        modes[i, :, :, i] = away.T
-    return modes.reshape(-1, n, d)
-
-
-def _scaled(points: Array) -> Array:
     away = points - points.mean(axis=0)
-    scaled: Array = away / max(float(np.abs(away).max()), 1e-300)
-    return scaled
+    away = np.column_stack([np.ones(n), away / max(float(np.abs(away).max()), 1e-300)])
+    return np.einsum("ij,nk->iknj", np.eye(d), away).reshape(-1, n, d)
 
 
 def _slopes(at: Array, gradients: Array, order: int) -> Array:
@@ -334,11 +318,8 @@ class _Work:
     @cached_property
     def _knots(self) -> Array:
         """Times of kinks, s: of supports, which may take up another velocity, and of loads."""
-        return np.array([*self.nodes.knots, *self._kinks_of_loads])
-
-    @property
-    def _kinks_of_loads(self) -> list[float]:
-        return [time for _, history in self.forces for time, _ in history or ()]
+        of_loads = [time for _, history in self.forces for time, _ in history or ()]
+        return np.array([*self.nodes.knots, *of_loads])
 
     @cached_property
     def _field(self) -> SolutionField:
@@ -399,17 +380,14 @@ class _Work:
         """Interpolate displacements and velocities (n, d) at a time by Hermite's cubic."""
         solution, held = self.solution, self.nodes.follows
         assert solution.velocity is not None
-        a, b = solution.times[first], solution.times[last]
-        for one in (first, last):
-            if abs(time - solution.times[one]) <= 1e-12 * (b - a):
+        ends = [first, last]
+        for one in ends:
+            if abs(time - solution.times[one]) <= 1e-12 * np.ptp(solution.times[ends]):
                 return solution.displacement[one], solution.velocity[one]
-        span, s = b - a, (time - a) / (b - a)
-        u0, u1 = solution.displacement[[first, last]]
-        v0, v1 = solution.velocity[[first, last]]
-        gain = u1 - u0
-        u = u0 + s * s * (3 - 2 * s) * gain
-        u = u + span * s * (1 - s) * ((1 - s) * v0 - s * v1)
-        v = 6 * s * (1 - s) * gain / span + (1 - s) * (1 - 3 * s) * v0 + s * (3 * s - 2) * v1
+        cubic = CubicHermiteSpline(
+            solution.times[ends], solution.displacement[ends], solution.velocity[ends]
+        )
+        u, v = cubic(time), cubic(time, 1)
         u[held] = self.nodes.values(time)[held]
         v[held] = self.nodes.velocities(time)[held]
         return u, v

@@ -22,7 +22,7 @@ import numpy as np
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut, welded
 from verify.compare.error_norm import cut_rule_of
-from verify.compare.hooke import hooke, nodal_strain_energy
+from verify.compare.hooke import cell_strain_energies, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices
 from verify.conformance.check import EXACT, Check, Finding, Solutions, covered, is_field
@@ -237,8 +237,8 @@ def _unexplained_field(scene: Scene, solution: Solution, field: Field) -> str:
         corners.reshape(-1, d), np.arange(len(corners) * k).reshape(-1, k),
         (interpolant[solution.cells] - wanted).reshape(1, -1, d), order=solution.order,
     )  # fmt: skip
-    allowed = 4.0 * nodal_strain_energy(SolutionField(apart), law)
-    found = nodal_strain_energy(SolutionField(solution).with_nodal(off), law)
+    allowed = 4.0 * cell_strain_energies(SolutionField(apart), law).sum()
+    found = cell_strain_energies(SolutionField(solution).with_nodal(off), law).sum()
     if not found <= allowed + YOUNG * (_SOLVED * scale) ** 2 * len(corners):
         return f"the energy of what is off is {found:.2g} J, by the place of the cut {allowed:.2g}"
     return ""

@@ -10,6 +10,12 @@ from verify.geometry.simplices import distance_to_outline
 Array = NDArray[np.float64]
 
 
+def polygon_area(corners: Array) -> float:
+    """Area of a polygon (k, 2), positive if its corners go anticlockwise."""
+    x, y = (corners - corners[0]).T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
 def polygon_defect(corners: Array) -> str | None:
     """Why the closed polygon `corners` (n, 2) is not simple, or None if it is."""
     closed = np.vstack([corners, corners[:1]])

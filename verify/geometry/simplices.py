@@ -73,10 +73,14 @@ def boundary_facets(cells: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def unit_normals(simplices: Array) -> Array:
-    """Return unit normals (m, d) of segments (m, 2, 2), to the left, or of triangles (m, 3, 3)."""
+    """Return unit normals (m, d) of segments (m, 2, 2), to the left, or of triangles (m, 3, 3).
+
+    NaN where there is none.
+    """
     edges = np.moveaxis(simplices[:, 1:] - simplices[:, :1], 1, 0)
     across = np.cross(*edges) if len(edges) == 2 else edges[0][:, ::-1] * [-1.0, 1.0]
-    return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
 
 def ear_clipping(corners: Array) -> Ints:

@@ -297,7 +297,6 @@ def _noted(record: SolveRecord, notes: dict[str, str]) -> SolveRecord:
 def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rules) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
     scene, reference = one.scene, held.reference
-    assert scene is not None
     record, other = with_cut(record, one, rules)
     if defect := _defect(scene, one):
         return _noted(record, _named(scene, defect))
@@ -378,7 +377,6 @@ def _contact(
 ) -> tuple[list[Metric], dict[str, str]]:
     """Measure the contact of the faces of cuts."""
     rule, truth = rules.on_cuts(), None
-    assert one.scene is not None
     if rule is None:
         return [], {"contact_pressure": "no cut lies inside the body"}
     if reference is not None:
@@ -398,7 +396,6 @@ def _errors(
     other: SolutionMotion | None,
 ) -> tuple[list[Metric], dict[str, str], SolveRecord]:
     """Measure the errors by the coarser rules, then by the finest what these leave too open."""
-    assert one.scene is not None
     times = compared_times(one.scene, one.solution)
     measure = partial(error_history, one.motion, reference.motion, times, rules, one.law)
     try:

@@ -25,7 +25,7 @@ from math import inf, isfinite, log
 from verify.compare.body import AnyBody
 from verify.compare.realised import cut_deviation
 from verify.errors import InputError
-from verify.result import Rate, Regularisation, SolveRecord
+from verify.result import Rate, SolveRecord
 from verify.scene import Scene
 from verify.scene.parts import END_OF_SUPPORT
 from verify.solution import Solution
@@ -305,28 +305,25 @@ def shifted_ends(records: Sequence[SolveRecord]) -> str:
 
     What is held then differs from the part by a length that jumps from level to level.
     """
-    shifts = [
-        max((r.size or 0.0 for r in one.regularisations if _is_shift(r)), default=0.0)
+    ends = [
+        [r.size or 0.0 for r in one.regularisations if (r.kind, r.unit) == (END_OF_SUPPORT, "h")]
         for one in records
     ]
+    shifts = [max(own, default=0.0) for own in ends]
     if not any(shifts):
         return ""
     return f"supports hold {', '.join(f'{s:.2g}' for s in shifts)} h beyond where their parts end"
 
 
-def _is_shift(entry: Regularisation) -> bool:
-    return entry.kind == END_OF_SUPPORT and entry.unit == "h"
-
-
 _ON_THE_CUT = 1e-10  # of the body's size
 
 
-def counted_order(scene: Scene | None, solution: Solution) -> float:
+def counted_order(scene: Scene, solution: Solution) -> float:
     """Return the order in the energy norm that can be counted on: that of the elements.
 
     It is ½ where a blade goes on its way: its tip is everywhere once, and no mesh graded to it.
     """
-    return 0.5 if scene is not None and cut_on_the_way(scene) else solution.order
+    return 0.5 if cut_on_the_way(scene) else solution.order
 
 
 def error_fall(

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
+import numpy as np
+
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import Interval, error_interval
 from verify.result import CaseResult, SolveRecord, Status, repeated_totals
@@ -99,13 +101,8 @@ def time_at(points: Sequence[WorkPoint], error: float) -> tuple[float, float, fl
     for a, b in pairwise(ordered):
         if b.error <= error * (1 + 1e-9):
             share = math.log(a.error / error) / math.log(a.error / b.error)
-            share = min(share, 1.0)
-            one, two, three = (
-                math.exp((1 - share) * math.log(s) + share * math.log(t))
-                for s, t in (
-                    (a.seconds, b.seconds), (a.fastest, b.fastest), (a.slowest, b.slowest),
-                )
-            )  # fmt: skip
+            times = np.log([[p.seconds, p.fastest, p.slowest] for p in (a, b)])
+            one, two, three = np.exp([1 - min(share, 1.0), min(share, 1.0)] @ times).tolist()
             return one, two, three
     return None
 

@@ -17,6 +17,7 @@ from verify.compare.cut_deviation import polylines_of, triangles_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.errors import InputError, UnsupportedSceneError
+from verify.geometry.planar import polygon_area
 from verify.judge.intervals import quotient_half_width
 from verify.judge.reference import compared_size, conforming_reference
 from verify.result import CaseResult, Notice, NoticeKind
@@ -190,9 +191,7 @@ def _coarser(scene: Scene) -> Scene:
     if size is None:
         body = scene.geometry
         if isinstance(body, Rectangle | Polygon):
-            x, y = body.outline().T
-            area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-            size = area**0.5 / _DIVISIONS[2]
+            size = abs(polygon_area(body.outline())) ** 0.5 / _DIVISIONS[2]
         elif isinstance(body, Box):
             size = float(np.prod(np.subtract(body.upper, body.lower))) ** (1 / 3) / _DIVISIONS[3]
     if size is not None:

@@ -296,11 +296,8 @@ def _without(record: SolveRecord, why: str) -> SolveRecord:
 
 def _with_overlap(reference: ReferenceRecord, found: _Found) -> ReferenceRecord:
     """Add the overlap of an exact solution to what is recorded of it."""
-    overlap = found.overlap
-    entry: dict[str, Any] = {"depth": overlap.depth}
-    if overlap.depth > 0.0:
-        entry["place"] = _place(found)
-    return replace(reference, overlap=entry)
+    place = {"place": _place(found)} if found.overlap.depth > 0.0 else {}
+    return replace(reference, overlap={"depth": found.overlap.depth, **place})
 
 
 def _contestants(

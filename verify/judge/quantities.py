@@ -6,7 +6,6 @@ all its values. Its root mean square there has no accidents, and falls in order.
 """
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from verify.compare.motion import SolutionMotion
 from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplex_bodies import MembraneBody
 from verify.compare.simplices import cells_of, points_in, simplices
-from verify.errors import UnsupportedSceneError
 from verify.judge.resultants import WeakForm, mean_stress, reaction, section
 from verify.judge.stress_intensity import Found, solution_intensity
 from verify.scene import Scene
@@ -50,14 +48,13 @@ class Measured:
     solution : Solution
     body : Body or SolidBody
     law : Law
-    scene : Scene, optional
-        Displacements, openings, energies and stresses do not need it.
+    scene : Scene
     cut : RealisedCut, optional
         Says where its field is continued across that.
     """
 
     def __init__(
-        self, solution: Solution, body: AnyBody, law: Law, scene: Scene | None = None,
+        self, solution: Solution, body: AnyBody, law: Law, scene: Scene,
         cut: RealisedCut | None = None,
     ) -> None:  # fmt: skip
         self.solution, self.body, self.law, self.scene = solution, body, law, scene
@@ -68,8 +65,6 @@ class Measured:
     @cached_property
     def weak_form(self) -> WeakForm:
         """Forces at its nodes."""
-        if self.scene is None:
-            raise UnsupportedSceneError("a reaction or section needs the scene")
         return WeakForm(self.scene, self.solution, self.law)
 
     def continued(self, everywhere: bool) -> SolutionMotion:
@@ -114,14 +109,10 @@ class Measured:
             If it is asked for at a time that the solution does not reach.
         """
         if isinstance(asked, FractureQuantity):
-            if self.scene is None:
-                raise UnsupportedSceneError("a stress-intensity factor needs the scene")
             if isinstance(asked, StressIntensityQuantity) and asked.at_blade:
                 return blade_intensity(self.scene, self.motion, self.body, asked)
             return solution_intensity(self.scene, self.solution, asked, self._factors)
         if isinstance(asked, PartQuantity):
-            if self.scene is None:
-                raise UnsupportedSceneError("a number of a part needs the scene")
             return part_quantity(self.scene, self.solution, self.motion, self.law, asked)
         if isinstance(asked, ReactionQuantity):
             return reaction(self.weak_form, asked)
@@ -166,11 +157,7 @@ def unit_of(asked: Quantity, dimension: int) -> str:
 Array = NDArray[np.float64]
 
 
-class _Side(NamedTuple):
-    """A point, and one near it on the side that is meant; (1, d) arrays, m."""
-
-    point: Array
-    near: Array
+_Side = tuple[Array, Array]  # a point, and one near it on the side that is meant: (1, d), m
 
 
 def local_difference(
@@ -200,11 +187,11 @@ def _made_of(
     """Points whose displacements make the value, the positive side first, and along what (d,)."""
     if isinstance(asked, DisplacementQuantity):
         at = np.array([asked.point], dtype=float)
-        return [_Side(at, at)], np.eye(at.shape[1])["xyz".index(asked.component)]
+        return [(at, at)], np.eye(at.shape[1])["xyz".index(asked.component)]
     place = asked.at if fine.body.dimension == 2 else asked.point
     assert place is not None  # the scene was checked
     rule = cut_place(fine.body, asked.cut, place)
-    sides = [_Side(rule.points, rule.positive), _Side(rule.points, rule.negative)]
+    sides = [(rule.points, rule.positive), (rule.points, rule.negative)]
     normal = rule.normals[0]
     if asked.component == "normal":
         return sides, normal

@@ -80,18 +80,13 @@ class WeakForm:
         return inertia_of(self.solution, density, whole, parts).matrix
 
     @cached_property
-    def size(self) -> float:
-        """Diagonal of the body, m."""
-        return float(np.linalg.norm(np.ptp(self.solution.points, axis=0)))
-
-    @cached_property
     def on_cut(self) -> Bools:
         """Whether nodes (n,) are on the realised cut."""
         points, facets = self.solution.points, self.solution.cut_facets
         if not facets.size:
             return np.zeros(len(points), dtype=bool)
         away = cKDTree(facets.reshape(-1, points.shape[1])).query(points)[0]
-        return np.asarray(away <= 10 * ROUND_OFF * self.size)
+        return np.asarray(away <= 10 * ROUND_OFF * self.field.scale)
 
     @cached_property
     def owners(self) -> NDArray[np.int64]:
@@ -243,7 +238,7 @@ def _extended(form: WeakForm, own: Bools, held: Bools) -> Array:
     if not form.on_cut[layer].any():
         return found
     away = cKDTree(solution.points[nodes]).query(solution.points)[0]
-    share = np.minimum(away / (_REACH * form.size), 1.0)
+    share = np.minimum(away / (_REACH * form.field.scale), 1.0)
     smooth = (1.0 - share) ** 2 * (1.0 + 2.0 * share)
     return np.where(held, found, smooth[:, None])
 
@@ -293,7 +288,7 @@ def section(form: WeakForm, asked: SectionQuantity) -> float:
     """
     solution, step = form.solution, step_at(form.solution, asked.time)
     normal = np.asarray(asked.normal) / np.linalg.norm(asked.normal)
-    side = _Side(np.asarray(asked.point, dtype=float), normal, 10 * ROUND_OFF * form.size)
+    side = _Side(np.asarray(asked.point, dtype=float), normal, 10 * ROUND_OFF * form.field.scale)
     beyond = side.level(solution.points) > 0.0
     rigid = form.rigid(asked, step)
     _check_section(form, beyond, rigid)

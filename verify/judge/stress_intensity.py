@@ -23,6 +23,7 @@ from verify.scene import (
 )  # fmt: skip
 from verify.scene.acceptance import FractureQuantity
 from verify.scene.physics import factor_at, jumps
+from verify.scene.tool_path import Cut
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -33,40 +34,31 @@ _AROUND = 65  # directions, and distances, in which the material around a tip is
 
 def intensity_defect(scene: Scene, asked: FractureQuantity) -> str | None:
     """Why a factor cannot be had from any solution of a scene, or None."""
-    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
     if asked.at_blade:
         return None
     if scene.cell_dimension < scene.dimension or scene.analysis.kinematics != "linear":
         return "stress-intensity factors are measured in linear kinematics, and not in membranes"
+    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
     if isinstance(cut, ToolPathCut) and asked.end == "end" and _time(scene, asked) <= cut.ends_at:
         return "a tip that advances has another field than one at rest: measured of mode III only"
     if any(isinstance(load, BodyForce) and load.force == "exact" for load in scene.loads):
         return "stress-intensity factors are not measured under the body force of an exact solution"
-    if reason := _defect_in_time(scene, asked):
+    if reason := _defect_in_time(scene, asked) or _defect_on_faces(scene, asked):
         return reason
-    if reason := _defect_on_faces(scene, asked):
-        return reason
+    from reference.fracture import front_reach, no_tip
+
     if scene.dimension == 3:
         if not scene.material.is_uniform:
             return "factors along a front are measured in one material"
-        return _front_defect(scene, asked)
+        if not isinstance(scene.geometry, Box):
+            return "factors along a front are measured in boxes"
+        if not front_reach(scene, asked) > 0.0:
+            return f"the front of cut '{asked.cut}' leaves the body or meets another cut"
+        return None
     if isinstance(scene.geometry, MeshFile):
         return "factors at a tip are measured in rectangles and polygons"
-    from reference.fracture import no_tip
-
     assert asked.end is not None  # the scene is plane
     return no_tip(scene, asked.cut, asked.end)
-
-
-def _front_defect(scene: Scene, asked: FractureQuantity) -> str | None:
-    """Why a factor at a front cannot be had from any solution of a scene, or None."""
-    if not isinstance(scene.geometry, Box):
-        return "factors along a front are measured in boxes"
-    from reference.fracture import front_reach
-
-    if not front_reach(scene, asked) > 0.0:
-        return f"the front of cut '{asked.cut}' leaves the body or meets another cut"
-    return None
 
 
 def _defect_on_faces(scene: Scene, asked: FractureQuantity) -> str | None:
@@ -74,7 +66,7 @@ def _defect_on_faces(scene: Scene, asked: FractureQuantity) -> str | None:
     for load in _face_loads(scene, asked):
         if not is_uniform(load.components):
             return f"the load on the faces of cut '{asked.cut}' is not uniform"
-        if load.traction is not None and _normal(scene, asked.cut) is None:
+        if load.traction is not None and _asked_cut(scene, asked).plane_normal is None:
             return f"tractions are borne by the faces of cut '{asked.cut}', which is not plane"
     return None
 
@@ -89,8 +81,7 @@ def _defect_in_time(scene: Scene, asked: FractureQuantity) -> str | None:
     if duration is None:
         return None
     slack, time = _SAME_TIME * duration, _time(scene, asked)
-    cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
-    opens = float(getattr(cut, "opens_at", 0.0))
+    opens = float(getattr(_asked_cut(scene, asked), "opens_at", 0.0))
     still_closed = "closed" if opens > 0.0 or time == 0.0 else ""
     if scene.analysis.damping[1]:
         return (
@@ -233,7 +224,7 @@ def _with_free_faces(
         if load.traction is None:
             stress += values[0] * np.eye(d)
         else:
-            normal = _normal(scene, asked.cut)
+            normal = _asked_cut(scene, asked).plane_normal
             assert normal is not None  # else it is a defect
             stress += np.outer(values, normal) + np.outer(normal, values)
             stress -= (values @ normal) * np.outer(normal, normal)
@@ -245,10 +236,9 @@ def _with_free_faces(
     return replace(solution, displacement=solution.displacement + solution.points @ strain)
 
 
-def _normal(scene: Scene, name: str) -> Array | None:
-    """Give the unit normal of a cut, towards its positive side; None if the cut is not plane."""
-    cut = next(cut for cut in scene.final_cuts if cut.name == name)
-    return cut.plane_normal
+def _asked_cut(scene: Scene, asked: FractureQuantity) -> Cut:
+    """Return the cut at whose end a factor is asked for, as it is in the end."""
+    return next(cut for cut in scene.final_cuts if cut.name == asked.cut)
 
 
 def _material_around(scene: Scene, tip: Array, radius: float) -> Material:
@@ -278,8 +268,7 @@ def exact_intensity(scene: Scene, exact: Any, asked: FractureQuantity) -> float 
     Of a tip at rest G = (K_I² + K_II²)/E' + K_III²/2μ (Irwin 1957).
     """
     if hasattr(exact, "intensity_at"):  # its tips differ
-        cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
-        point = asked.point
+        cut, point = _asked_cut(scene, asked), asked.point
         if isinstance(cut, PolylineCut | ArcCut):
             point = cut.vertices()[0 if asked.end == "start" else -1]
         stated = exact.intensity_at(point)
