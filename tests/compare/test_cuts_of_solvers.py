@@ -1,12 +1,8 @@
 """Realised cuts of solvers at random places, against distances and lengths of one's own."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from cut_meshes import scene
-from scipy.spatial import cKDTree
-from solid_meshes import solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.errors import Rules
@@ -21,9 +17,7 @@ PLANE = ("xfem", "subdivision", "virtual_node", "snapping")
 
 def measured(cut, cells, solver, **parameters):
     """The record of a solve with one cut, and the facets."""
-    space = cut["kind"] not in ("polyline", "arc")
-    size = [cells] * (3 if space else 2)
-    case = (solid_scene if space else scene)([cut], mesh={"cells": [size]})
+    case = scene([cut], mesh={"cells": [[cells, cells]]})
     solution, body = find_solver(solver).solve(case, 0, 0, **parameters), body_of(case)
     rules = Rules(body, 1 / cells)
     one = Measured(solution, body, law_of(case), case, measured_cut(solution, body, rules))
@@ -35,11 +29,6 @@ def lengths(facets):
     return np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1)
 
 
-def areas(facets):
-    a, b = facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]
-    return np.linalg.norm(np.cross(a, b), axis=1) / 2
-
-
 def samples(facets, count=12):
     """Points on all facets."""
     weights = np.random.default_rng(0).dirichlet(np.ones(facets.shape[1]), count)
@@ -47,7 +36,7 @@ def samples(facets, count=12):
     return np.einsum("qk,fkd->fqd", weights, facets).reshape(-1, facets.shape[2])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_closed_cut_inside_an_element_is_said_to_be_missing(seed):
     random = np.random.default_rng(seed)
     angle = np.sort(random.uniform(0, 2 * np.pi, random.integers(3, 6)))
@@ -62,7 +51,7 @@ def test_a_closed_cut_inside_an_element_is_said_to_be_missing(seed):
         assert "cut missing at ends" in [one.kind for one in record.regularisations]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_is_missing_less_what_is_too_much_is_the_difference_of_lengths(seed):
     random = np.random.default_rng(seed)
     middle, angle = random.uniform(0.4, 0.6, 2), random.uniform(0, np.pi)
@@ -80,7 +69,7 @@ def test_what_is_missing_less_what_is_too_much_is_the_difference_of_lengths(seed
         assert ("cut missing at ends" in stated) == (record.cut.missing > 1e-10)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_resolved_arc_is_in_facets_within_the_limit(seed):
     random = np.random.default_rng(seed)
     centre, radius = random.uniform(-0.1, 0.1, 2), random.uniform(0.4, 0.7)
@@ -92,39 +81,3 @@ def test_a_resolved_arc_is_in_facets_within_the_limit(seed):
         assert record.cut.continued
         assert "cut beside where it was asked" not in {o.kind for o in record.regularisations}
         assert not record.cut.under_resolved
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(4))
-def test_surfaces_in_space_are_where_they_are_said_to_be(seed):
-    random = np.random.default_rng(seed)
-    cells = 6
-    centre, radius = random.uniform(-0.1, 0.1, 3), random.uniform(0.6, 0.9)
-    ball = {"kind": "sphere", "centre": centre.tolist(), "radius": radius}
-    record, facets = measured(ball, cells, "xfem")
-    off = np.abs(np.linalg.norm(samples(facets) - centre, axis=1) - radius).max()
-    assert record.cut.lateral == pytest.approx(off, rel=0.15)
-    assert record.cut.continued
-
-    middle, normal = random.uniform(0.45, 0.55, 3), random.normal(size=3)
-    disc = {"kind": "disc", "centre": middle.tolist(), "normal": normal.tolist(), "radius": 0.3}
-    record, facets = measured(disc, cells, "xfem")
-    area = np.pi * 0.3**2 - areas(facets).sum()
-    assert record.cut.missing - record.cut.surplus == pytest.approx(area, abs=0.02 * 0.3**2 * np.pi)
-    assert record.cut.lateral < 1e-9
-    assert "cut missing at ends" in [one.kind for one in record.regularisations]
-
-    height = random.uniform(0.1, 0.2)
-    ridge = np.array([[-0.1, 0.5, -0.1], [0.45, 0.5, -0.1], [0.52, 0.5 + height, -0.1],
-                      [0.59, 0.5, -0.1], [1.1, 0.5, -0.1]])  # fmt: skip
-    ridge[:, 1] += 0.037
-    swept = {"kind": "swept", "points": ridge.tolist(), "along": [0.0, 0.0, 1.2]}
-    record, facets = measured(swept, cells, "xfem")
-    share = np.linspace(0, 1, 41)[:, None]
-    line = np.concatenate([(1 - share) * a + share * b for a, b in pairwise(ridge)])
-    asked = line[:, None] + np.array([0.0, 0.0, 1.2]) * np.linspace(0.1, 1.1, 41)[:, None] / 1.2
-    asked = asked.reshape(-1, 3)
-    asked = asked[((asked >= 0) & (asked <= 1)).all(axis=1)]
-    away = cKDTree(samples(facets, 300)).query(asked)[0].max()
-    assert record.cut.asked_to_realised == pytest.approx(away, rel=0.15)
-    assert record.cut.continued == (record.cut.lateral <= record.cut.limit)

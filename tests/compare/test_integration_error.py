@@ -42,13 +42,11 @@ def true_errors(field, n):
     return np.sqrt(l2), np.sqrt(energy)
 
 
-# by all rules; by the two coarser, which are asked first
-@pytest.mark.parametrize(("first", "share"), [(0, 0.01), (1, 0.02)])
-@pytest.mark.parametrize("n", [4, 11, 16])
-def test_the_estimated_integration_error_covers_the_true_one_and_is_small(n, first, share):
+@pytest.mark.parametrize("n", [4, 11])
+def test_the_estimated_integration_error_covers_the_true_one_and_is_small(n):
     points, cells = grid(n, n)
     field = SolutionField(solution(points, cells, Smooth().displacement(points)))
-    family = rules(body_of(scene([])), 1 / n)[first:]
+    family = rules(body_of(scene([])), 1 / n)
     true_l2, true_energy = true_errors(field, n)
     # the truth is itself integrated: fourth order on triangles of h/8, 8^-4 of the integrand
     slack = 2.5e-4
@@ -56,7 +54,8 @@ def test_the_estimated_integration_error_covers_the_true_one_and_is_small(n, fir
         (true_l2, lambda r: displacement_error(field, Smooth(), r)),
         (true_energy, lambda r: energy_error(field, Smooth(), r, LAW)),
     ):
-        measured = integrate_norm(measure, family)
-        off = abs(measured.norm.absolute - true) / measured.norm.scale
-        assert off <= measured.integration_error + slack * measured.norm.relative
-        assert measured.integration_error < share * measured.norm.relative
+        for first, share in ((0, 0.01), (1, 0.02)):  # all rules; the two coarser, asked first
+            measured = integrate_norm(measure, family[first:])
+            off = abs(measured.norm.absolute - true) / measured.norm.scale
+            assert off <= measured.integration_error + slack * measured.norm.relative
+            assert measured.integration_error < share * measured.norm.relative

@@ -86,19 +86,6 @@ def test_a_jump_across_a_sliver_is_measured_on_its_own_cut(cut, gap):
     assert found.absolute == pytest.approx(5 * np.sqrt(cut.sliver(gap)), rel=tolerance)
 
 
-@pytest.mark.parametrize("cut", BODIES[1:], ids=NAMES[1:])
-def test_swapped_sides_in_space_show_as_a_jump_error_of_two(cut):
-    field = cut.halves(cut.levels[0], (STILL, SHIFT), REST)
-
-    class Swapped:
-        def displacement(self, points, near=None):
-            return field.displacement(points, 2 * points - near)
-
-    rule = cut.cut_rule(cut.body(), 0.2)
-    assert jump_error(field, field, rule).relative == 0.0
-    assert jump_error(Swapped(), field, rule).relative == pytest.approx(2.0, rel=1e-12)
-
-
 class Smooth:
     """Smooth in space; on a sheet its gradient is made tangential by the rule."""
 
@@ -113,10 +100,7 @@ class Smooth:
         return 0.1 * np.array(rows).transpose(2, 0, 1)
 
 
-@pytest.mark.parametrize(
-    ("cut", "n"), [(BODIES[1], 4), (BODIES[1], 8), (BODIES[2], 3), (BODIES[2], 6)],
-    ids=["roof-4", "roof-8", "cube-3", "cube-6"],
-)  # fmt: skip
+@pytest.mark.parametrize(("cut", "n"), [(BODIES[1], 8), (BODIES[2], 3)], ids=["roof-8", "cube-3"])
 def test_the_estimated_integration_error_in_space_covers_the_true_one(cut, n):
     body, true = cut.body(), Smooth()
     points, cells, _ = cut.layers(n)

@@ -25,9 +25,9 @@ def about(d, degrees, centre, shift):
 
 
 # halves of other meshes, so that no node lies opposite to another; 0.083 is no multiple of h
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("gap", [0.083, 0.0017, 1e-6])
+@pytest.mark.parametrize(
+    ("d", "order", "gap"), [(2, 1, 1e-6), (2, 2, 0.083), (3, 1, 0.083), (3, 2, 0.0017)]
+)
 def test_a_half_that_is_pressed_in_overlaps_by_that_much(d, order, gap):
     moves = [STILL[d], (np.eye(d), -gap * normal(d))]
     _, depth = common(d, moves)
@@ -42,7 +42,7 @@ def test_a_half_that_is_pressed_in_overlaps_by_that_much(d, order, gap):
 # than its face of the cut: it is found at most one facet, 0.3 long, away, where sin 20° times
 # that is missing. At the place that is named it is the distance from the other's face.
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("whole", [0.0, 125.0, 260.0])
+@pytest.mark.parametrize("whole", [0.0, 125.0])
 def test_a_half_that_is_turned_into_the_other_overlaps_by_as_much_wherever_both_are(d, whole):
     moves = [STILL[d], about(d, 20.0, np.full(d, 0.43), -0.05 * normal(d))]
     _, depth = common(d, moves)
@@ -70,10 +70,9 @@ def test_a_half_that_slid_along_the_cut_overlaps_only_where_the_other_is(d):
      lambda d: (np.eye(d), np.zeros(d)), lambda d: (np.eye(d), 1e-13 * -normal(d))],
     ids=["open", "hardly open", "closed", "closed within round-off"],
 )  # fmt: skip
-@pytest.mark.parametrize("whole", [0.0, 73.0])
-def test_what_opens_or_touches_does_not_overlap(d, move, whole):
+def test_what_opens_or_touches_does_not_overlap(d, move):
     moves = [STILL[d], move(d)]
-    everywhere = turn(d, whole), np.linspace(0.3, -2.0, d)
+    everywhere = turn(d, 73.0), np.linspace(0.3, -2.0, d)
     moves = [(everywhere[0] @ t, everywhere[0] @ s + everywhere[1]) for t, s in moves]
     found = OverlapSearch(pressed(d, 7 if d == 2 else 4, moves)).at()
     assert found.depth == 0.0

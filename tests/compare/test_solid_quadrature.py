@@ -3,9 +3,8 @@ import pytest
 from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
 
 from verify.compare.body import body_of
-from verify.compare.body_rule import _thick, body_rule
+from verify.compare.body_rule import body_rule
 from verify.compare.cut_rule import surface_rule
-from verify.compare.simplices import heights
 from verify.scene import load_scene
 
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 1.0, 1.0], "radius": 0.3}
@@ -87,24 +86,6 @@ def test_normals_point_to_the_positive_side_as_the_scene_says():
     assert np.allclose(bent.normals[first], normal / np.linalg.norm(normal))
 
 
-def test_an_ellipse_has_the_nearest_points_of_its_rim():
-    ellipse = {
-        "kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 0.0, 1.0],
-        "radii": [0.4, 0.2], "axis": [1.0, 0.0, 0.0],
-    }  # fmt: skip
-    (patch,) = body_of(solid_scene([ellipse])).patches
-    random = np.random.default_rng(1)
-    points = random.uniform(-0.2, 1.2, (300, 3))
-    foot, rim = patch.nearest(points)
-    angle = np.linspace(0, 2 * np.pi, 20001)
-    ring = 0.5 + np.column_stack([0.4 * np.cos(angle), 0.2 * np.sin(angle), 0 * angle])
-    for p, f in zip(points[rim], foot[rim], strict=True):
-        sampled = np.linalg.norm(ring - p, axis=1).min()
-        # 20 000 points on the rim: the nearest of them is further by the square of their gap
-        assert np.linalg.norm(f - p) == pytest.approx(sampled, abs=1e-6)
-    assert (np.abs(foot[~rim] - points[~rim])[:, :2] < 1e-15).all()
-
-
 def test_an_inverse_square_root_at_a_front_is_integrated():
     # 1/√r about a front along y through the cube: ∫ 1/√r over a rectangle, by polar pieces
     body = body_of(solid_scene([HALF]))
@@ -150,24 +131,3 @@ def test_a_body_given_by_tetrahedra_has_its_volume_and_its_cut_its_area(tmp_path
     along = body_from_a_file(tmp_path, [[-0.1, -0.1, 1 / 3], [0.6, -0.1, 1 / 3], [0.7, 1.1, 1 / 3]])
     area = 0.65 - 0.5 * 0.95 * 19 / 30  # left of its right side, not left of its left one
     assert surface_rule(along, 0.1).weights.sum() == pytest.approx(area, rel=1e-12)
-
-
-def test_the_rule_of_a_cut_does_not_depend_on_how_far_it_reaches_beyond_the_body(tmp_path):
-    counts, areas = [], []
-    for times in (1.0, 16.0, 256.0):
-        centre = np.array([0.5, 0.5, 0.5])
-        polygon = centre + times * (np.array(inclined()["points"]) - centre)
-        rule = surface_rule(body_from_a_file(tmp_path, polygon.tolist()), 0.1)
-        counts.append(len(rule.points))
-        areas.append(rule.weights.sum())
-    assert areas == pytest.approx([np.sqrt(1 + 1 / 9 + 1 / 25)] * 3, rel=1e-12)
-    assert max(counts) < 1.1 * min(counts)
-
-
-@pytest.mark.parametrize("k", [2, 3])
-def test_what_is_thick_is_what_its_heights_say(k):
-    cells = np.random.default_rng(k).random((300, k + 1, 3))
-    cells[:99, k] = cells[:99, :k].mean(axis=1) + 1e-14
-    cells[99:150, k] = cells[99:150, 0]
-    for least in (1e-13, 0.1, 0.3):
-        assert (_thick(cells, least) == (heights(cells) > least)).all()
