@@ -5,51 +5,21 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+import scenes
 from cut_meshes import grid
 from judged_fields import Quadratic, judged
 from membrane_meshes import layers, line, membrane, roof
 
 from verify.compare.body import body_of
 from verify.result import Verdict
-from verify.scene import load_scene
 
-CASE = """
-title = "a sheet"
-requirement = "it shall hold"
-[geometry]
-kind = "file"
-file = "sheet.vtu"
-dimension = 3
-cells = "surface"
-[mesh]
-pattern = "given"
-[material]
-young = 1.0
-poisson = 0.3
-thickness = 0.01
-[analysis]
-kinematics = "corotational"
-[[supports]]
-where = "boundary"
-displacement = [0.0, 0.0, 0.0]
-[[cuts]]
-kind = "polygon"
-name = "cut"
-points = [[-1.0, -0.1, -1.0], [-1.0, -0.1, 2.0], [2.0, 1.1, 2.0], [2.0, 1.1, -1.0]]
-[[quantities]]
-kind = "strain_energy"
-[[quantities]]
-kind = "opening"
-name = "opening"
-point = [0.25, 0.4, 0.2]
-[[quantities]]
-kind = "displacement"
-name = "corner"
-point = [1.0, 1.0, 0.0]
-component = "y"
-[[quantities]]
-kind = "maximum_displacement"
-"""
+QUANTITIES = [
+    {"kind": "strain_energy"},
+    {"kind": "opening", "name": "opening", "point": [0.25, 0.4, 0.2]},
+    {"kind": "displacement", "name": "corner", "point": [1.0, 1.0, 0.0], "component": "y"},
+    {"kind": "maximum_displacement"},
+]
+CUT = [[-1.0, -0.1, -1.0], [-1.0, -0.1, 2.0], [2.0, 1.1, 2.0], [2.0, 1.1, -1.0]]
 
 
 def above(points):
@@ -59,8 +29,8 @@ def above(points):
 TRUTH = Quadratic(above)
 
 
-def interpolant(n, shape=roof, flip=False):
-    points, cells, layer = layers(shape, n, flip=flip)
+def interpolant(n):
+    points, cells, layer = layers(roof, n)
     far = np.where(layer[:, None] == 1, [[0.5, 3.0, 0.0]], [[0.5, -3.0, 0.0]])
     u = TRUTH.displacement(points, far)
     edge = points[layer == 1]
@@ -71,27 +41,26 @@ def interpolant(n, shape=roof, flip=False):
 
 @pytest.fixture
 def sheet(tmp_path):
-    def make(checks="", shape=roof, n=4):
-        points, cells = grid(n, n)
-        meshio.Mesh(shape(*points.T), [("triangle", cells)]).write(tmp_path / "sheet.vtu")
-        (tmp_path / "case.toml").write_text(CASE + checks)
-        return load_scene(tmp_path / "case.toml")
+    def make(**limits):
+        points, cells = grid(4, 4)
+        meshio.Mesh(roof(*points.T), [("triangle", cells)]).write(tmp_path / "sheet.vtu")
+        surface = {"file": "sheet.vtu", "dimension": 3, "cells": "surface"}
+        found = scenes.scene(
+            [{"kind": "polygon", "name": "cut", "points": CUT}], 3,
+            geometry={"kind": "file", **surface}, mesh={"pattern": "given"},
+            material=scenes.soft(3, thickness=0.01), analysis={"kinematics": "corotational"},
+            quantities=QUANTITIES, exact={"solution": "quadratic"},
+            acceptance=[{"check": "error", "metric": m, "at_most": v} for m, v in limits.items()],
+        )  # fmt: skip
+        found.came_from(tmp_path / "case.toml", "sheet")
+        return found
 
     return make
 
 
-def limit(metric, at_most):
-    return f'[[acceptance]]\ncheck = "error"\nmetric = "{metric}"\nat_most = {at_most}\n'
-
-
-EXACT = '[exact]\nsolution = "quadratic"\n'
-
-
 def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
-    checks = "".join(limit(m, 0.05) for m in ("displacement_l2", "jump_l2", "opening"))
-    result = judged(
-        sheet(EXACT + checks), {"xfem": {k: interpolant(4 * 2**k) for k in range(3)}}, TRUTH
-    )
+    scene = sheet(displacement_l2=0.05, jump_l2=0.05, opening=0.05)
+    result = judged(scene, {"xfem": {k: interpolant(4 * 2**k) for k in range(3)}}, TRUTH)
     assert [(v.verdict, v.reason) for v in result.verdicts if v.verdict is not Verdict.PASS] == []
     order = {rate.metric: rate.order for rate in result.rates}
     # linear elements: two in the displacement, also on cuts, and one in the energy norm
@@ -108,7 +77,7 @@ def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
 
 
 def test_another_surface_or_a_part_of_one_is_an_error(sheet):
-    scene, whole = sheet(EXACT + limit("jump_l2", 0.1)), interpolant(4)
+    scene, whole = sheet(jump_l2=0.1), interpolant(4)
     part = replace(whole, cells=whole.cells[:-3])
     lifted = replace(whole, points=whole.points + np.array([0.0, 0.0, 0.05]))
     for solution, reason in ((part, "of the body"), (lifted, "surface")):
@@ -118,7 +87,7 @@ def test_another_surface_or_a_part_of_one_is_an_error(sheet):
 
 
 def test_how_far_a_surface_lies_off_that_of_the_scene_is_said_beyond_round_off_of_its_size(sheet):
-    scene, whole = sheet(EXACT), interpolant(4)
+    scene, whole = sheet(), interpolant(4)
     size = body_of(scene).size
     assert size > 1.2  # of one, shares and lengths were the same
     for share, said in ((0.9, False), (2.5, True)):

@@ -41,7 +41,7 @@ def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:
     reference = find_solver("reference")
     own, beside = ({k: reference.solve(s, k, 0) for k in range(3)} for s in (one, other))
     judged = find_solver("conforming").solve(one, 0, 0)
-    record = _record(judged)
+    record = SolveRecord("scene", "conforming", 0, Status.SOLVED, size=judged.size, unknowns=10)
     result = assess_accuracy(one, [record], {"conforming": {0: judged}, "reference": own})
     notice = adequacy_notice(one, "kinematics", beside, result)
     assert notice.kind is NoticeKind.ADEQUACY
@@ -52,29 +52,6 @@ def test_a_beam_that_bends_far_says_what_linear_kinematics_costs() -> None:
     assert said == pytest.approx(100 * abs(poor / rich - 1), rel=0.06)  # two digits
     assert said > 0.5
     assert notice.text.startswith("linear kinematics against finite rotation: ")
-
-
-def test_a_beam_that_bends_far_says_what_hookes_law_costs() -> None:
-    """Hooke's law at finite rotation is the cheaper one, whichever of the two is asked."""
-    one = scene(adequacy={"material": True}, analysis={"kinematics": "finite_rotation"})
-    other = other_scene(one, "material")
-    assert (other.material.model, other.analysis.kinematics) == ("neo_hookean", "corotational")
-    assert other_scene(other, "material").material.model == "hooke"
-    reference = find_solver("reference")
-    own, beside = ({k: reference.solve(s, k, 0) for k in range(3)} for s in (one, other))
-    judged = find_solver("conforming").solve(one, 0, 0)
-    solutions = {"conforming": {0: judged}, "reference": own}
-    result = assess_accuracy(one, [_record(judged)], solutions)
-    notice = adequacy_notice(one, "material", beside, result)
-    shares = [abs(strain_energy(u[2], law_of(s))) for u, s in ((own, one), (beside, other))]
-    said = re.search(r"([\d.]+) % \(± [^)]*\) in strain_energy", notice.text)
-    assert notice.text.startswith("Hooke's law against neo-Hookean material: ")
-    assert said is not None, notice.text
-    assert float(said[1]) == pytest.approx(100 * abs(shares[0] / shares[1] - 1), rel=0.06)
-
-
-def _record(solution):
-    return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
 
 
 def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
@@ -88,13 +65,11 @@ def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
     assert other.reference.levels == 3
 
 
-def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
-    moving = scene(
-        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1}, adequacy={"motion": True}
-    )
-    assert other_scene(moving, "motion").analysis.kind == "static"
-    with pytest.raises(ValidationError, match="dynamic"):
-        scene(adequacy={"motion": True})
+def test_hookes_law_at_finite_rotation_is_the_cheaper_one_whichever_is_asked() -> None:
+    one = scene(adequacy={"material": True}, analysis={"kinematics": "finite_rotation"})
+    other = other_scene(one, "material")
+    assert (other.material.model, other.analysis.kinematics) == ("neo_hookean", "corotational")
+    assert other_scene(other, "material").material.model == "hooke"
 
 
 @pytest.mark.parametrize(("key", "levels"), [
@@ -136,6 +111,10 @@ def test_the_static_answer_bears_the_last_body_force_and_traction() -> None:
         loads=[{"kind": "body_force", "force": [0.5, -1.0], "history": history},
                {"kind": "traction", "where": "right", "traction": [0.2, 0.4], "history": history}],
     )  # fmt: skip
-    force, traction = other_scene(moving, "motion").loads
+    other = other_scene(moving, "motion")
+    assert other.analysis.kind == "static"
+    force, traction = other.loads
     assert list(force.force) == [1.5, -3.0]
     assert list(traction.traction) == pytest.approx([0.6, 1.2], rel=1e-15)
+    with pytest.raises(ValidationError, match="dynamic"):
+        scene(adequacy={"motion": True})

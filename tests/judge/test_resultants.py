@@ -68,8 +68,9 @@ MESHES = {"regular": {"cells": [[9, 8]]}, "free": {"pattern": "unstructured", "s
 
 
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("solver", ["xfem", "conforming", "subdivision"])
-@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize(
+    ("solver", "mesh"), [("xfem", "free"), ("conforming", "regular"), ("subdivision", "free")]
+)
 def test_reactions_balance_loads_and_sections_what_lies_beside_them(solver, mesh):
     about = [0.2, 0.1]
     asked = [reaction(f"{at[0]}{c}", at, c) for at in ("left", "right") for c in "xy"]
@@ -93,18 +94,16 @@ def test_reactions_balance_loads_and_sections_what_lies_beside_them(solver, mesh
     assert [unit_of(asked, 2) for asked in scene.quantities[3:5]] == ["N/m", "N m/m"]
 
 
-@pytest.mark.parametrize("solver, n, off", [("conforming", 8, 1e-12), ("xfem", 8, 2e-3),
-                                             ("xfem", 32, 5e-4)])  # fmt: skip
-def test_a_clamp_that_is_cut_through_bears_the_load(solver, n, off):
-    """To round-off where elements end at the cut; else to (h/δ)² of what decays over δ = √2/4."""
+def test_a_clamp_that_is_cut_through_bears_the_load():
+    """To (h/δ)² of what decays over δ = √2/4, as elements go on beyond the cut."""
     scene = scenes.scene(
         [{"kind": "polyline", "points": [[-0.1, 0.37], [0.62, 0.61]]}],
         material=PLANE["material"], supports=PLANE["supports"][:1],
-        loads=PLANE["loads"][:3], mesh={"cells": [[n, n]]},
+        loads=PLANE["loads"][:3], mesh={"cells": [[32, 32]]},
         quantities=[reaction("x", "left", "x"), reaction("y", "left", "y"),
                     moment("m", "left", "z", [0.2, 0.1])],
     )  # fmt: skip
-    assert list(values(scene, solver).values()) == pytest.approx([*-LOAD, -MOMENT], abs=off)
+    assert list(values(scene).values()) == pytest.approx([*-LOAD, -MOMENT], abs=5e-4)
 
 
 SOLID = {
@@ -201,20 +200,18 @@ def test_a_reaction_in_motion_has_the_inertia_in_it(solver):
     assert len(over_time["quantity_sx"]) == 5
 
 
-def hanging(solver, level, radius):
-    """A bar without lateral contraction: its stress is that of the weight below."""
+def test_a_hanging_bar_bears_its_weight_and_the_weight_below():
+    """No lateral contraction: the stress is that of the weight below; A = 2e-3, ρg = 9800.
+
+    Reactions, moments and sections to round-off, stresses to (h/L)².
+    """
     content = load_scene("controls/hanging_bar").model_dump(mode="json", by_alias=True)
     content |= {"acceptance": [], "quantities": [
         reaction("R", "top", "z"), moment("M", "top", "y", [0.0, 0.0, 0.3]),
         section("N", [0.02, 0.02, 0.11], [0.0, 0.0, 1.0], "z"),
-        stress([0.026, 0.021, 0.172], radius, "zz"), stress([0.026, 0.021, 0.172], radius, "xz"),
+        stress([0.026, 0.021, 0.172], 0.019, "zz"), stress([0.026, 0.021, 0.172], 0.019, "xz"),
     ]}  # fmt: skip
-    return values(scenes.Scene.model_validate(content), solver, level)
-
-
-def test_a_hanging_bar_bears_its_weight_and_the_weight_below():
-    """Reactions, moments and sections to round-off, stresses to (h/L)²; A = 2e-3, ρg = 9800."""
-    found = hanging("xfem", 1, 0.019)
+    found = values(scenes.Scene.model_validate(content), "xfem", 1)
     assert found["R"] == pytest.approx(9800 * 6e-4, rel=1e-10)
     # the weight acts at x = 0.025: R about the y axis is −x R_z
     assert found["M"] == pytest.approx(-9800 * 6e-4 * 0.025, rel=1e-9)
@@ -226,7 +223,7 @@ def test_a_hanging_bar_bears_its_weight_and_the_weight_below():
 def test_a_mean_stress_is_smooth_in_h_where_one_at_a_point_is_not():
     """Sinusoidal displacement on meshes of any size: errors of the mean fall with h²."""
     worst = {}
-    for n in (12, 13, 24, 25, 48, 49):
+    for n in (12, 13, 24, 25):
         scene = scenes.scene(mesh={"cells": [[n, n]]}, quantities=[stress([0.44, 0.57], 0.17)])
         mesh = find_solver("conforming").solve(scene, 0, repetitions=0)
         x, y = mesh.points.T
@@ -239,7 +236,7 @@ def test_a_mean_stress_is_smooth_in_h_where_one_at_a_point_is_not():
         exact = (lame + 2 * shear) * 3 * np.cos(3 * 0.44 + 0.57) * mean
         worst[n] = abs(found / exact - 1)
     assert worst[12] < 0.02
-    for coarse, fine in ((12, 24), (13, 25), (24, 48), (25, 49)):
+    for coarse, fine in ((12, 24), (13, 25)):
         assert worst[fine] < worst[coarse] / 2.5
 
 
@@ -259,8 +256,9 @@ def test_the_stress_of_a_patch_is_exact_on_both_sides_of_an_inclined_cut():
         assert got == pytest.approx([sigma[0, 0], sigma[1, 1], sigma[0, 1]], abs=1e-12)
 
 
-@pytest.mark.parametrize("model", ["hooke", "neo_hookean", "stable_neo_hookean"])
-@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize(
+    ("d", "model"), [(3, "hooke"), (2, "neo_hookean"), (3, "stable_neo_hookean")]
+)
 def test_the_stress_of_a_stretched_and_turned_body_is_that_of_cauchy(d, model):
     """Principal stresses λᵢ ∂W/∂λᵢ / J of the energy of each model, turned with the body."""
     stretches = np.array([1.3, 0.8, 1.1])[:d]

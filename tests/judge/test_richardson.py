@@ -136,32 +136,16 @@ def test_the_window_of_orders_is_as_stated(order, factor):
 def test_a_sequence_without_its_formal_order_gets_a_larger_safety_factor(values, why):
     found = extrapolate(values, [0.4, 0.2, 0.1], 2)
     assert why in found.reason
-    assert found.half_width >= 2.5 * abs(values[-1] - values[-2]) / (2**0.5 - 1) * (1 - 1e-9)
+    last = abs(values[-1] - values[-2])
+    assert found.half_width >= 2.5 * last / (2**0.5 - 1) * (1 - 1e-9)
+    if "no order" in why:
+        assert found.half_width >= 3 * last / (2**0.5 - 1) * (1 - 1e-9)
 
 
 def test_a_difference_that_is_small_by_accident_is_not_taken_for_an_error():
     # d₂ = 1e-9, d₁ = 0.1: an error that falls by 4 leaves a twelfth of d₁
     found = extrapolate([3.0, 3.1, 3.1 + 1e-9], [0.4, 0.2, 0.1], 2)
     assert found.half_width == pytest.approx(1.6 * 0.1 / 4 / 3)
-
-
-def test_a_singular_sequence_brackets_its_limit_although_order_two_was_expected():
-    sizes = [0.4, 0.2, 0.1]
-    found = extrapolate([3 + h**0.5 for h in sizes], sizes, 2)
-    assert abs(found.value - 3) <= found.half_width
-
-
-def test_levels_whose_differences_grow_are_not_given_the_benefit_of_their_element():
-    sizes = [0.4, 0.2, 0.1]
-    growing = extrapolate([3.00, 3.01, 3.03], sizes, 3)
-    assert growing.half_width >= 3 * 0.02 * (1 - 1e-12)
-    assert field_uncertainty([0.01, 0.02], sizes, 3).half_width >= 3 * 0.02 * (1 - 1e-12)
-
-
-def test_a_functional_may_converge_with_twice_the_order_of_its_element():
-    sizes = [0.4, 0.2, 0.1]
-    found = extrapolate([1 + h**3.9 for h in sizes], sizes, 4)
-    assert abs(found.value - 1) <= found.half_width <= 1.7 * abs(found.value - 1)
 
 
 def test_an_order_that_is_too_high_does_not_blow_up_a_bar():

@@ -150,55 +150,36 @@ def test_an_interval_is_judged_as_a_whole_and_what_means_nothing_is_not(claim):
     assert reason in found.reason
 
 
-@pytest.mark.parametrize(
-    "order, width, limits, expected",
-    [
-        (1.98, 0.01, {"at_least": 1.95}, PASS),
-        (1.96, 0.05, {"at_least": 1.95}, UNDECIDED),
-        (1.50, 0.05, {"at_least": 1.95}, FAIL),
-        (0.51, 0.01, {"equals": 0.5, "within": 0.05}, PASS),
-        (0.60, 0.01, {"equals": 0.5, "within": 0.05}, FAIL),
-        (0.54, 0.02, {"equals": 0.5, "within": 0.05}, UNDECIDED),
-    ],
-)
-def test_a_rate_is_judged_on_its_interval(order, width, limits, expected):
-    rate = Rate("xfem", "energy_norm", order, width, "", [order, order])
-    found = verdict({"check": "rate", **limits}, [solve(0, 0.1), solve(1, 0.05)], [rate])
-    assert found.verdict is expected
+NEAR_HALF = {"equals": 0.5, "within": 0.05}
+SLOWING = "slowing: slopes 0.08, 0.01"
 
 
 @pytest.mark.parametrize(
-    "reason, expected",
+    ("order", "width", "reason", "limits", "expected"),
     [
-        ("diverging: slopes -1", FAIL),
-        ("oscillating: slopes -1, 1", UNDECIDED),
-        ("floor: errors 1e-15", UNDECIDED),
+        (1.98, 0.01, "", {"at_least": 1.95}, PASS),
+        (1.96, 0.05, "", {"at_least": 1.95}, UNDECIDED),
+        (1.50, 0.05, "", {"at_least": 1.95}, FAIL),
+        (0.51, 0.01, "", NEAR_HALF, PASS),
+        (0.60, 0.01, "", NEAR_HALF, FAIL),
+        (0.54, 0.02, "", NEAR_HALF, UNDECIDED),
+        # what means nothing never passes
+        (None, 0.0, "diverging: slopes -1", {"at_least": 1.0}, FAIL),
+        (None, 0.0, "oscillating: slopes -1, 1", {"at_least": 1.0}, UNDECIDED),
+        (None, 0.0, "floor: errors 1e-15", {"at_least": 1.0}, UNDECIDED),
+        # what stops falling fails if the order is below the limit at most
+        (None, 0.05, SLOWING, {"at_least": 1.95}, FAIL),
+        (None, 0.05, SLOWING, NEAR_HALF, FAIL),
+        (None, 2.0, SLOWING, {"at_least": 1.95}, UNDECIDED),
+        (None, 0.05, SLOWING, {"equals": 0.0, "within": 0.1}, UNDECIDED),
     ],
 )
-def test_an_order_that_means_nothing_never_passes(reason, expected):
-    rate = Rate("xfem", "energy_norm", None, 0.0, reason, [-1.0, -1.1])
-    found = verdict({"check": "rate", "at_least": 1.0}, [solve(0, 0.1), solve(1, 0.2)], [rate])
+def test_a_rate_is_judged_on_its_interval(order, width, reason, limits, expected):
+    slopes = [-1.0, -1.1] if "diverging" in reason else [0.08, 0.01]
+    rate = Rate("xfem", "energy_norm", order, width, reason, slopes)
+    found = verdict({"check": "rate", **limits}, [solve(0, 0.1), solve(1, 0.09)], [rate])
     assert found.verdict is expected
     assert reason in found.reason
-
-
-@pytest.mark.parametrize(
-    "limits, width, expected",
-    [
-        ({"at_least": 1.95}, 0.05, FAIL),
-        ({"equals": 0.5, "within": 0.05}, 0.05, FAIL),
-        ({"at_least": 1.95}, 2.0, UNDECIDED),
-        ({"equals": 0.0, "within": 0.1}, 0.05, UNDECIDED),
-    ],
-)
-def test_an_error_that_stops_falling_fails_if_the_order_is_below_the_limit_at_most(
-    limits, width, expected
-):
-    rate = Rate("uncut", "energy_norm", None, width, "slowing: slopes 0.08, 0.01", [0.08, 0.01])
-    records = [solve(0, 0.1, solver="uncut"), solve(1, 0.09, solver="uncut")]
-    found = verdict({"check": "rate", "solver": "uncut", **limits}, records, [rate])
-    assert found.verdict is expected
-    assert found.reason.startswith("slowing")
 
 
 @pytest.mark.parametrize("status", [Status.FAILED, Status.TIMEOUT, Status.REFUSED, Status.MEMORY])
@@ -226,25 +207,16 @@ def by_solver(found):
     return {one.solver: one.verdict for one in found}
 
 
-def test_a_check_that_names_no_solver_is_made_of_each_but_the_reference():
-    records = [
-        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.01, "reference": 9}.items()
-    ]
-    assert by_solver(verdicts(BOUND, records)) == {"mine": FAIL, "xfem": PASS}
-
-
-def test_a_rate_is_judged_for_each_solver_by_its_own():
-    records = [solve(i, 0.1, solver=s) for s in ("mine", "xfem") for i in (0, 1)]
+def test_a_check_that_names_no_solver_is_made_of_each_by_its_own():
+    """But of the reference; a ratio of all but the one that they are compared with."""
+    half = {"mine": FAIL, "xfem": PASS}
+    records = [solve(0, e, solver=s) for s, e in (("mine", 1.0), ("xfem", 0.01), ("reference", 9))]
+    assert by_solver(verdicts(BOUND, records)) == half
+    records[2] = solve(0, 0.01, solver="conforming")
+    assert by_solver(verdicts(AT_MOST_TWICE, records)) == half
     rates = [Rate(s, "energy_norm", p, 0.01, "", [p, p]) for s, p in (("mine", 0.1), ("xfem", 1.0))]
-    found = verdicts({"check": "rate", "at_least": 0.9}, records, rates)
-    assert by_solver(found) == {"mine": FAIL, "xfem": PASS}
-
-
-def test_a_ratio_is_made_of_all_but_the_one_compared_with():
-    records = [
-        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.1, "conforming": 0.1}.items()
-    ]
-    assert by_solver(verdicts(AT_MOST_TWICE, records)) == {"mine": FAIL, "xfem": PASS}
+    records = [solve(i, 0.1, solver=s) for s in half for i in (0, 1)]
+    assert by_solver(verdicts({"check": "rate", "at_least": 0.9}, records, rates)) == half
 
 
 def test_what_a_reference_misses_that_was_left_out_is_undecided():
