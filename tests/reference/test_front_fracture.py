@@ -1,5 +1,7 @@
 """K_I, K_II, K_III and openings along fronts in space, against closed forms."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from fourth_order import difference
@@ -32,6 +34,7 @@ def prism_field(intensity, points, middles):
     return field
 
 
+@cache
 def prism(intensity, n=16):
     """Give the exact field at the nodes of P2 elements on a box cut along x < 0, y = 0."""
     grid = structured_tetrahedra((-1, -1, 0), (1, 1, 1), (n, n, n // 4))
@@ -51,7 +54,7 @@ def prism(intensity, n=16):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("intensity", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.7, -0.4, 0.5)])
+@pytest.mark.parametrize("intensity", [(1, 0, 0), (0.7, -0.4, 0.5)])
 def test_the_three_modes_are_told_apart_in_the_exact_fields_of_a_prism(intensity):
     field = prism(intensity)
     found = front_intensity(field, SOLID, FRONT, [0.4, 0.6, 0.8], stations=2)
@@ -64,11 +67,10 @@ def test_the_three_modes_are_told_apart_in_the_exact_fields_of_a_prism(intensity
     assert found.spread.max() < 6e-3
 
 
-@pytest.mark.parametrize("part", [(0.125, 0.875), (0.21, 0.93)])
-def test_stations_closer_than_the_elements_along_a_front_have_its_factors(part):
+def test_stations_closer_than_the_elements_along_a_front_have_its_factors():
     """Hats of 0.19 m between nodes 0.25 m apart are those of the nodes, not of the arc length."""
-    field = prism((0.7, -0.4, 0.5), 16)
-    front = StraightFront([0.0, 0.0, part[0]], [0.0, 0.0, part[1]], [1.0, 0.0, 0.0])
+    field = prism((0.7, -0.4, 0.5))
+    front = StraightFront([0.0, 0.0, 0.21], [0.0, 0.0, 0.93], [1.0, 0.0, 0.0])
     found = front_intensity(field, SOLID, front, [0.4, 0.6, 0.8], stations=3, fitted=False)
     assert found.modes == pytest.approx(np.tile([0.7, -0.4, 0.5], (3, 1)), abs=2e-2)
 
@@ -76,7 +78,7 @@ def test_stations_closer_than_the_elements_along_a_front_have_its_factors(part):
 def test_a_station_that_no_node_is_near_is_refused():
     front = StraightFront([0.0, 0.0, 0.26], [0.0, 0.0, 0.49], [1.0, 0.0, 0.0])
     with pytest.raises(InputError, match="no node of the mesh"):
-        front_intensity(prism((1, 0, 0), 16), SOLID, front, [0.6], stations=3, fitted=False)
+        front_intensity(prism((1, 0, 0)), SOLID, front, [0.6], stations=3, fitted=False)
 
 
 def test_the_intensity_does_not_depend_on_the_axes():
@@ -142,7 +144,7 @@ def test_the_curved_fields_are_what_differences_in_space_say(mode):
 
 def test_each_station_sees_its_own_intensity_whichever_others_are_asked_for():
     """A field whose K_I rises along the front: nodal sums are shared out by hats."""
-    field = prism((1, 0, 0), 16)
+    field = prism((1, 0, 0))
     rising = Solution(
         field.points, field.cells, field.displacement * (1 + field.points[:, 2:]), order=2,
         cut_facets=field.cut_facets,
@@ -172,25 +174,6 @@ class TestThePenny:
         )
         return find_solver("reference").solve(scene, level, repetitions=0)
 
-    @pytest.fixture(scope="class")
-    @classmethod
-    def fields(cls):
-        return [cls.solve(level) for level in range(2)]
-
-    def test_the_energy_converges_with_order_three_at_the_front(self, fields):
-        errors = [field.ledger["strain"][0] / 32.244473884 - 1 for field in fields]
-        assert 0 < errors[1] < 4e-3
-        assert np.log2(errors[0] / errors[1]) > 2.6
-
-    def test_the_intensity_along_the_front_is_sneddons_to_three_thousandths(self, fields):
-        mean = front_intensity(fields[1], SOLID, self.FRONT, [0.4, 0.5])
-        assert mean.modes / self.INTENSITY == pytest.approx(np.array([[1.0, 0, 0]]), abs=1e-3)
-        assert mean.spread.max() < 1e-3
-        local = front_intensity(fields[1], SOLID, self.FRONT, [0.5], stations=4)
-        assert local.modes[:, 0] / self.INTENSITY == pytest.approx(np.ones(4), abs=3e-3)
-        assert np.abs(local.modes[:, 1:]).max() < 3e-3
-
-    @pytest.mark.heavy
     def test_at_4999_a_free_face_leaves_the_intensity_as_exact_as_at_a_third(self):
         """Displacements all around give the crack's volume: K_I is 2 % off, as is the volume."""
         sides = ["left", "right", "front", "back", "bottom"]
@@ -205,7 +188,6 @@ class TestThePenny:
         found = front_intensity(field, material, self.FRONT, [0.4, 0.55], stations=4)
         assert found.modes[:, 0] / self.INTENSITY == pytest.approx(np.ones(4), abs=1e-3)
 
-    @pytest.mark.heavy
     def test_its_energy_is_known_to_a_thousandth(self):
         field = self.solve(0, 0.34)
         assert field.ledger["strain"][0] == pytest.approx(32.244473884, rel=1e-3)

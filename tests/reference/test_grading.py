@@ -1,6 +1,8 @@
 """Singular points, gradings and imprints: area, length and pieces, cuts in any place."""
 
+from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,19 +24,14 @@ from verify.solvers.conforming_meshes import reference_mesh
 UNIT = ((0.0, 0.0), (1.0, 1.0), (8, 8))
 
 
+@cache
+def unstructured():
+    return background_mesh(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]), 0.15)
+
+
 def cut_square(*polylines, mesh=None):
     points, cells = mesh or structured_triangles(*UNIT)
     return open_cut(*imprint(points, cells, [np.array(p, dtype=float) for p in polylines]))
-
-
-def check(mesh, length, pieces):
-    """Area, faces and length of the cut are kept."""
-    assert areas(mesh).sum() == pytest.approx(1.0, rel=1e-12)
-    assert exterior_facets(mesh) == len(mesh.boundary) + 2 * len(mesh.cut_facets)
-    first = np.unique(mesh.parent, return_index=True)[1]
-    ends = mesh.points[first[mesh.cut_facets]]
-    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(length, rel=1e-9)
-    assert mesh.pieces.max() + 1 == pieces
 
 
 # polylines, and the number of pieces that they leave
@@ -53,11 +50,24 @@ CUTS = {
 }
 
 
+@needs_fenicsx[0]
+@needs_fenicsx[1]
 @pytest.mark.parametrize("name", CUTS)
 def test_a_cut_in_any_place_keeps_area_and_length_and_opens_two_faces(name):
     polylines, pieces = CUTS[name]
     length = sum(length_in_square(np.array(polyline)) for polyline in polylines)
-    check(cut_square(*polylines), length, pieces)
+    for mesh in (cut_square(*polylines), cut_square(*polylines, mesh=unstructured())):
+        assert areas(mesh).sum() == pytest.approx(1.0, rel=1e-12)
+        assert exterior_facets(mesh) == len(mesh.boundary) + 2 * len(mesh.cut_facets)
+        # beside a mesh line a cut may follow it
+        assert length_of_cut(mesh) == pytest.approx(length, rel=1e-9)
+        assert mesh.pieces.max() + 1 == pieces
+
+
+def length_of_cut(mesh):
+    first = np.unique(mesh.parent, return_index=True)[1]
+    ends = mesh.points[first[mesh.cut_facets]]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
 
 
 def length_in_square(polyline):
@@ -102,23 +112,12 @@ def test_a_cut_a_sliver_away_from_edges_and_vertices_keeps_area_and_pieces(expon
 class TestOnUnstructuredMeshes:
     pytestmark = needs_fenicsx
 
-    @pytest.mark.parametrize("name", CUTS)
-    def test_a_cut_in_any_place_keeps_area_and_pieces(self, name):
-        polylines, pieces = CUTS[name]
-        outline = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-        mesh = cut_square(*polylines, mesh=background_mesh(outline, 0.15))
-        assert areas(mesh).sum() == pytest.approx(1.0, rel=1e-12)
-        assert exterior_facets(mesh) == len(mesh.boundary) + 2 * len(mesh.cut_facets)
-        assert mesh.pieces.max() + 1 == pieces
-
     def test_a_background_mesh_is_uniform_deterministic_and_ignores_cuts(self):
         outline = np.array([[0, 0], [3, 0], [3, 1], [1, 1], [1, 2.0], [0, 2.0]])
         points, cells = background_mesh(outline, 0.1)
         again, _ = background_mesh(outline, 0.1)
         assert np.array_equal(points, again)
-        corners = points[cells]
-        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        area = areas(SimpleNamespace(points=points, cells=cells))
         assert area.sum() == pytest.approx(4.0, rel=1e-12)
         # equilateral triangles of side 0.1 on average; none much larger or smaller
         assert area.mean() == pytest.approx(np.sqrt(3) / 4 * 0.01, rel=0.15)
@@ -183,9 +182,7 @@ class TestNearerThanTheMeshGeneratorCanGo:
             away = np.sort(np.linalg.norm(mesh.points - tip, axis=1))
             assert away[0] < 1e-15
             assert away[1] < 4 * grading.smallest
-        a, b, c = (mesh.points[mesh.cells[:, k]] for k in range(3))
-        area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-        assert area.sum() == pytest.approx(1.0, rel=1e-12)
+        assert areas(mesh).sum() == pytest.approx(1.0, rel=1e-12)
         # and the tips stay closed: a cut of F facets between two tips doubles F − 1 nodes
         assert len(mesh.parent) - len(np.unique(mesh.parent)) == len(mesh.cut_facets) - 1
 
@@ -193,7 +190,7 @@ class TestNearerThanTheMeshGeneratorCanGo:
     # terms of the height
     @pytest.mark.parametrize(
         "length, mouth, tip",
-        [(21.1, 0.224, (19.23, -0.178)), (29.7, -0.067, (24.66, 0.113)), (20.3, 0.236, (4.3, 0))],
+        [(29.7, -0.067, (24.66, 0.113)), (20.3, 0.236, (4.3, 0))],
     )
     def test_no_facet_is_lost_at_the_tip_in_a_slender_body(self, length, mouth, tip):
         scene = square(
@@ -232,22 +229,19 @@ def factors_of(cuts):
 
 
 @pytest.mark.parametrize("cuts", SHORT.values(), ids=SHORT)
-@pytest.mark.parametrize("level", [0, 1])
-class TestAroundShortBranches:
-    pytestmark = needs_fenicsx
-
-    def test_domains_fit_around_every_tip_on_the_coarsest_level_too(self, cuts, level):
-        scene = square(cuts, **WIDE, quantities=factors_of(cuts))
-        mesh, _ = reference_mesh(scene, level)
-        field = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))
-        found = tips(scene)
-        assert len(found) == (3 if len(cuts) == 3 else 4)
-        for tip in found:
-            for radius in tip.radii():
-                around = ring(field, tip.point, float(radius))
-                # elements of a third of the smallest radius, halved with every level: a ring of
-                # them has 2π 3 2^level of at least two triangles each
-                assert len(around.cells) > 30 * 2**level
+@needs_fenicsx[0]
+@needs_fenicsx[1]
+def test_domains_fit_around_every_tip_on_the_coarsest_level_too(cuts):
+    scene = square(cuts, **WIDE, quantities=factors_of(cuts))
+    mesh, _ = reference_mesh(scene, 0)
+    field = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))
+    found = tips(scene)
+    assert len(found) == (3 if len(cuts) == 3 else 4)
+    for tip in found:
+        for radius in tip.radii():
+            around = ring(field, tip.point, float(radius))
+            # elements of a third of the smallest radius: a ring of 2π 3 of at least two triangles
+            assert len(around.cells) > 30
 
 
 def test_only_tips_that_are_asked_for_and_lie_close_to_something_are_graded_to_anew():
@@ -270,8 +264,13 @@ def test_only_tips_that_are_asked_for_and_lie_close_to_something_are_graded_to_a
     assert close(common, factors_of(common)) == []
 
 
-@pytest.mark.parametrize("reversed_cell", [False, True])
-@given(angle=st.floats(0, 2 * np.pi), off=st.floats(-1e-9, 1e-9), place=st.floats(0.1, 0.9))
+@settings(max_examples=40, deadline=None)
+@given(
+    reversed_cell=st.booleans(),
+    angle=st.floats(0, 2 * np.pi),
+    off=st.floats(-1e-9, 1e-9),
+    place=st.floats(0.1, 0.9),
+)
 def test_a_flat_cell_between_nodes_of_a_cut_is_flipped_into_its_neighbour(
     reversed_cell, angle, off, place
 ):
@@ -280,9 +279,7 @@ def test_a_flat_cell_between_nodes_of_a_cut_is_flipped_into_its_neighbour(
     flat = [0, 2, 1] if reversed_cell else [0, 1, 2]
     cells, cut = np.array([flat, [0, 2, 3], [0, 4, 1], [1, 4, 2]]), np.array([[0, 1], [1, 2]])
     flipped = flip_flat_cells(points, cells, cut)
-    corners = points[flipped]
-    edges = corners[:, 1:] - corners[:, :1]
-    area = 0.5 * (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    area = areas(SimpleNamespace(points=points, cells=flipped))
     assert area.min() > 0.02
     assert area.sum() == pytest.approx(0.75, rel=1e-8)
     held = {frozenset(pair) for cell in flipped.tolist() for pair in ((*cell[:2],), (*cell[1:],))}
@@ -290,31 +287,3 @@ def test_a_flat_cell_between_nodes_of_a_cut_is_flipped_into_its_neighbour(
     assert {frozenset(pair) for pair in cut.tolist()} <= held
     marked = np.array([[0, 1], [1, 2], [0, 2]])
     assert np.array_equal(flip_flat_cells(points, cells, marked), cells)
-
-
-class TestFlatCells:
-    pytestmark = needs_fenicsx
-
-    def test_a_cut_that_gmsh_leaves_flat_cells_at_has_a_reference(self):
-        """A branch on a cut, a round region, K at the ends: three nodes on the cut are a cell."""
-        corners = [[0, 0], [0.07, -0.004], [0.075, 0.03], [0.03, 0.041], [-0.003, 0.028]]
-        cuts = [
-            polyline("a", (0.0203, 0.0107), (0.0391, 0.0193)),
-            polyline("b", (0.0297, 0.015), (0.0345, 0.0055)),
-        ]
-        round_region = {"where": "hypot(x - 0.05, y - 0.01) < 0.0123", "young": 1.5e4}
-        given_scene = square(
-            cuts,
-            geometry={"kind": "polygon", "corners": corners},
-            mesh={"pattern": "unstructured", "sizes": [0.006]},
-            material=scenes.soft(density=1.0, regions=[round_region]),
-            quantities=[one for one in factors_of(cuts) if one["name"] != "b start"],
-        )
-        mesh, _ = reference_mesh(given_scene, 2)
-        x, y = np.array(corners).T
-        exact = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
-        assert areas(mesh).sum() == pytest.approx(exact, rel=1e-12)
-        lengths = sum(np.linalg.norm(np.subtract(*cut["points"])) for cut in cuts)
-        first = np.unique(mesh.parent, return_index=True)[1]
-        ends = mesh.points[first[mesh.cut_facets]]
-        assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(lengths)

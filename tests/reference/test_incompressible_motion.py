@@ -30,12 +30,9 @@ def solved(scene, level=0):
 
 
 def test_a_body_in_equilibrium_stays_where_statics_with_a_pressure_finds_it():
-
     scene = swinging(initial={"kind": "equilibrium", "cuts": "open"})
-    found, static = (
-        solved(scene),
-        solved(scene.model_copy(update={"analysis": type(scene.analysis)()})),
-    )
+    still = scene.model_copy(update={"analysis": type(scene.analysis)()})
+    found, static = solved(scene), solved(still)
     assert found.notes["unknowns"] == static.notes["unknowns"] == "displacement and pressure"
     assert found.ledger["strain"] == pytest.approx(static.ledger["strain"][0], rel=1e-8)
     size = np.abs(static.displacement).max()
@@ -44,15 +41,14 @@ def test_a_body_in_equilibrium_stays_where_statics_with_a_pressure_finds_it():
     assert found.ledger["kinetic"].max() < 1e-12 * found.ledger["strain"][0]
 
 
-@pytest.mark.parametrize("damping", [(0.0, 0.0), (1.0, 1e-3)])
-def test_the_account_closes_and_a_cut_that_opens_on_the_way_costs_next_to_nothing(damping):
+def test_the_account_closes_and_a_cut_that_opens_on_the_way_costs_next_to_nothing():
     scene = swinging([SLIT | {"opens_at": 0.1}], poisson=0.49)
-    damped = scene.analysis.model_copy(update={"damping": damping})
+    damped = scene.analysis.model_copy(update={"damping": (1.0, 1e-3)})
     ledger = solved(scene.model_copy(update={"analysis": damped})).ledger
     assert spread(ledger["total"] + ledger["kinetic"].max()) < 1e-10
     # pressures that may jump across the cut take up a little more of div u, the scheme takes some
     assert abs(ledger["algorithmic"][-1]) < 0.02 * ledger["strain"].max()
-    assert (ledger["damping"][-1] > 0) == bool(damping[0])
+    assert ledger["damping"][-1] > 0
 
 
 def test_a_pressure_halves_the_error_of_a_coarse_mesh_in_motion(monkeypatch):

@@ -107,7 +107,7 @@ VALUES = {
     "single edge .5": edge(0.5, 2.825465, 2.2995892, 9.0036825),
     "single edge .6": edge(0.6, 4.033332, 4.1256056, 18.123400, marks=HEAVY),
     "edge under tension": moes((9.366536, 0.0), TENSION, marks=HEAVY),
-    "edge under shear": moes((34.0426, 4.5370), {"top": [1, 0]}, CLAMPED),
+    "edge under shear": moes((34.0426, 4.5370), {"top": [1, 0]}, CLAMPED, marks=HEAVY),
     "centre .3": centre(0.3, 1.123191),
     "centre .5": centre(0.5, 1.333712),
     "centre .7": centre(0.7, 1.677138),
@@ -184,8 +184,8 @@ def test_a_faceted_circle_converges_with_the_square_of_its_facets():
     )
     known = exact_solution("circular_cut", scene.exact.parameters, scene.material)
     exact = known.strain_energy(scene)
-    levels = [find_solver("reference").solve(scene, k, repetitions=0) for k in (1, 2, 3)]
+    levels = [find_solver("reference").solve(scene, k, repetitions=0) for k in (0, 1, 2)]
     errors = [level.ledger["strain"][0] / exact - 1 for level in levels]
     # P2 would be of order 4 on the facets; what is left is the area between them and the arc
     assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2.0, abs=0.1)
-    assert 0 < errors[2] < 5e-5
+    assert 0 < errors[2] < 2e-4

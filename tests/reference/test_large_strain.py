@@ -20,13 +20,7 @@ pytestmark = needs_fenicsx
 
 @pytest.mark.parametrize(
     ("d", "degree", "poisson", "pressure"),
-    [
-        (2, 1, 0.3, False),
-        (3, 1, 0.3, False),
-        (3, 2, 0.3, False),
-        (2, 2, 0.49, True),
-        (3, 2, 0.49, True),
-    ],
+    [(2, 2, 0.49, True), (3, 1, 0.3, False), (3, 2, 0.3, False)],
 )
 def test_halves_turned_each_by_its_own_rotation_are_stretched_exactly(d, degree, poisson, pressure):
     """Sides are free: 2μ (a − 1) + λ tr (U − I) = 0 for the stretch a across the pull."""
@@ -62,39 +56,6 @@ def test_bending_converges_with_twice_the_degree(degree, order):
         )
         errors.append(found.strain_energy / 4.4748894293e-4 - 1)
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
-
-
-def test_a_split_strip_peels_into_opposite_half_circles():
-    space = space_of(2, (16, 160), (-0.05, 0.0), (0.05, 1.0), [[[0.0, -0.1], [0.0, 1.1]]])
-    points = space.node_points
-    right = np.zeros(len(points), dtype=bool)
-    right[space.cell_nodes[space.centroids[:, 0] > 0]] = True
-    mirror = np.where(right, 1.0, -1.0)[:, None] * [1.0, 0.0] + [0.0, 1.0]
-
-    def field(factor):
-        own = points * mirror - [0.025, 0.0]  # both halves as the right one, about its middle
-        return rolled(own, -factor * np.pi, 0.05) * mirror
-
-    found = solve(space, on_ends(space), field)
-    assert found.strain_energy == pytest.approx(1.12698177e-4, rel=1e-6)
-
-
-def test_small_loads_give_the_linear_answer():
-    cut = polyline("cut", (-0.1, 0.5), (0.5, 0.5))
-    opening = [{"kind": "opening", "name": "mouth", "at": 0.2}]
-    held = [{"where": "bottom", "displacement": [0, 0]}]
-    load = [{"kind": "traction", "where": "top", "traction": [0, 1e-6]}]
-    arguments = {"supports": held, "loads": load, "quantities": opening}
-    linear = square([cut], **arguments)
-    finite = square([cut], analysis={"kinematics": "corotational"}, **arguments)
-    one, two = (
-        find_solver("conforming").solve(scene, 0, repetitions=0) for scene in (linear, finite)
-    )
-    # the difference is of second order in strains of 1e-6, some ten times larger at the tip
-    scale = np.abs(one.displacement).max()
-    assert np.abs(two.displacement - one.displacement).max() < 1e-4 * scale
-    assert two.ledger["strain"][0] == pytest.approx(one.ledger["strain"][0], rel=1e-4)
-    assert two.iterations["newton"] >= 1
 
 
 def test_what_turns_inside_out_at_a_tip_is_measured_and_stays_a_point():
@@ -158,23 +119,25 @@ def thin(load, slenderness, young=1.2e7):
 def tip(load, slenderness, level):
     """Tip of that strip by the reference, over its length; the path must be short."""
     found = find_solver("reference").solve(thin(load, slenderness), level, repetitions=0)
-    assert found.iterations["load steps"] <= 40
-    assert found.iterations["newton"] <= 400
+    assert_few(found.iterations["load steps"], found.iterations["newton"])
     end = np.argmin(np.linalg.norm(found.points - [10.0, 5.0 / slenderness], axis=1))
     return (found.points[end] + found.displacement[0, end] - [0.0, 5.0 / slenderness]) / 10
 
 
-@pytest.mark.parametrize("load", [2.0, 3.0, 10.0])
-def test_the_tip_of_a_thin_strip_is_that_of_the_elastica_in_few_steps(load):
+def assert_few(steps, iterations):
+    assert steps <= 40
+    assert iterations <= 400
+
+
+def test_the_tip_of_a_thin_strip_is_that_of_the_elastica_in_few_steps():
     """Shear and stretch add PL²/EI (h/L)² times a number of order one."""
-    assert tip(load, 100, 0) == pytest.approx(elastica(load), abs=load * 1e-4)
+    assert tip(10.0, 100, 0) == pytest.approx(elastica(10.0), abs=1e-3)
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("load", [2.0, 3.0, 10.0])
-def test_a_thin_strip_tends_to_the_elastica_like_the_square_of_its_thickness(load):
+def test_a_thin_strip_tends_to_the_elastica_like_the_square_of_its_thickness():
     """Quarters to 5 %, which the next power may add; half-widths to a tenth of the difference."""
-    away = []
+    away, load = [], 10.0
     for slenderness in (25, 50, 100):
         tips = np.array([tip(load, slenderness, level) for level in range(3)])
         away.append(tips[-1] - elastica(load))
@@ -183,33 +146,6 @@ def test_a_thin_strip_tends_to_the_elastica_like_the_square_of_its_thickness(loa
         assert width <= 0.1 * np.linalg.norm(away[-1])
     assert away[0] / away[1] == pytest.approx([4.0, 4.0], rel=0.05)
     assert away[1] / away[2] == pytest.approx([4.0, 4.0], rel=0.05)
-
-
-def test_a_thin_inclined_flap_turns_in_few_steps():
-    """A strip at an odd angle, cut lengthwise from its end; the upper lip bears PL²/EI = 10."""
-    length, slenderness, angle = 10.0, 60, 2.2
-    height, (c, s) = 2 * length / slenderness, (np.cos(angle), np.sin(angle))
-    turned = np.array([[c, s], [-s, c]])
-    corners = np.array([[0, 0], [length, 0], [length, height], [0, height]]) @ turned
-    cut = np.array([[0.15 * length, 0.47 * height], [1.02 * length, 0.53 * height]]) @ turned
-    along, across = f"{c} * x + {s} * y", f"{-s} * x + {c} * y"
-    load = 10.0 / slenderness**2 / 12
-    scene = scenes.scene(
-        [polyline("cut", *cut.tolist())],
-        geometry={"kind": "polygon", "corners": corners.tolist()},
-        mesh={"pattern": "unstructured", "sizes": [height / 3]},
-        material={"young": 1.0, "poisson": 0.3, "plane": "strain"},
-        analysis={"kinematics": "corotational"},
-        supports=[{"where": f"{along} < 1e-6", "displacement": [0.0, 0.0]}],
-        loads=[
-            {"kind": "traction", "traction": [-s * load, c * load],
-             "where": f"{along} > {length - 1e-6} and {across} > {0.53 * height}"},
-        ],
-    )  # fmt: skip
-    found = find_solver("reference").solve(scene, 0, repetitions=0)
-    assert np.abs(found.displacement).max() > 0.5 * length
-    assert found.iterations["load steps"] <= 40
-    assert found.iterations["newton"] <= 400
 
 
 def end_load(force, length, v):
@@ -221,14 +157,14 @@ def end_load(force, length, v):
     return at_end * ufl.inner(ufl.as_vector(force), v) * ufl.ds
 
 
-def slender_block(**parameters):
+def slender_block():
     """A block of 1 × 0.03 × 0.03 under a dead load askew at its end, PL²/EI = 6, ν = 0."""
     space = space_of(2, (16, 1, 1), upper=(1.0, 0.03, 0.03))
     across = 6.0 * 0.03**2 / 12 * np.array([0.0, 0.8, 0.6])
     held = space.node_points[:, 0] < 1e-12
     still = np.zeros_like(space.node_points)
     load = forces_of(space, partial(end_load, across, 1.0))
-    found = solve(space, held, lambda _: still, poisson=0.0, load=load, **parameters)
+    found = solve(space, held, lambda _: still, poisson=0.0, load=load)
     end = space.node_points[:, 0] > 1 - 1e-12
     return found, found.displacement[end].mean(axis=0)
 
@@ -236,20 +172,16 @@ def slender_block(**parameters):
 def test_a_slender_block_turns_in_few_steps_along_its_load():
     """Its section has no axis of its own: the plane of the elastica is that of the load."""
     found, moved = slender_block()
-    assert found.steps <= 40
-    assert found.iterations <= 400
+    assert_few(found.steps, found.iterations)
     assert not found.nested  # linear elements lock: they end far from here
     plane = moved @ np.array([[1.0, 0.0], [0.0, 0.8], [0.0, 0.6]])
     assert moved @ [0.0, 0.6, -0.8] == pytest.approx(0.0, abs=1e-3)
     # shear and stretch: of the order of PL²/EI (h/L)², and the error of the coarse mesh
     assert plane == pytest.approx(elastica(6.0) - [1.0, 0.0], abs=6 * 0.03**2)
-    slowly, _ = slender_block(first_step=0.1)
-    assert slowly.steps > found.steps
-    assert found.strain_energy == pytest.approx(slowly.strain_energy, rel=1e-9)
+    assert found.method == "PETSc SNES, MUMPS Cholesky"
 
 
-def test_the_record_names_the_solver_that_ran(monkeypatch):
-    assert slender_block()[0].method == "PETSc SNES, MUMPS Cholesky"
+def test_the_record_names_the_iterative_solver_that_ran(monkeypatch):
     monkeypatch.setattr(large_strain, "_MOST_DIRECT", 0)
     space = space_of(1, (3, 3, 3))
     found = solve(space, on_ends(space), lambda f: 0.1 * f * space.node_points * [0, 1, 0])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fourth_order import difference
 from reference_scenes import square
 
 from reference.exact import exact_solution
@@ -27,16 +28,10 @@ def scene(**changes) -> Scene:
     return square(**given | changes)
 
 
-@pytest.fixture(scope="module")
-def patch() -> tuple[Scene, object]:
-    case = load_scene("material/layers_patch")
-    assert case.exact is not None
-    return case, exact_solution(case.exact.solution, case.exact.parameters, case.material)
-
-
-def test_the_layered_field_is_in_equilibrium_with_each_material(patch) -> None:
+def test_the_layered_field_is_in_equilibrium_with_each_material() -> None:
     """Stress by Hooke's law of each point's own material, against the tension that is stated."""
-    case, exact = patch
+    case = load_scene("material/layers_patch")
+    exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
     points = np.random.default_rng(3).uniform(0.0, 1.0, (200, 2))
     law, gradient = law_of(case).at(points), exact.gradient(points)
     strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
@@ -44,29 +39,7 @@ def test_the_layered_field_is_in_equilibrium_with_each_material(patch) -> None:
     stress = 2 * law.shear[:, None, None] * strain
     stress += (law.lame * trace)[:, None, None] * np.eye(2)
     assert np.abs(stress - exact.stress(points)).max() < 1e-14
-    steps = 1e-7 * np.eye(2)
-    for i in range(2):
-        difference = exact.displacement(points + steps[i]) - exact.displacement(points - steps[i])
-        assert np.abs(difference / 2e-7 - gradient[:, :, i]).max() < 1e-8
-
-
-@pytest.mark.parametrize("name", SOLVERS)
-def test_a_free_turn_stores_nothing_in_any_material(name: str) -> None:
-    """Round-off of strains, 1e-15, squared, over the energy of strains of 1."""
-    turned = scene(
-        supports=[
-            {
-                "where": "boundary",
-                "displacement": [0.2, -0.1],
-                "rotation": {"angle": 77.0, "centre": [0.1, 0.3]},
-            }
-        ],
-        cuts=[CUT],
-        analysis={"kinematics": "finite_rotation"},
-    )
-    found = find_solver(name).solve(turned, 0, 0)
-    assert strain_energy(found, law_of(turned)) < 1e-20
-    assert float(found.ledger["strain"][0]) < 1e-20
+    assert np.abs(difference(exact.displacement, points, 1e-4) - gradient).max() < 1e-8
 
 
 @pytest.mark.parametrize("name", SOLVERS)

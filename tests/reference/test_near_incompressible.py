@@ -1,10 +1,11 @@
 """Locking: what an element loses as Poisson's ratio goes to 1/2, and pressures gain."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from large_bodies import bent, lame, on_ends, rolled, solve, space_of
+from large_bodies import lame, on_ends, solve, space_of
 from reference_scenes import TENSION, energy_of, needs_fenicsx, plate, polyline, square
 from solid_scenes import cube, polygon
 
@@ -33,14 +34,19 @@ def plane(poisson, **changes):
     )
 
 
-def loss(scene, degree, level):
-    """Share of the energy that ungraded elements miss: what tip and clamps cost, and locking."""
-    limit = energy_of(scene, "reference", level=level)
-    return 1 - energy_of(scene, "conforming", degree=degree) / limit
+@cache
+def reference(poisson, level):
+    return find_solver("reference").solve(plane(poisson), level, repetitions=0)
+
+
+def losses(poisson):
+    """Shares of the energy that linear and quadratic elements miss: tip, clamps and locking."""
+    limit = reference(poisson, 1).ledger["strain"][0]
+    return [1 - energy_of(plane(poisson), "conforming", degree=p) / limit for p in (1, 2)]
 
 
 def test_linear_elements_lock_and_quadratic_ones_do_not():
-    stiff, soft = ([loss(plane(nu), p, 1) for p in (1, 2)] for nu in (0.49, 0.3))
+    stiff, soft = losses(0.49), losses(0.3)
     assert stiff[0] > 2 * soft[0] > 0  # 44 % of the energy missing, 19 % at 0.3
     assert 0 < stiff[1] < 1.5 * soft[1]  # 7.1 % and 5.3 %: tip and clamps
 
@@ -84,6 +90,7 @@ def waving(poisson, n, d):
     return square(through, material=material, mesh={"cells": [[n, n]]}, exact=WAVES, **EXACT)
 
 
+@cache
 def errors(poisson, n, d, **parameters):
     """Largest nodal errors over the largest displacement without and with a pressure."""
     scene = waving(poisson, n, d)
@@ -101,10 +108,9 @@ def errors(poisson, n, d, **parameters):
 
 @pytest.mark.parametrize("d, n", [(2, 8), (3, 2)])
 def test_a_pressure_keeps_the_error_that_the_element_has_at_a_third_up_to_a_half(d, n):
-    pure, mixed = zip(*(errors(nu, n, d) for nu in (0.3, 0.49, 0.4999)), strict=True)
-    assert max(mixed) < 2 * mixed[0]
-    assert pure[1] > 1.5 * pure[0]
-    assert pure[2] > 4 * mixed[2]
+    pure, mixed = zip(*(errors(nu, n, d) for nu in (0.3, 0.4999)), strict=True)
+    assert mixed[1] < 2 * mixed[0]
+    assert pure[1] > max(1.5 * pure[0], 4 * mixed[1])
 
 
 def test_the_error_with_a_pressure_falls_with_the_order_of_the_element_at_4999():
@@ -113,17 +119,15 @@ def test_the_error_with_a_pressure_falls_with_the_order_of_the_element_at_4999()
     assert np.log2(pure / finer) < 2.5
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
-def test_minres_gives_the_answer_of_a_factorisation(poisson):
-    direct, iterated = (errors(poisson, 3, 3, method=m)[1] for m in ("direct", "multigrid"))
+def test_minres_gives_the_answer_of_a_factorisation():
+    direct, iterated = (errors(0.4999, 2, 3, method=m)[1] for m in ("direct", "multigrid"))
     assert iterated == pytest.approx(direct, rel=1e-6)  # residual 1e-10, errors of some 1e-3
 
 
 def test_the_reference_takes_a_pressure_by_itself_and_converges_from_the_first_level():
-    solver = find_solver("reference")
-    one, two = (solver.solve(plane(0.49), level, repetitions=0) for level in (0, 1))
+    one, two = (reference(0.49, level) for level in (0, 1))
     assert one.notes["unknowns"] == "displacement and pressure"
-    assert solver.solve(plane(0.3), 0, repetitions=0).notes["unknowns"] == "displacement"
+    assert reference(0.3, 1).notes["unknowns"] == "displacement"
     # the potential energy is a saddle value: no bound, but close
     assert one.ledger["strain"][0] == pytest.approx(two.ledger["strain"][0], rel=5e-4)
 
@@ -143,13 +147,12 @@ def test_the_pressure_that_a_solution_leaves_out_is_found_again_from_its_displac
     assert energy == pytest.approx(found.ledger["strain"][0], rel=1e-9)
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
-def test_stress_intensities_are_as_exact_at_4999_as_at_a_third(poisson):
+def test_stress_intensities_are_as_exact_at_4999_as_at_a_third():
     """Tractions alone: K is the same for every ν."""
     cut = polyline("a", (0, 1), (0.5, 1))
-    scene = plate(1, 2, [cut], TENSION, poisson=poisson)
+    scene = plate(1, 2, [cut], TENSION, poisson=0.4999)
     found = find_solver("reference").solve(scene, 1, repetitions=0)
-    assert (found.notes["unknowns"] == "displacement and pressure") == (poisson > 0.45)
+    assert found.notes["unknowns"] == "displacement and pressure"
     (tip,) = tips(scene)
     of = [found, replace(found, notes={})]  # the second time with Hooke's stress of u alone
     one, blind = (
@@ -158,9 +161,8 @@ def test_stress_intensities_are_as_exact_at_4999_as_at_a_third(poisson):
         - 1
         for f in of
     )
-    assert abs(one) < 2e-5  # 9e-6 and 11e-6
-    if poisson > 0.45:
-        assert abs(blind) > 20 * abs(one)
+    assert abs(one) < 2e-5  # 11e-6, and 9e-6 at 0.3
+    assert abs(blind) > 20 * abs(one)
 
 
 def sector(height, curvature):
@@ -185,72 +187,39 @@ def bent_energy(height, curvature, mu, lam):
 HEIGHT, CURVATURE = 0.4, 2.0
 
 
-def bending_errors(law, poisson, d, lower, path, wanted):
-    """Errors of the energy without and with a pressure of a thick strip whose ends turn.
-
-    `path` gives displacements in the plane at a curvature; `wanted` is the energy per depth.
-    """
-    upper = [lower + HEIGHT, 1.0, 0.2]
-    space = space_of(2, (3, 8, 1)[:d], [lower, 0.0, 0.0], upper)
-    held = np.repeat(on_ends(space)[:, None], d, axis=1)
-    held[:, 2:] = True  # in space: no motion across the plane
+def test_a_thick_strip_of_neo_hookean_material_bends_to_rivlins_sector():
+    """Its energy, without and with a pressure."""
+    poisson, space = 0.4999, space_of(2, (3, 8), [0.0, 0.0], [HEIGHT, 1.0])
+    X, Y = space.node_points.T
 
     def field(factor):
-        moved = np.zeros_like(space.node_points)
-        if factor > 0.0:
-            moved[:, :2] = path(space.node_points[:, :2], factor * CURVATURE)
-        return moved
-
-    found = (
-        solve(space, held, field, poisson, energy=law, pressure=pressure)
-        for pressure in (False, True)
-    )
-    return [abs(one.strain_energy / wanted / (1.0 if d == 2 else 0.2) - 1) for one in found]
-
-
-@pytest.mark.parametrize(
-    "poisson, d", [(0.49, 2), (0.4999, 2), pytest.param(0.4999, 3, marks=pytest.mark.heavy)]
-)
-def test_a_thick_strip_of_neo_hookean_material_bends_to_rivlins_sector(poisson, d):
-    def path(points, curvature):
-        X, Y = points.T
-        r = np.sqrt(sector(HEIGHT, curvature)[0] ** 2 + 2 * X / curvature)
-        return np.column_stack([r * np.cos(curvature * Y), r * np.sin(curvature * Y)]) - points
+        if factor == 0.0:
+            return np.zeros_like(space.node_points)
+        k = factor * CURVATURE
+        r = np.sqrt(sector(HEIGHT, k)[0] ** 2 + 2 * X / k)
+        return np.column_stack([r * np.cos(k * Y), r * np.sin(k * Y)]) - space.node_points
 
     lam, mu = lame(poisson)
     wanted = bent_energy(HEIGHT, CURVATURE, mu, lam)
-    pure, mixed = bending_errors("neo_hookean", poisson, d, 0.0, path, wanted)
-    # the next term of the energy is of the order of (μ/λ)², and the mesh is coarse
-    assert mixed < 5e-4 + 3 * ((1 - 2 * poisson) / (2 * poisson)) ** 2
-    assert pure > 10 * mixed
-
-
-@pytest.mark.parametrize("poisson, worse", [(0.3, 0.5), (0.49, 5), (0.4999, 50)])
-def test_a_thick_strip_bends_as_exactly_at_4999_as_at_a_third(poisson, worse):
-    """The energy is off by 5.1e-4 with a pressure at every ν, without one by up to 5.0e-2."""
-    lam, mu = lame(poisson)
-    x, weights = np.polynomial.legendre.leggauss(40)
-    radius, slope = bent(HEIGHT, CURVATURE, poisson)
-    X = 0.5 * HEIGHT * x
-    along, across = CURVATURE * radius(X) - 1, slope(X) - 1
-    density = mu * (along**2 + across**2) + lam / 2 * (along + across) ** 2
-    wanted = 0.5 * HEIGHT * weights @ density
-    pure, mixed = bending_errors(
-        "corotated", poisson, 2, -HEIGHT / 2, lambda p, k: rolled(p, k, HEIGHT, poisson), wanted
+    pure, mixed = (
+        solve(space, on_ends(space), field, poisson, energy="neo_hookean", pressure=pressure)
+        for pressure in (False, True)
     )
-    assert mixed < 1e-3
-    assert pure > worse * mixed
+    # the next term of the energy is of the order of (μ/λ)², and the mesh is coarse
+    off = abs(mixed.strain_energy / wanted - 1)
+    assert off < 5e-4
+    assert abs(pure.strain_energy / wanted - 1) > 10 * off
 
 
 def test_the_reference_takes_a_pressure_at_finite_rotation_in_the_plane():
     """Small loads: its energy is that of linear kinematics with a pressure."""
 
-    def reference(kinematics, poisson=0.4999):
-        loads = [{"kind": "traction", "where": "top", "traction": [0, 1e-5]}]
-        scene = plane(poisson, loads=loads, analysis={"kinematics": kinematics})
-        return find_solver("reference").solve(scene, 0, repetitions=0)
-
-    linear, finite = reference("linear"), reference("corotational")
+    loads = [{"kind": "traction", "where": "top", "traction": [0, 1e-5]}]
+    linear, finite = (
+        find_solver("reference").solve(
+            plane(0.4999, loads=loads, analysis={"kinematics": kinematics}), 0, repetitions=0
+        )
+        for kinematics in ("linear", "corotational")
+    )
     assert finite.notes["unknowns"] == "displacement and pressure"
     assert finite.ledger["strain"][0] == pytest.approx(linear.ledger["strain"][0], rel=1e-3)
-    assert reference("corotational", 0.3).notes["unknowns"] == "displacement"

@@ -116,7 +116,7 @@ class Drawn:
             assert done == pytest.approx(self.work(gradient, shift, side), rel=1e-12, abs=1e-13)
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(4))
 @pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (1, 3))])
 def test_a_load_is_that_of_its_piece_for_every_way_to_cut(d, cells, number):
     drawn = Drawn(d, number)
@@ -131,9 +131,8 @@ def test_a_load_is_that_of_its_piece_for_every_way_to_cut(d, cells, number):
         drawn.check(problem.nodal_forces(), problem.points, problem.points, sided=False)
 
 
-@pytest.mark.parametrize("number", range(4))
-@pytest.mark.parametrize(("d", "cells"), [(2, (3, 7)), (3, (2,))])
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(("number", "degree"), [(0, 2), (1, 1), (3, 2)])
+@pytest.mark.parametrize(("d", "cells"), [(2, (7,)), (3, (2,))])
 def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degree):
     from reference.boundary_conditions import load_forces
     from reference.space import conforming_space
@@ -141,8 +140,7 @@ def test_a_load_is_that_of_its_piece_on_conforming_meshes(d, cells, number, degr
 
     drawn = Drawn(d, number)
     scene = drawn.scene(cells)
-    meshes = [peer_mesh(scene, level, "imprinted") for level in range(len(cells))]
-    for mesh in (*meshes, reference_mesh(scene, 0)[0]):
+    for mesh in (peer_mesh(scene, 0, "imprinted"), reference_mesh(scene, 0)[0]):
         space = conforming_space(mesh, degree)
         forces = load_forces(scene, space, None).reshape(-1, d)
         drawn.check(forces, space.node_points, space.beside_nodes())
@@ -159,12 +157,9 @@ def program(monkeypatch):
         sys.modules.pop(name, None)
 
 
-@pytest.mark.parametrize("number", (1, 3))
 @pytest.mark.parametrize("d", (2, 3))
-def test_a_program_that_cuts_elements_loads_and_holds_each_side_for_itself(
-    d, number, program, tmp_path
-):
-    drawn = Drawn(d, number)
+def test_a_program_that_cuts_elements_loads_and_holds_each_side_for_itself(d, program, tmp_path):
+    drawn = Drawn(d, 1)
     scene = drawn.scene([3])
     side = " + ".join(f"({a!r})*{x}" for a, x in zip(drawn.across.tolist(), "xyz", strict=False))
     # the side of the cut on which there is something of the part
@@ -194,7 +189,7 @@ def test_a_program_that_cuts_elements_loads_and_holds_each_side_for_itself(
 
 
 PARTED = {
-    "mesh": {"cells": [[5, 5], [9, 9]]},
+    "mesh": {"cells": [[5, 5]]},
     "material": {"young": 1.0, "poisson": 0.0, "plane": "strain"},
     "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
     "loads": [
@@ -204,15 +199,11 @@ PARTED = {
 }
 
 
-@pytest.mark.parametrize(
-    "solver",
-    ["xfem", *SIDED, "snapping", "conforming", "reference"],
-)
+@pytest.mark.parametrize("solver", ["xfem", *SIDED, "snapping", "conforming", "reference"])
 def test_a_load_that_reaches_to_a_cut_stretches_its_own_half_only(solver):
     scene = scenes.scene([{"kind": "polyline", "points": [[-0.1, 0.5], [1.1, 0.5]]}], **PARTED)
-    for level in range(2):
-        energy = find_solver(solver).solve(scene, level, 0).ledger["strain"][-1]
-        assert energy == pytest.approx(0.25, rel=1e-8)
+    energy = find_solver(solver).solve(scene, 0, 0).ledger["strain"][-1]
+    assert energy == pytest.approx(0.25, rel=1e-8)
 
 
 def energies(scene, solver, levels):
@@ -221,52 +212,13 @@ def energies(scene, solver, levels):
     ]
 
 
-def held_to(where, d, cells, cuts=(), **more):
-    """A body that is held on a part which ends inside facets, and pulled aside."""
-    return scenes.scene(
-        cuts,
-        d,
-        mesh={"cells": [[n] * d for n in cells]},
-        supports=[{"where": where, "displacement": [0.0] * d}],
-        loads=[{"kind": "traction", "where": "right", "traction": [1.0, 0.5, 0.3][:d]}],
-        **more,
-    )
-
-
-@pytest.mark.parametrize("number", range(4))
-def test_energies_rise_to_the_reference_where_a_support_ends_in_a_facet(number):
-    # what is held shrinks to the part, in nested spaces: the energy under a load rises
-    rng = np.random.default_rng([SEED, 2, 100 + number])
-    end = rng.uniform(0.55, 0.9)
-    # where a cut comes out, the upper part is held by what the part reaches beyond it: at least
-    # three elements of the finest mesh
-    left, right = end - rng.uniform(0.13, 0.3), rng.uniform(0.3, 0.7)
-    slope = right - left
-    cut = [[-0.1, left - 0.1 * slope], [1.1, right + 0.1 * slope]]
-    cuts = [{"kind": "polyline", "points": cut}] if number % 2 else []
-    reference = {"size": 0.2, "levels": 3}
-    scene = held_to(f"x < 1e-6 and y < {end!r}", 2, (3, 6, 12, 24), cuts, reference=reference)
-    (finest,) = energies(scene, "reference", [1])
-    for solver in ("xfem", "virtual_node", "conforming"):
-        found = energies(scene, solver, range(4))
-        assert found == sorted(found)
-        assert found[-1] < finest
-        assert finest - found[-1] < 0.5 * (finest - found[0])
-
-
-def test_energies_rise_to_the_reference_where_a_support_ends_in_a_facet_in_space():
-    scene = held_to(
-        "z < 1e-6 and x < 0.61 and y > 0.23", 3, (2, 4, 8), reference={"size": 0.4, "levels": 3}
-    )
-    (finest,) = energies(scene, "reference", [1])
-    found = energies(scene, "xfem", range(3))
-    assert found == sorted(found)
-    assert found[-1] < finest
-    assert finest - found[-1] < 0.6 * (finest - found[0])
-
-
 def test_the_shift_of_an_end_is_reported_in_metres_and_in_elements():
-    scene = held_to("x < 1e-6 and y < 0.55", 2, (4, 8), reference={"size": 0.2, "levels": 3})
+    scene = scenes.scene(
+        mesh={"cells": [[4, 4], [8, 8]]},
+        supports=[{"where": "x < 1e-6 and y < 0.55", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "traction", "where": "right", "traction": [1.0, 0.5]}],
+        reference={"size": 0.2, "levels": 3},
+    )
     for solver in ("xfem", "subdivision", "conforming"):
         for level, shift in enumerate((0.2, 0.075)):
             solution = find_solver(solver).solve(scene, level, 0)
@@ -287,60 +239,24 @@ def test_levels_on_which_an_end_shifts_have_no_order():
     assert not shifted_ends([solved(0.2), solved(0.1)])
 
 
-@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.heavy)])
-def test_the_reference_on_a_given_mesh_ends_supports_and_loads_where_they_end(tmp_path, d):
+def test_the_reference_on_a_given_mesh_ends_supports_and_loads_where_they_end(tmp_path):
     """Its energies rise under refinement to those of the same body meshed anew."""
     import meshio
 
-    from reference.meshing import structured_tetrahedra, structured_triangles
-    from verify.scene import load_scene
+    from reference.meshing import structured_triangles
 
-    count = {2: 4, 3: 2}[d]
-    make = structured_triangles if d == 2 else structured_tetrahedra
-    points, cells = make([0.0] * d, [1.0] * d, [count] * d)
-    kind = {2: "triangle", 3: "tetra"}[d]
-    place = np.pad(points, ((0, 0), (0, 3 - d)))
-    meshio.Mesh(place, [(kind, cells)]).write(tmp_path / "body.vtu")
-    plane = 'plane = "strain"' if d == 2 else ""
-    (tmp_path / "case.toml").write_text(f"""
-title = "t"
-requirement = "r"
-[geometry]
-kind = "file"
-file = "body.vtu"
-dimension = {d}
-[mesh]
-pattern = "given"
-[material]
-young = 1.0
-poisson = 0.3
-{plane}
-[[supports]]
-where = "x < 0.1"
-displacement = {[0.0] * d}
-[[loads]]
-kind = "traction"
-where = "x > 0.999999 and y < 0.63"
-traction = {[1.0, 0.5, 0.3][:d]}
-[reference]
-degree = 1
-""")
-    given = load_scene(tmp_path / "case.toml")
-    anew = scenes.scene(
-        (),
-        d,
-        supports=[{"where": "x < 0.1", "displacement": [0.0] * d}],
-        loads=[
-            {
-                "kind": "traction",
-                "where": "x > 0.999999 and y < 0.63",
-                "traction": [1.0, 0.5, 0.3][:d],
-            }
-        ],
-        reference={"size": 0.25, "levels": 3},
-    )
-    levels = range(4 if d == 2 else 3)
-    found, (finest,) = energies(given, "reference", levels), energies(anew, "reference", [1])
+    points, cells = structured_triangles([0.0, 0.0], [1.0, 1.0], [4, 4])
+    place = np.pad(points, ((0, 0), (0, 1)))
+    meshio.Mesh(place, [("triangle", cells)]).write(tmp_path / "body.vtu")
+    load = {"kind": "traction", "where": "x > 0.999999 and y < 0.63", "traction": [1.0, 0.5]}
+    parts = {"supports": [{"where": "x < 0.1", "displacement": [0.0, 0.0]}], "loads": [load]}
+    given = scenes.scene(
+        geometry={"kind": "file", "file": "body.vtu"}, mesh={"pattern": "given"},
+        reference={"degree": 1}, **parts,
+    )  # fmt: skip
+    given.came_from(tmp_path / "case.toml", "given")
+    anew = scenes.scene(reference={"size": 0.25, "levels": 3}, **parts)
+    found, (finest,) = energies(given, "reference", range(4)), energies(anew, "reference", [1])
     assert found == sorted(found)
     assert found[-1] < finest
     assert finest - found[-1] < 0.35 * (finest - found[0])

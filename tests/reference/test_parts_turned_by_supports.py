@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from large_bodies import forces_of
 from reference_scenes import needs_fenicsx, polyline, square
-from solid_scenes import cube, polygon
 
 from reference.boundary_conditions import best_rotation
 from reference.large_strain import solve_large_strain
@@ -20,14 +19,14 @@ YOUNG = 3e4
 LEAST = 1e-9 * YOUNG  # E L^2 of a unit square; round-off and the tolerance of forces are far below
 
 
-def turned(seed, degrees, size=0.2, degree=2):
+def turned(seed, degrees):
     """A unit square with a random cut on an unstructured mesh, its upper part turned and moved."""
     random = np.random.default_rng(seed)
     x = [-0.1, *np.sort(random.uniform(0.15, 0.85, 2)), 1.1]
     cut = polyline("cut", *np.column_stack([x, random.uniform(0.4, 0.65, 4)]).tolist())
     return square(
         [cut],
-        mesh={"pattern": "unstructured", "sizes": [size]},
+        mesh={"pattern": "unstructured", "sizes": [0.2]},
         material={"young": YOUNG, "poisson": 0.42, "plane": "strain"},
         analysis={"kinematics": "finite_rotation"},
         supports=[
@@ -36,56 +35,17 @@ def turned(seed, degrees, size=0.2, degree=2):
              "rotation": {"angle": degrees, "centre": [0.6, 0.5]}},
         ],
         loads=[],
-        reference={"size": 0.3, "degree": degree},
+        reference={"size": 0.3},
     )  # fmt: skip
-
-
-def turned_in_space(seed, degrees):
-    """A box with an inclined plane cut, its upper part turned about an odd axis and moved."""
-    random = np.random.default_rng(seed)
-    tilt = random.uniform(-0.1, 0.1, 2)
-    corners = np.array([[-0.2, -0.2], [1.5, -0.2], [1.5, 1.2], [-0.2, 1.2]])
-    heights = random.uniform(0.45, 0.55) + (corners - 0.5) @ tilt
-    turn = {"angle": degrees, "centre": [0.6, 0.5, 0.5], "axis": random.normal(size=3).tolist()}
-    return cube(
-        [polygon("cut", *np.column_stack([corners, heights]).tolist())],
-        geometry={"kind": "box", "lower": [0, 0, 0], "upper": [1.3, 1, 1]},
-        mesh={"cells": [[3, 3, 3]]},  # the conforming mesh is made anew for the inclined cut
-        material={"young": YOUNG, "poisson": 0.42},
-        analysis={"kinematics": "finite_rotation"},
-        supports=[
-            {"where": "z < 0.2", "displacement": [0.0, 0.0, 0.0]},
-            {"where": "z > 0.8", "displacement": [0.2, 0.15, 0.1], "rotation": turn},
-        ],
-        loads=[],
-        reference={"size": random.uniform(0.4, 0.6), "degree": 1},
-    )
-
-
-def energy(scene, solver):
-    found = find_solver(solver).solve(scene, 0, repetitions=0)
-    assert found.notes["stability"] == "tangent positive definite"
-    return float(found.ledger["strain"][0])
 
 
 @pytest.mark.parametrize("degrees", [105.0, 180.0, 260.0])
 def test_a_part_that_is_turned_rigidly_stores_nothing(degrees) -> None:
     """At 260° one mesh had 43 J, in nine steps of the linear response."""
     for solver in ("conforming", "reference"):
-        assert energy(turned(int(degrees), degrees), solver) < LEAST
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("solver", ["conforming", "reference"])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_part_that_is_turned_rigidly_stores_nothing_at_every_angle(dim, solver, seed) -> None:
-    for degrees in map(float, range(15, 346, 15)):
-        if dim == 2:
-            scene = turned(seed, degrees, degree=1 + seed % 2)
-        else:
-            scene = turned_in_space(seed, degrees)
-        assert energy(scene, solver) < LEAST
+        found = find_solver(solver).solve(turned(int(degrees), degrees), 0, repetitions=0)
+        assert found.notes["stability"] == "tangent positive definite"
+        assert found.ledger["strain"][0] < LEAST
 
 
 def solve(points, cells, fixed, prescribed, load=None, first_step=0.25):
@@ -119,7 +79,7 @@ def test_ends_of_a_strip_that_turn_against_one_another_are_followed_the_way_they
         return (points[:, 0] == 0.0) | (points[:, 0] == 1.0)
 
     quickly = solve(*mesh, ends, path)
-    slowly = solve(*mesh, ends, path, first_step=0.03)
+    slowly = solve(*mesh, ends, path, first_step=0.06)
     assert quickly.negative_modes == 0
     assert quickly.strain_energy == pytest.approx(slowly.strain_energy, rel=1e-8)
 
@@ -148,7 +108,7 @@ def test_an_unstable_column_is_refused_with_its_energy() -> None:
         solve(points, cells, lambda p: p[:, 0] == 0.0, lambda p, f: 0.0 * p, push)
 
 
-@pytest.mark.parametrize("degrees", [1e-6, 30.0, 179.999, 180.0, 300.0])
+@pytest.mark.parametrize("degrees", [1e-6, 179.999, 180.0, 300.0])
 def test_the_best_rotation_is_the_one_that_was_made(degrees) -> None:
     random = np.random.default_rng(4)
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))

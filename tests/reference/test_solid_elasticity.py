@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from large_bodies import space_of
+from large_bodies import space_of, turn
 from ranks_of_tests import on_one_rank_and_two
 from reference_scenes import energy_of, needs_fenicsx
 from solid_scenes import EXACT, SHAPES, cube, disc, polygon
@@ -11,7 +11,7 @@ from reference import elasticity, linear_solvers
 from reference.deformation import stretch_trace
 from reference.elasticity import solve_linear
 from reference.exact import exact_solution
-from reference.law import Law, law_of
+from reference.law import Law
 from reference.meshing import (
     Grading,
     conforming_mesh,
@@ -21,7 +21,6 @@ from reference.meshing import (
 )
 from reference.space import conforming_space
 from verify.scene import Material, load_scene
-from verify.scene.physics import Rotation
 from verify.solvers import find_solver
 from verify.solvers.conforming_meshes import reference_mesh
 
@@ -58,8 +57,7 @@ def energy_error(scene, **choices):
     return energy_of(scene, **choices) / known.strain_energy(scene) - 1
 
 
-@pytest.mark.parametrize("mesh", ["imprinted", "remeshed"])
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(("mesh", "degree"), [("imprinted", 1), ("remeshed", 2)])
 def test_a_uniform_strain_on_each_side_of_a_cut_is_reproduced(mesh, degree):
     scene = with_exact("solid_patch", PATCH)
     # the imprinted cut is off by up to 3e-5 of an edge, and the energy by that times the jump
@@ -67,17 +65,16 @@ def test_a_uniform_strain_on_each_side_of_a_cut_is_reproduced(mesh, degree):
     assert abs(energy_error(scene, solver="conforming", mesh=mesh, degree=degree)) < tolerance
 
 
-@pytest.mark.parametrize("degree, order", [(1, 2.0), (2, 4.0)])
-def test_smooth_fields_with_a_body_force_converge_with_twice_the_degree(degree, order):
+@pytest.mark.parametrize("degree, order, cells", [(1, 2.0, (5, 10)), (2, 4.0, (3, 6))])
+def test_smooth_fields_with_a_body_force_converge_with_twice_the_degree(degree, order, cells):
     force = [{"kind": "body_force", "force": "exact"}]
     scene = with_exact(
         "solid_smooth",
         WAVES,
         loads=force,
-        mesh={"cells": [[3] * 3, [6] * 3, [12] * 3][: 4 - degree]},
+        mesh={"cells": [[n] * 3 for n in cells]},
     )
-    levels = range(len(scene.mesh.cells))
-    errors = [abs(energy_error(scene, solver="conforming", level=k, degree=degree)) for k in levels]
+    errors = [abs(energy_error(scene, solver="conforming", level=k, degree=degree)) for k in (0, 1)]
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx(order, abs=0.4)
 
 
@@ -92,34 +89,22 @@ def test_an_exact_traction_does_the_work_of_an_exact_support():
     assert abs(energy_error(scene, solver="conforming", mesh="remeshed", degree=2)) < 1e-9
 
 
-def test_a_bar_under_tension_is_in_uniaxial_stress():
-    scene = cube(
-        supports=[
-            {"where": "bottom", "displacement": [0], "components": ["z"]},
-            {"where": "left", "displacement": [0], "components": ["x"]},
-            {"where": "front", "displacement": [0], "components": ["y"]},
-        ],
-        loads=[{"kind": "traction", "where": "top", "traction": [0, 0, 3.0]}],
-    )
-    for solver in ("conforming", "reference"):
-        assert energy_of(scene, solver) == pytest.approx(4.5, rel=1e-10)  # ½ σ²/E
-
-
 class TestHowItIsSolved:
-    def solve(self, scene, method, size=0.22, degree=2):
+    def solve(self, scene, method, size=0.28, degree=2):
         grading = Grading(size, np.zeros((0, 3)), 0.5, 2 / 3, curves=True)
         space = conforming_space(conforming_mesh(scene, grading), degree)
         return solve_linear(scene, space, None, method)
 
-    @pytest.mark.parametrize("most", [0, 10**6], ids=["GAMG", "MUMPS"])  # on linear elements
-    def test_multigrid_and_mumps_agree(self, monkeypatch, most):
-        monkeypatch.setattr(linear_solvers, "_MOST_CORNERS", most)
-        direct, iterative = (self.solve(cube([disc()]), m) for m in ("direct", "multigrid"))
-        assert iterative.answer.iterations <= (60 if most == 0 else 30)
-        assert iterative.strain_energy == pytest.approx(direct.strain_energy, rel=1e-10)
-        scale = np.abs(direct.displacement).max()
-        assert np.abs(iterative.displacement - direct.displacement).max() < 1e-8 * scale
-        assert iterative.answer.residual <= 1e-10
+    def test_multigrid_and_mumps_agree(self, monkeypatch):
+        direct = self.solve(cube([disc()]), "direct")
+        for most, iterations in ((0, 60), (10**6, 30)):  # linear elements by GAMG, by MUMPS
+            monkeypatch.setattr(linear_solvers, "_MOST_CORNERS", most)
+            iterative = self.solve(cube([disc()]), "multigrid")
+            assert iterative.answer.iterations <= iterations
+            assert iterative.strain_energy == pytest.approx(direct.strain_energy, rel=1e-10)
+            scale = np.abs(direct.displacement).max()
+            assert np.abs(iterative.displacement - direct.displacement).max() < 1e-8 * scale
+            assert iterative.answer.residual <= 1e-10
 
     def test_iterations_do_not_grow_with_the_mesh(self):
         found = [self.solve(cube([disc()]), "multigrid", h, 1) for h in (0.24, 0.12)]
@@ -156,13 +141,6 @@ class TestHowItIsSolved:
             solve_linear(scene, space, None, "multigrid")
 
 
-_PARALLEL = """
-from test_solid_elasticity import answer_on
-answer = [answer_on(world, 1, "direct", 0.3), answer_on(world, 2, "multigrid", 0.3),
-          answer_on(world, 2, "multigrid", 0.6, pressure=True)]
-"""
-
-
 def answer_on(world, degree, method, size, pressure=False):
     """Number of unknowns, energy and norm of the answer for a cube with a disc cut into it."""
     loads = [
@@ -180,20 +158,6 @@ def answer_on(world, degree, method, size, pressure=False):
     )  # fmt: skip
 
 
-def test_two_ranks_give_the_answer_of_one(tmp_path):
-    one, two = on_one_rank_and_two(_PARALLEL, tmp_path)
-    # multigrid leaves a residual of 1e-10, of which the energy is off by less
-    for alone, shared, tolerance in zip(one, two, (1e-10, 1e-10, 1e-8), strict=True):
-        assert shared == pytest.approx(alone, rel=tolerance)
-
-
-TISSUE = Material(young=1.0, poisson=0.3)
-
-
-def turn(degrees, axis=(1.0, 2.0, -1.0)):
-    return Rotation(angle=float(degrees), centre=[0.0, 0.0, 0.0], axis=list(axis)).matrix()
-
-
 def test_the_sum_of_stretches_is_that_of_the_singular_values_with_the_sign_of_the_volume():
     random = np.random.default_rng(0)
     F = random.standard_normal((2000, 3, 3))
@@ -209,36 +173,19 @@ def test_the_sum_of_stretches_is_that_of_the_singular_values_with_the_sign_of_th
     assert (error <= np.minimum(1e-13 / apart, 1e-6)).all()
 
 
-@pytest.mark.parametrize("size", [1e-3, 1e-8, 1e-15, 1e-200])
-def test_small_strains_keep_their_digits(size):
-    """tr(U − I) = tr H + |w|² to the third order, w the axial vector of the rotation."""
-    H = size * np.random.default_rng(3).standard_normal((200, 3, 3))
-    w = 0.5 * np.linalg.norm([H[:, 2, 1] - H[:, 1, 2], H[:, 0, 2] - H[:, 2, 0],
-                              H[:, 1, 0] - H[:, 0, 1]], axis=0)  # fmt: skip
-    error = np.abs(stretch_trace(H) - np.einsum("nii->n", H) - w**2)
-    assert (error < 50 * size**3 + 1e-14 * size).all()
-
-
-def test_a_turn_by_120_degrees_stores_nothing_and_pulls_nowhere():
-    space = space_of(2, (1, 1, 1))
-    x = space.node_points
-    turned = (x @ turn(120).T - x).ravel()
-    mechanics = law_of(TISSUE, space, "corotational")
-    assert abs(mechanics.energy(turned)) < 1e-14
-    assert np.abs(mechanics.force(turned)).max() < 1e-15
-
-
-@pytest.mark.parametrize("pressure", [False, True])
-@pytest.mark.parametrize("energy", ["linear", "corotated", "neo_hookean"])
-def test_force_and_tangent_are_the_derivatives_of_the_energy(energy, pressure):
+@pytest.mark.parametrize(
+    ("energy", "d", "pressure"), [("corotated", 3, False), ("neo_hookean", 2, True)]
+)
+def test_force_and_tangent_are_the_derivatives_of_the_energy(energy, d, pressure):
     from dolfinx import fem
     from dolfinx.fem import petsc
 
-    space = space_of(2, (1, 1, 1))
-    law = Law(TISSUE, space, energy, pressure)
+    space = space_of(2, (1,) * d)
+    tissue = Material(young=1.0, poisson=0.3, plane="strain" if d == 2 else None)
+    law = Law(tissue, space, energy, pressure)
     random = np.random.default_rng(1)
     start, way = 0.03 * random.standard_normal((2, law.solution.x.array.size))
-    turned = (space.node_points @ turn(100).T - space.node_points).ravel()
+    turned = (space.node_points @ turn(d, 1.75).T - space.node_points).ravel()
     start += law.unknowns.own_part(turned)
 
     def put(share):
@@ -280,19 +227,17 @@ def hanging(cuts):
 def test_linear_elements_equal_another_code_at_finite_rotation():
     """Of one rotation per element XFEM makes the same model where the cut runs along facets."""
     half = polygon("half", (-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5))
-    for cuts in ([], [half]):
-        scene = hanging(cuts)
-        mine, other = (
-            find_solver(name).solve(scene, 0, repetitions=0) for name in ("conforming", "xfem")
-        )
-        assert mine.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-9)
+    mine, other = (
+        find_solver(name).solve(hanging([half]), 0, repetitions=0)
+        for name in ("conforming", "xfem")
+    )
+    assert mine.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-9)
 
 
-_TURNED = """
+_PARALLEL = """
 import reference.large_strain
-from test_solid_elasticity import hanging
-from reference.boundary_conditions import constrained_values
-from reference.boundary_conditions import load_forces
+from test_solid_elasticity import answer_on, hanging
+from reference.boundary_conditions import constrained_values, load_forces
 from reference.large_strain import solve_large_strain
 from reference.space import conforming_space
 from verify.solvers.conforming_meshes import peer_mesh
@@ -301,15 +246,21 @@ if world.size > 1:
     reference.large_strain._MOST_DIRECT = 0
 scene = hanging([])
 space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, world)
-found = solve_large_strain(
+turned = solve_large_strain(
     scene.material, space, constrained_values(scene, space, None)[0],
     lambda factor: constrained_values(scene, space, None, factor)[1],
     load_forces(scene, space, None))
-answer = [found.strain_energy, found.orientation.least, float(np.linalg.norm(found.displacement))]
+answer = [
+    answer_on(world, 1, "direct", 0.3), answer_on(world, 2, "multigrid", 0.4),
+    answer_on(world, 2, "multigrid", 0.6, pressure=True),
+    [turned.strain_energy, turned.orientation.least, float(np.linalg.norm(turned.displacement))],
+]
 """
 
 
-def test_two_ranks_and_multigrid_give_the_answer_of_one_rank_and_a_factorisation(tmp_path):
-    one, two = on_one_rank_and_two(_TURNED, tmp_path)
-    # Newton's residual is 1e-11 of the forces
-    assert two == pytest.approx(one, rel=1e-9)
+def test_two_ranks_give_the_answer_of_one(tmp_path):
+    """At finite rotation by multigrid on two ranks, and by a factorisation on one."""
+    one, two = on_one_rank_and_two(_PARALLEL, tmp_path)
+    # multigrid leaves a residual of 1e-10, of which the energy is off by less; Newton 1e-11
+    for alone, shared, tolerance in zip(one, two, (1e-10, 1e-10, 1e-8, 1e-9), strict=True):
+        assert shared == pytest.approx(alone, rel=tolerance)

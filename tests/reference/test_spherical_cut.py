@@ -6,7 +6,6 @@ from reference_scenes import needs_fenicsx
 from solid_scenes import EXACT, cube
 
 from reference.exact import exact_solution
-from verify.scene import SphereCut
 from verify.solvers import find_solver
 
 CENTRE, RADIUS = np.array([-0.06, -0.03, -0.04]), 0.6
@@ -28,26 +27,6 @@ def shell(cells):
 def energy(scene):
     known = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
     return known.strain_energy(scene)
-
-
-def test_the_nearest_points_of_a_cap_are_those_of_its_fine_triangulation():
-    cap = SphereCut(
-        kind="sphere", centre=(0.1, 0.2, 0.3), radius=0.4, towards=(1.0, -1.0, 2.0), opening=65.0
-    )
-    (patch,) = cap.pieces()
-    vertices = cap.facets(0.004)[0]
-    points = np.random.default_rng(4).uniform(-0.5, 0.9, (300, 3))
-    foot, rim = patch.nearest(points)
-    nearest = np.linalg.norm(points[:, None] - vertices, axis=2).min(axis=1)
-    # a vertex lies within 0.004 of every point of the cap: off by that along it at most
-    away = np.linalg.norm(points - foot, axis=1)
-    assert (away <= nearest + 1e-12).all()
-    assert (nearest <= np.hypot(away, 0.004) + 0.004).all()
-    assert 0.2 < rim.mean() < 0.9
-    low, high = patch.bounds()
-    assert (vertices >= low - 1e-12).all()
-    assert (vertices <= high + 1e-12).all()
-    np.testing.assert_allclose(np.ptp(vertices, axis=0), high - low, rtol=1e-3)
 
 
 def test_the_compact_solver_has_the_energy_of_the_shell_with_order_two():

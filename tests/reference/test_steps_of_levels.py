@@ -35,13 +35,9 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
 @pytest.mark.parametrize("name", SCENES)
-def test_every_level_of_the_reference_halves_every_step_of_the_one_before(
-    name, kinematics, monkeypatch
-):
-    asked = {"reference": COARSE, "time_step": None} | SCENES[name]
-    scene = moving(kinematics=kinematics, **asked)
+def test_every_level_of_the_reference_halves_every_step_of_the_one_before(name, monkeypatch):
+    scene = moving(**{"reference": COARSE, "time_step": None} | SCENES[name])
     taken = []
 
     def step(stepper, state):

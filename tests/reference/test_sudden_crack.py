@@ -13,12 +13,9 @@ from verify.compare.hooke import law_of
 from verify.judge.convergence import extrapolate
 from verify.judge.notices import ringing_factors
 from verify.judge.quantities import Measured
-from verify.judge.reference import known_quantity, size_of
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.conforming import _RADIUS_OF_JUMPS
-from verify.study.calibration import trials
-from verify.study.calibration_families import families
 
 LAW = Hooke(lame=0.7, shear=0.4, dimension=2, density=2.0)
 TIME = 0.9
@@ -114,7 +111,7 @@ def test_factors_are_of_second_order_from_the_second_step_after_a_jump():
     assert half[0] / half[2] > 150.0
 
 
-@pytest.mark.parametrize("steps", [2, 3, 4, 5, 6, 8, 10])
+@pytest.mark.parametrize("steps", [2, 5, 10])
 def test_half_widths_of_a_factor_after_so_many_steps_of_the_coarsest_level(steps):
     """They cover its error and are at most five times it; with ½ they were 11 to 1350 times."""
     errors = factor_after_steps(_RADIUS_OF_JUMPS, 4 * steps)[[steps - 1, 2 * steps - 1, -1]]
@@ -166,44 +163,3 @@ class TestOnTheReference:
         for asked, error in zip(scene.quantities[:2], expected, strict=True):
             exact = sudden_intensity("I", 1e-3, hooke(scene.material), asked.time)
             assert measured.quantity(asked) / exact - 1 == pytest.approx(error, abs=1e-3)
-
-    @pytest.mark.heavy
-    def test_half_widths_of_factors_are_not_those_of_wave_fronts_elsewhere(self):
-        """They were 46 to 440 times the errors with the order of the field in the whole body."""
-        (family,) = (one for one in families(quick=False) if one.name == "sudden crack")
-        found = trials(family, 3, seed=0)
-        assert len(found) == 4
-        for trial in found:
-            assert 1.0 <= trial.ratio < 20.0, trial
-
-    @pytest.mark.heavy
-    @pytest.mark.parametrize(
-        ("case", "mode"),
-        [("crack_pressed_suddenly", "I"), ("crack_sheared_suddenly", "II")],
-    )
-    def test_half_widths_cover_the_factor_at_every_output(self, case, mode):
-        """Outputs 0.45 h/c apart, closer than the natural step: ten factors per mode.
-
-        Promised is 90 % of a family: nine of ten. In mode II the three levels at 1.08 s agree
-        to 4e-4 by chance, and K is off by 1.1e-4, 2.4 half-widths.
-        """
-        scene = load_scene(f"dynamics/{case}")
-        size, outputs = 0.3, 11
-        times = np.linspace(0.0, scene.analysis.duration, outputs)[1:]
-        (asked,) = scene.quantities[-1:]
-        scene = scene.model_copy(update={
-            "analysis": scene.analysis.model_copy(update={"outputs": outputs}),
-            "reference": scene.reference.model_copy(update={"size": size}),
-        })  # fmt: skip
-        body, law = body_of(scene), law_of(scene)
-        solver = find_solver("reference")
-        solutions = [solver.solve(scene, level, repetitions=0) for level in range(3)]
-        measured = [Measured(one, body, law, scene) for one in solutions]
-        sizes, covered = [size_of(one) for one in solutions], []
-        for time in times:
-            one = asked.model_copy(update={"time": float(time)})
-            values = [level.quantity(one) for level in measured]
-            known = known_quantity(one, measured, values, sizes, falls=4.0)
-            exact = sudden_intensity(mode, 1e-3, hooke(scene.material), time)
-            covered.append(abs(known.value - exact) < known.half_width)
-        assert np.mean(covered) >= 0.9, list(zip(times, covered, strict=True))

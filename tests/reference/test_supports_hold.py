@@ -40,30 +40,6 @@ def test_a_body_on_rollers_only_is_refused_without_any_cut():
         energy_of(square(supports=[ROLLERS]), "conforming")
 
 
-@pytest.mark.parametrize(
-    ("solver", "kinematics"),
-    [
-        ("conforming", "linear"),
-        ("conforming", "corotational"),
-        ("reference", "linear"),
-        ("reference", "corotational"),
-        ("xfem", "linear"),
-        ("xfem", "corotational"),
-    ],
-)
-def test_a_part_that_ends_at_a_cut_holds_what_lies_on_its_own_side(solver, kinematics):
-    # the halves are drawn apart rigidly, by parts of the bottom and top that end where the cut does
-    moved = [(-0.1, "x < 0.45"), (0.2, "x > 0.45")]
-    supports = [
-        {"where": f"{where} and ({edge})", "displacement": [u, 0.0]}
-        for u, where in moved
-        for edge in ("y < 1e-9", "y > 1 - 1e-9")
-    ]
-    cut = polyline("a", (0.45, -0.1), (0.45, 1.1))
-    scene = square([cut], supports=supports, loads=[], analysis={"kinematics": kinematics})
-    assert energy_of(scene, solver) < 1e-20
-
-
 @pytest.mark.parametrize("solver", ["conforming", "reference"])
 def test_halves_of_a_block_that_are_carried_apart_store_nothing(solver):
     # a translation has no forces by which the residual of Newton's method could be judged
