@@ -8,7 +8,6 @@ from case_texts import body_text
 from cut_meshes import grid, quadratic
 from solid_meshes import cube_grid
 
-from verify.compare import mass
 from verify.compare.blade import blade_forces, driving_force, swept_area
 from verify.compare.mass import kinetic
 from verify.compare.motion_account import balance, energy_scale, total_energy
@@ -78,8 +77,7 @@ def spinning(points, spin, centre, push):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order, monkeypatch):
-    monkeypatch.setattr(mass, "COMPILED", order == 2)  # and without numba
+def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order):
     points, cells = grid(3, 2) if d == 2 else cube_grid(2, 2, 2)
     if order == 2:
         points, cells = quadratic(points, cells)
