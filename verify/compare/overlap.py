@@ -281,7 +281,8 @@ class OverlapSearch:
         points = np.einsum("nk,nkd->nd", shares, corners[which])
         step = np.minimum(_STEP * height[which], _LONGEST * self._size)
         outside = points + step[:, None] * normals[which]
-        held = self._holding(cells, outside)
+        searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
+        held = holding_cells(outside, searched, _INSIDE * self._size, nearest=False)
         inside = held >= 0
         which, shares, points, held = which[inside], shares[inside], points[inside], held[inside]
         step, outside = step[inside], outside[inside]
@@ -314,10 +315,6 @@ class OverlapSearch:
         corners = self.solution.points[faces.nodes]
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
         return nearest_before(places, tree, corners, np.nan_to_num(unit_normals(corners)))
-
-    def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
-        searched = cells.tree.over(cells.shape.corners, cells.shape.normals)
-        return holding_cells(points, searched, _INSIDE * self._size, nearest=False)
 
 
 # A ray through an edge must not slip between two facets.

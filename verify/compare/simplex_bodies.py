@@ -241,10 +241,15 @@ def surface_lines(
     for patch in patches:
         level = patch.level(points)
         level[np.abs(level) <= _ON * size] = 0.0
-        for ends, ways in (_across(points, cells, level), _along(points, cells, level)):
+        *along, odd = _along(points, cells, level)
+        for ends, ways in (_across(points, cells, level), along):
             ends, which = _clipped(ends, patch, SHORT * size)
             rows.append((ends, *ways[which].swapaxes(0, 1)))
-        _refuse_folds(points, cells, level, patch, name, SHORT * size)
+        if len(_clipped(odd, patch, SHORT * size)[0]):
+            raise UnsupportedSceneError(
+                f"cut '{name}' lies along a fold of the membrane or in one of its triangles: it "
+                "does not part what is on its sides, and cannot be compared on"
+            )
     return SurfaceLines(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
@@ -268,41 +273,27 @@ def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
     return ends, np.stack([into, -into], axis=1)
 
 
-def _edges_on(cells: Cells, level: Array) -> tuple[Cells, Cells]:
-    """Find edges (e, 2) of triangles that lie on plane, and the triangles' third corners (e,)."""
-    pairs = np.concatenate([cells[:, list(edge)] for edge in _EDGES])
+def _along(points: Array, cells: Cells, level: Array) -> tuple[Array, Array, Array]:
+    """Find edges of triangles that lie on the plane.
+
+    Those (s, 2, 3) with a triangle on either side of it, ways (s, 2, 3) into both, and those
+    (o, 2, 3) inside the surface whose triangles are not on either side.
+    """
+    pairs = np.sort(np.concatenate([cells[:, list(edge)] for edge in _EDGES]), axis=1)
     third = np.concatenate([cells[:, 3 - sum(edge)] for edge in _EDGES])
     on = (level[pairs] == 0.0).all(axis=1)
-    return np.sort(pairs[on], axis=1), third[on]
-
-
-def _along(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
-    """Find edges (s, 2, 3) of triangles on either side of the plane, and ways into both."""
-    pairs, third = _edges_on(cells, level)
-    above = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] > 0.0}
-    below = {tuple(e): c for e, c in zip(pairs.tolist(), third, strict=True) if level[c] < 0.0}
-    both = np.array(sorted(above.keys() & below.keys()), dtype=np.int64).reshape(-1, 2)
-    ends = points[both]
-    ways = [
-        _square(points[[side[tuple(e)] for e in both.tolist()]].reshape(-1, 3) - ends[:, 0], ends)
-        for side in (above, below)
-    ]
-    return ends, np.stack(ways, axis=1)
-
-
-def _refuse_folds(
-    points: Array, cells: Cells, level: Array, patch: PlanePatch, name: str, tolerance: float
-) -> None:
-    """Raise if the patch runs along an edge whose triangles are not on either side of it."""
-    pairs, third = _edges_on(cells, level)
-    _, which, times = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    sides = np.bincount(which, np.sign(level[third]), len(times))
-    odd = pairs[(times[which] > 1) & (sides[which] != 0.0) | (level[third] == 0.0)]
-    if len(_clipped(points[odd], patch, tolerance)[0]):
-        raise UnsupportedSceneError(
-            f"cut '{name}' lies along a fold of the membrane or in one of its triangles: it does "
-            "not part what is on its sides, and cannot be compared on"
-        )
+    pairs, third, side = pairs[on], third[on], np.sign(level[third[on]])
+    edges, which, times = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    beside = np.full((2, len(edges)), -1)
+    beside[0, which[side > 0.0]], beside[1, which[side < 0.0]] = (
+        third[side > 0.0],
+        third[side < 0.0],
+    )
+    both = (beside >= 0).all(axis=0)
+    ends = points[edges[both]]
+    ways = [_square(points[own] - ends[:, 0], ends) for own in beside[:, both]]
+    odd = pairs[(times > 1)[which] & (np.bincount(which, side) != 0.0)[which] | (side == 0.0)]
+    return ends, np.stack(ways, axis=1), points[odd]
 
 
 def _square(way: Array, ends: Array) -> Array:
