@@ -299,10 +299,11 @@ def test_bars_of_a_curved_cut_cover_what_its_facets_are_off():
      "--names", "scheme", "mass"],
 ])  # fmt: skip
 def test_ctrl_c_ends_a_study_in_one_line(words, tmp_path, monkeypatch, capsys):
-    def stopped(*_):
+    def stopped(*_, **given):
         raise RunStoppedError(signal.SIGINT)
 
-    monkeypatch.setattr(study, "run_cases", stopped)
+    for way in ("run_cases", "made"):  # by a run, and by parts
+        monkeypatch.setattr(study, way, stopped)
     assert main(["study", *words, "--out", str(tmp_path)]) == 130
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == "verify: error: interrupted by SIGINT; the same command resumes it"
