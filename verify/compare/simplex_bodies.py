@@ -16,7 +16,7 @@ from verify.compare.sides import distance_to_segments, nearest_segments
 from verify.compare.simplices import KUHN, simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.geometry.patches import Patch, PlanePatch
-from verify.geometry.simplices import feet, measures, rim_edges
+from verify.geometry.simplices import feet, inner_range, measures, rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.geometry import Box, MeshFile
@@ -318,20 +318,12 @@ def _clipped(ends: Array, patch: PlanePatch, tolerance: float) -> tuple[Array, N
 
 def _within(a: Array, b: Array, triangles: Array, tolerance: float) -> list[tuple[float, float]]:
     """Compute ranges of the parameter of a segment ab inside a union of triangles (m, 3, 2)."""
-    found = []
-    for triangle in triangles:
-        low, high = 0.0, 1.0
-        turn = np.sign(np.linalg.det(triangle[1:] - triangle[0]))
-        for p, q in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-            inward = turn * np.array([p[1] - q[1], q[0] - p[0]])
-            at, to = inward @ (a - p), inward @ (b - p)
-            if at < 0.0 and to < 0.0:
-                low, high = 1.0, 0.0
-            elif at < 0.0 or to < 0.0:
-                share = at / (at - to)
-                low, high = (max(low, share), high) if at < 0.0 else (low, min(high, share))
-        if high - low > tolerance:
-            found.append((low, high))
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    turn = np.sign(np.linalg.det(triangles[:, 1:] - triangles[:, :1]))[:, None, None]
+    inward = turn * np.stack([-edges[..., 1], edges[..., 0]], axis=2)
+    heights = (np.einsum("mkd,mkd->mk", inward, end - triangles) for end in (a, b))
+    ranges = zip(*(ends.tolist() for ends in inner_range(*heights)), strict=True)
+    found = [(low, high) for low, high in ranges if high - low > tolerance]
     merged: list[tuple[float, float]] = []
     for low, high in sorted(found):
         if merged and low <= merged[-1][1] + tolerance:

@@ -230,6 +230,19 @@ def feet(points: Array, starts: Array, ends: Array) -> Array:
     return found
 
 
+def inner_range(first: Array, last: Array) -> tuple[Array, Array]:
+    """Range (n,), (n,) of the parameter of segments in which k linear functions are not negative.
+
+    By their values (n, k) at both ends (Cyrus and Beck, 1978); it begins at infinity where there
+    is none.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = first / (first - last)
+    low = np.where(first < 0.0, share, 0.0).max(axis=1)
+    high = np.where((first >= 0.0) & (last < 0.0), share, 1.0).min(axis=1)
+    return np.where(((first < 0.0) & (last < 0.0)).any(axis=1), np.inf, low), high
+
+
 def nearest_parts(points: Array, parts: Array) -> tuple[Array, Ints]:
     """Distances (n,) of points (n, d) to the nearest of segments or triangles, and its number.
 

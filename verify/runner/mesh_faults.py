@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
-from verify.geometry.simplices import boundary_facets, feet, measures
+from verify.geometry.simplices import boundary_facets, feet, inner_range, measures
 from verify.printable import place_text as _at
 from verify.result import Notice, NoticeKind
 from verify.scene import Gravity, MeshFile, Scene, Traction, read_mesh
@@ -313,13 +313,8 @@ class _Skin:
                 np.einsum("nkd,nd->nk", normals[cell], place[row]) - offsets[cell]
                 for place in (starts, ends)
             )
-            # the part of a segment inside of all half-spaces (Cyrus and Beck, 1978)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                share = first / (first - last)
-            into = np.where(first < 0.0, share, 0.0).max(axis=1)
-            out = np.where((first >= 0.0) & (last < 0.0), share, 1.0).min(axis=1)
-            apart = ((first <= 0.0) & (last <= 0.0)).any(axis=1)
-            found.append(cell[~apart & (into < out) & (cell != own[row])])
+            low, high = inner_range(first, last)
+            found.append(cell[(low < high) & (cell != own[row])])
         return np.unique(np.concatenate(found))
 
     def _half_spaces(self, corners: Array) -> tuple[Array, Array]:
