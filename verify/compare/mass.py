@@ -100,13 +100,12 @@ def kinetic(
     if cells is not None:
         nodes, own = nodes[cells], own[cells]
     at, share = simplex_rule(k, 2 if solution.order == 1 else 4)
-    hats, mass = shape_functions(at, k, solution.order), np.outer(share, own).ravel()
+    hats, mass = shape_functions(at, k, solution.order), np.outer(own, share).ravel()
     total, rows = float(mass.sum()), []
     moved = solution.points + solution.displacement[steps]
-    for fields in zip(moved, solution.velocity[steps], strict=True):
-        place, speed = (
-            np.tensordot(hats, one[nodes], (1, 1)).reshape(-1, d).T.copy() for one in fields
-        )
+    for x, v in zip(moved, solution.velocity[steps], strict=True):
+        values = np.take(np.concatenate([x.T, v.T]), nodes, axis=1) @ hats.T
+        place, speed = values.reshape(2, d, -1)
         centre = place @ mass / max(total, 1e-300)
         arm, moment = place - centre[:, None], mass * speed
         size, reach = np.sqrt((speed**2).sum(axis=0)), np.sqrt((arm**2).sum(axis=0))

@@ -158,8 +158,12 @@ def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[
 
 
 def _turn(corners: Array) -> Array:
-    """Compute the signed volume (m,), up to a factor."""
-    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    """Compute the signed volume (m,), up to a factor; `np.linalg.det` takes five times as long."""
+    edges = np.moveaxis(corners[:, 1:] - corners[:, :1], (1, 2), (0, 1))
+    if len(edges) == 2:
+        return np.asarray(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
+    a, (b, c, d), (e, f, g) = edges
+    return np.asarray(a[0] * (c * g - d * f) + a[1] * (d * e - b * g) + a[2] * (b * f - c * e))
 
 
 def _swapped(d: int, order: int) -> list[int]:
