@@ -1,8 +1,8 @@
 """C4 from its page: gmsh's tetrahedra with the disc as a face, quadratic elements of scikit-fem.
 
 Nodes are doubled on the disc; edges along the front are curved, and the nodes of edges that meet it
-lie at a quarter of them, which gives the elements the root of the distance. Opening and factors are
-those of the ellipsoid that fits the jump of the displacement.
+lie at a quarter of them, which gives the elements the root of the distance. Opening and factors
+belong to the ellipsoid that fits the jump of the displacement.
 """
 
 import gmsh

@@ -1,7 +1,7 @@
 """The second route of the scenes at rest: `python second_routes.py c1_slit` prints it.
 
-Values of `cases/benchmark/values.toml` and pages of `docs/benchmark` stand on it. Each answer is
-that of the finer of two meshes, or extrapolated from both. One quantity may differ little between
+Values of `cases/benchmark/values.toml` and pages of `docs/benchmark` stand on it. Each answer comes
+from the finer of two meshes, or is extrapolated from both. One quantity may differ little between
 them by chance, so the largest relative difference of all quantities counts for each.
 """
 

@@ -73,7 +73,7 @@ def check(
     Parameters
     ----------
     strict
-        what is undecided: exit code 5
+        undecided verdicts: exit code 5
     partial
         leave out cases of the file that the run was not asked for
     """

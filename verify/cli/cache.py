@@ -68,7 +68,7 @@ def clear(cases: Annotated[Sequence[str], Arg("CASE")] = (), *, outdated: bool =
     cases
         name or pattern (default: all that is kept)
     outdated
-        only those of another code or other versions
+        only entries of another code or other versions
     """
     cache = _cache()
     chosen = [

@@ -42,7 +42,7 @@ class Arg:
     exclusive : bool
         Whether it stands beside no other such option of its command.
     help : str
-        A default is added to it, unless it speaks of one. Without it that of the docstring counts.
+        A default is added to it, unless it speaks of one. Without it the docstring counts.
     """
 
     metavar: str | None = None

@@ -294,7 +294,7 @@ def positions(
     positions
         meshes of each scene, up to 16
     level
-        mesh level that is solved (default: that of the study, else the coarsest)
+        mesh level that is solved (default: the level of the study, else the coarsest)
     """
     from verify.runner.selection import select_cases
     from verify.scene.mesh_position import POSITIONS

@@ -402,7 +402,7 @@ def pairs_met(
 ) -> Iterator[tuple[Ints, Ints]]:
     """Yield all pairs (n,) of one of `rows` and a cell whose box it meets, some rows at a time.
 
-    `corners` (m, k, d) are those of the cells. ``meets(row, low, high, box)`` tells of n rows
+    `corners` (m, k, d) belong to the cells. ``meets(row, low, high, box)`` tells of n rows
     whether they meet the boxes of these numbers (n,), from ``low[box]`` to ``high[box]``.
     """
     leaves, boxes = len(tree.lower) // 2, (corners.min(axis=1), corners.max(axis=1))

@@ -276,8 +276,8 @@ def _across(points: Array, cells: Cells, level: Array) -> tuple[Array, Array]:
 def _along(points: Array, cells: Cells, level: Array) -> tuple[Array, Array, Array]:
     """Find edges of triangles that lie on the plane.
 
-    Those (s, 2, 3) with a triangle on either side of it, ways (s, 2, 3) into both, and those
-    (o, 2, 3) inside the surface whose triangles are not on either side.
+    Returns edges (s, 2, 3) with a triangle on either side of it, and the ways (s, 2, 3) into both.
+    The last are edges (o, 2, 3) inside the surface whose triangles are not on either side.
     """
     pairs = np.sort(np.concatenate([cells[:, list(edge)] for edge in _EDGES]), axis=1)
     third = np.concatenate([cells[:, 3 - sum(edge)] for edge in _EDGES])

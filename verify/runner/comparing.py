@@ -33,7 +33,7 @@ class Comparison:
     question : dict
         What `verify.runner.judging` is asked: the ``key`` that identifies the comparison, the
         solvers that are judged (``judge_only``; none: all), the run directory (``root``), folders
-        in it of the solves and of those of other ``models``, and the ``provenance`` of the run.
+        in it of the solves, also by other ``models``, and the ``provenance`` of the run.
     timeout, memory : float
         Limits, s and bytes.
     """

@@ -400,8 +400,8 @@ class ReferenceLevels(Strict):
     degree
         polynomial order
     time_step
-        dynamic: largest step of the coarsest level, s, which every level halves (default: that of
-        the analysis)
+        dynamic: largest step of the coarsest level, s, which every level halves (default: the
+        step of the analysis)
     """
 
     kind: Literal["exact", "conforming"] | None = None
