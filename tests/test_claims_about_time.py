@@ -48,36 +48,30 @@ def run(pytester, taken, passes, breaks=False):
 
 
 @pytest.mark.parametrize(
-    ("taken", "passes", "outcome", "calls"),
+    ("shared", "taken", "passes", "breaks", "outcome", "calls"),
     [
-        (0.0, 1, "passed", 1),
-        (0.9, 1, "passed", 1),
-        (0.9, 2, "passed", 2),
-        (0.9, 9, "skipped", 3),
-        (0.0, 2, "failed", 1),
+        (False, 0.9, 1, False, "passed", 1),
+        (False, 0.9, 2, False, "passed", 2),
+        (False, 0.9, 9, False, "skipped", 3),
+        (False, 0.0, 2, False, "failed", 1),
+        # on a shared machine others are not to be seen; an error is one
+        (True, 0.0, 2, False, "passed", 2),
+        (True, 0.0, 9, False, "skipped", 3),
+        (True, 0.0, 9, True, "failed", 1),
     ],
 )
 def test_a_claim_fails_only_on_a_quiet_machine(
-    pytester, monkeypatch, taken, passes, outcome, calls
+    pytester, monkeypatch, shared, taken, passes, breaks, outcome, calls
 ):
-    monkeypatch.delenv("VERIFY_SHARED_MACHINE", raising=False)
-    found, count = run(pytester, taken, passes)
+    if shared:
+        monkeypatch.setenv("VERIFY_SHARED_MACHINE", "1")
+    else:
+        monkeypatch.delenv("VERIFY_SHARED_MACHINE", raising=False)
+    found, count = run(pytester, taken, passes, breaks)
     found.assert_outcomes(**{outcome: 1})
     assert count == calls
+    said = (
+        "assert 3 == 9, 3 times on a shared machine" if shared else "other programs took 0.9 cores"
+    )
     if outcome == "skipped":
-        found.stdout.fnmatch_lines(["*undecided: other programs took 0.9 cores*"])
-
-
-@pytest.mark.parametrize(
-    ("passes", "breaks", "outcome", "calls"),
-    [(2, False, "passed", 2), (9, False, "skipped", 3), (9, True, "failed", 1)],
-)
-def test_on_a_shared_machine_a_claim_is_undecided_and_an_error_is_one(
-    pytester, monkeypatch, passes, breaks, outcome, calls
-):
-    monkeypatch.setenv("VERIFY_SHARED_MACHINE", "1")
-    found, count = run(pytester, 0.0, passes, breaks)
-    found.assert_outcomes(**{outcome: 1})
-    assert count == calls
-    if outcome == "skipped":
-        found.stdout.fnmatch_lines(["*undecided: assert 3 == 9, 3 times on a shared machine*"])
+        found.stdout.fnmatch_lines([f"*undecided: {said}*"])

@@ -46,9 +46,7 @@ def simplex(dimension, order, times=1):
     )
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("times", [1, 3])
+@pytest.mark.parametrize("dimension, order, times", [(2, 2, 3), (3, 1, 3), (3, 2, 1)])
 def test_a_solution_is_read_as_it_was_written_to_the_last_bit(tmp_path, dimension, order, times):
     written = simplex(dimension, order, times)
     write_solution(written, tmp_path / "a" / "solution")

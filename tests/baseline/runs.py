@@ -44,32 +44,16 @@ def metrics(energy=2.001, sag=-0.52, error=0.01, reference=-0.5, width=0.001):
 
 
 def solve(level=1, seconds=(0.100, 0.101, 0.102), calibration=QUIET, **values):
-    return SolveRecord(
-        "a/case",
-        "xfem",
-        level,
-        Status.SOLVED,
-        size=0.25 / 2**level,
-        metrics=metrics(**values),
-        timings={"assembly": [0.5 * s for s in seconds], "solve": [0.5 * s for s in seconds]},
-        notes={"calibration": calibration},
-    )
+    times = {name: [0.5 * s for s in seconds] for name in ("assembly", "solve")}
+    return SolveRecord("a/case", "xfem", level, Status.SOLVED, size=0.25 / 2**level, timings=times,
+                       metrics=metrics(**values), notes={"calibration": calibration})  # fmt: skip
 
 
 def result(*solves, scene=None, verdicts=()):
     asked = scenes.scene(**SCENE | (scene or {}))
     content = asked.model_dump(mode="json", by_alias=True)
-    return CaseResult(
-        case="a/case",
-        title="a test",
-        requirement="it shall hold",
-        scene_hash="0123",
-        scene=content,
-        reference=ReferenceRecord(),
-        solves=list(solves) or [solve(0), solve(1)],
-        rates=[],
-        verdicts=list(verdicts),
-    )
+    return CaseResult("a/case", "a test", "it shall hold", "0123", content, ReferenceRecord(),
+                      list(solves) or [solve(0), solve(1)], [], list(verdicts))  # fmt: skip
 
 
 def verdict(check, metric, what, observed=1.0):
@@ -84,11 +68,7 @@ def run(
     for one in results:
         write_result(replace(one), folder / "cases" / one.case.replace("/", "__") / "result.json")
     origin = {"commit": commit, "dirty": False, "date": date, "cpu": cpu, **more}
-    record = {
-        "schema": 1,
-        "cases": [one.case for one in results],
-        "finished": finished,
-        "provenance": origin,
-    }
+    cases = [one.case for one in results]
+    record = {"schema": 1, "cases": cases, "finished": finished, "provenance": origin}
     (folder / "run.json").write_text(json.dumps(record))
     return folder

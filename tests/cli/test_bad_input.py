@@ -26,21 +26,13 @@ BROKEN_CASES = {
     "cut through itself": ("[1.1, 0.7]]", "[1.1, 0.7], [0.5, 0.9], [0.5, 0.1]]", "intersects"),
     "exact solution": ('solution = "patch"', 'solution = "pitch"', "'patch'"),
     "parameter of it": ("slope = ", "slop = ", "'slop'"),
-    "solver of a check": (
-        'metric = "strain_energy"',
-        'metric = "strain_energy"\nsolver = "conformist"',
-        "'conforming'",
-    ),
+    "solver of a check": ('check = "value"', 'check = "value"\nsolver = "conform"', "'conforming'"),
     "nested 900 deep": (UPPER, f"upper = {'[' * 900}{']' * 900}", "nested too deep; expected at"),
     "5000 digits": ("poisson = 0.3", f"poisson = {'9' * 5000}", "not valid TOML: Exceeds"),
     "1e308": (UPPER, "upper = [1.0, 1e308]", "geometry.upper[1]: expected a number ≤ 1e+60"),
     "dotted key": ("[material]", f"{'a.' * 20_000}a = 1\n[material]", "a key of more than"),
     "key of 10 MB": ("[material]", f"{'a' * 10**7} = 1\n[material]", "has 10 MB; expected a case"),
-    "long inequality": (
-        'where = "boundary"',
-        f'where = "{" or ".join(["x < 1"] * 100_000)}"',
-        "characters; expected at most 2000",
-    ),
+    "long inequality": ('"boundary"', f'"{" or ".join(["x < 1"] * 100_000)}"', "at most 2000"),
     "escape in the title": ('title = "', 'title = "\\u001b[2J', "title: expected one line of text"),
     "mark of direction": ('title = "', 'title = "\\u202e', "title: expected one line of text"),
 }  # fmt: skip
@@ -83,8 +75,9 @@ def refused(capsys, arguments, said):
     assert found == 2
 
 
-@pytest.mark.parametrize("fault", BROKEN_CASES)
-@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize(
+    ("command", "fault"), [*(("check", fault) for fault in BROKEN_CASES), ("run", "unknown key")]
+)
 def test_a_broken_case_file_is_refused(tmp_path, monkeypatch, capsys, command, fault):
     old, new, said = BROKEN_CASES[fault]
     assert old in PATCH
@@ -233,15 +226,11 @@ def mutated_text(text, rng):
     return "\n".join(lines)
 
 
-def check_cases(tmp_path, capsys, items):
-    for item in items:
+def test_a_few_mutated_cases(tmp_path, capsys):
+    for item in range(20):
         rng = random.Random(f"case {item}")
         source = rng.choice(CASES)
         file = tmp_path / "own.toml"
         file.write_text(mutated_text(source.read_text(), rng))
         assert_said(capsys, ["check", file], item)
         assert [path.name for path in tmp_path.iterdir()] == ["own.toml"], item
-
-
-def test_a_few_mutated_cases(tmp_path, capsys):
-    check_cases(tmp_path, capsys, range(40))

@@ -61,75 +61,58 @@ def all_commands() -> Iterator[tuple[str, str, bool]]:
 
 
 SHELL = ("sh", "console")
-# every command in the blocks of these pages is run, one after the other, by this test
-BY_PAGE = {
-    "docs/guide/write-a-case.md": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "docs/guide/cli.md": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "docs/guide/your-solver.md":
-        "tests/test_extending_docs.py::test_every_command_on_extending_succeeds_in_order",
-    "docs/guide/regression.md":
-        "tests/test_extending_docs.py::test_every_command_on_regression_succeeds_in_order",
-    "docs/guide/simulator.md":
-        "tests/simulator/test_thesis_guide.py::test_every_command_of_the_guide_succeeds",
-    "docs/guide/tutorial.md": "tests/cli/test_tutorial.py"
-        "::test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails",
+HERE, FOREIGN = "tests/cli/test_docs.py", "tests/foreign/test_installing.py"
+# by test: pages of which it runs every command in a block, one after the other, and first words of
+# commands; a command whose case is not in the docs is run with another one
+RUN_BY = {
+    f"{HERE}::test_every_command_of_the_page_succeeds": [
+        "docs/guide/write-a-case.md", "docs/guide/cli.md", "verify list", "verify schema",
+        "verify check my_", "verify run my_", "verify solvers list"],
+    "tests/test_extending_docs.py::test_every_command_on_extending_succeeds_in_order": [
+        "docs/guide/your-solver.md"],
+    "tests/test_extending_docs.py::test_every_command_on_regression_succeeds_in_order": [
+        "docs/guide/regression.md", "verify baseline check"],
+    "tests/simulator/test_thesis_guide.py::test_every_command_of_the_guide_succeeds": [
+        "docs/guide/simulator.md", "verify play"],
+    "tests/cli/test_tutorial.py"
+    "::test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails": [
+        "docs/guide/tutorial.md"],
+    "tests/runner/test_cluster.py::test_a_killed_worker_loses_nothing": [
+        "verify run -k not quick --out sweep --cluster",
+        "verify run -k quick --solver xfem --solver removal"],
+    "tests/runner/test_reference_cache.py"
+    "::test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed": [
+        "verify cache export", "verify run statics/tissue_strip --solver xfem --references"],
+    f"{FOREIGN}"
+    "::test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed": [
+        "verify solvers install", "verify solvers remove"],
+    "tests/foreign/test_live.py::test_an_installed_solver_keeps_what_it_does_not_refuse": [
+        "verify conform ngsxfem"],
+    "tests/foreign/test_live.py::test_an_installed_solver_passes_the_patch_test": [
+        "verify run statics/f3_inclined --solver xfem --solver ngsxfem"],
+    "tests/foreign/test_programs.py"
+    "::test_the_template_answers_a_case_where_verify_cannot_be_imported": [
+        "verify export statics/f1_patch --out mine", "python mine/example.py",
+        "verify import statics/f1_patch mine"],
+    "tests/install/test_setup.py::test_all_that_a_full_run_needs_works_here": ["verify doctor"],
+    "tests/install/test_setup.py::test_setup_installs_the_hashed_lock_and_then_the_project": [
+        ".ci/setup"],
+    "tests/install/test_setup.py::test_no_claim_about_time_decides_make_test": [
+        "make test", "make bench"],
+    f"{HERE}::test_make_knows_its_targets": ["make"],
+    f"{HERE}::test_scripts_are_there_and_compile": [".ci/"],
+    f"{HERE}::test_a_command_of_seconds_succeeds": [
+        "verify conform virtual_node", "verify conform snapping"],
+    f"{HERE}::test_a_command_of_minutes_succeeds": [
+        "verify run --quick --solver my_solver", "verify study",
+        "verify run cutting/hanging_block_quick", "verify run dynamics/freed_half"],
+    "tests/install/test_light_judge.py"
+    "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark": [
+        "verify export benchmark", "verify import benchmark", "verify run benchmark --solver"],
+    "tests/benchmark/test_values.py::test_solvers_are_off_by_what_the_page_says": [
+        "verify run benchmark/"],
 }  # fmt: skip
-# by their first words; a command whose case is not in the docs is run with another one
-BY_TEST = {
-    "verify list": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "verify schema": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "verify run --quick --solver my_solver":
-        "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
-    "verify check my_": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "verify run my_": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "verify run -k not quick --out sweep --cluster":
-        "tests/runner/test_cluster.py::test_a_killed_worker_loses_nothing",
-    "verify run -k quick --solver xfem --solver removal":
-        "tests/runner/test_cluster.py::test_a_killed_worker_loses_nothing",
-    "verify cache export":
-        "tests/runner/test_reference_cache.py::test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed",
-    "verify run statics/tissue_strip --solver xfem --references":
-        "tests/runner/test_reference_cache.py::test_a_run_judges_by_a_bundle_where_fenicsx_is_not_installed",
-    "verify baseline check": "tests/test_extending_docs.py"
-        "::test_every_command_on_regression_succeeds_in_order",
-    "verify solvers install": "tests/foreign/test_installing.py"
-        "::test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed",
-    "verify solvers remove": "tests/foreign/test_installing.py"
-        "::test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed",
-    "verify solvers list": "tests/cli/test_docs.py::test_every_command_of_the_page_succeeds",
-    "verify conform ngsxfem":
-        "tests/foreign/test_live.py::test_an_installed_solver_keeps_what_it_does_not_refuse",
-    "verify run statics/f3_inclined --solver xfem --solver ngsxfem":
-        "tests/foreign/test_live.py::test_an_installed_solver_passes_the_patch_test",
-    "verify export statics/f1_patch --out mine": "tests/foreign/test_programs.py"
-        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
-    "python mine/example.py": "tests/foreign/test_programs.py"
-        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
-    "verify import statics/f1_patch mine": "tests/foreign/test_programs.py"
-        "::test_the_template_answers_a_case_where_verify_cannot_be_imported",
-    "verify doctor": "tests/install/test_setup.py::test_all_that_a_full_run_needs_works_here",
-    ".ci/setup": "tests/install/test_setup.py"
-        "::test_setup_installs_the_hashed_lock_and_then_the_project",
-    "make test": "tests/install/test_setup.py::test_no_claim_about_time_decides_make_test",
-    "make bench": "tests/install/test_setup.py::test_no_claim_about_time_decides_make_test",
-    "make": "tests/cli/test_docs.py::test_make_knows_its_targets",
-    ".ci/": "tests/cli/test_docs.py::test_scripts_are_there_and_compile",
-    "verify play": "tests/simulator/test_thesis_guide.py::test_every_command_of_the_guide_succeeds",
-    "verify conform virtual_node": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
-    "verify conform snapping": "tests/cli/test_docs.py::test_a_command_of_seconds_succeeds",
-    "verify study": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
-    "verify run cutting/hanging_block_quick": "tests/cli/test_docs.py"
-        "::test_a_command_of_minutes_succeeds",
-    "verify export benchmark": "tests/install/test_light_judge.py"
-        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
-    "verify import benchmark": "tests/install/test_light_judge.py"
-        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
-    "verify run benchmark --solver": "tests/install/test_light_judge.py"
-        "::test_an_environment_of_pip_install_is_small_and_judges_the_benchmark",
-    "verify run benchmark/":
-        "tests/benchmark/test_values.py::test_solvers_are_off_by_what_the_page_says",
-    "verify run dynamics/freed_half": "tests/cli/test_docs.py::test_a_command_of_minutes_succeeds",
-}  # fmt: skip
+BY_NAME = {name: test for test, names in RUN_BY.items() for name in names}
 # written by `make results` beside what came of it
 RESULTS = "docs/results/"
 # of the form of a command: a word in capitals or three dots stand for something
@@ -143,21 +126,20 @@ def runner_of(page: str, command: str, in_block: bool) -> str:
     if re.match(r"verify [a-z]+( [a-z]+| --\w+)?$", command) and not in_block:
         return "tests/cli/test_docs.py::test_every_command_in_the_docs_parses"
     plain = command.replace('"', "")
-    name = max((start for start in BY_TEST if plain.startswith(start)), key=len, default="")
-    if in_block and page in BY_PAGE:
-        return BY_PAGE[page]
-    return BY_TEST.get(name, "")
+    name = max((start for start in BY_NAME if plain.startswith(start)), key=len, default="")
+    return BY_NAME.get(page if in_block and page in BY_NAME else name, "")
 
 
 def test_every_command_in_the_docs_is_run_by_a_test() -> None:
     found = {one: runner_of(*one) for one in all_commands()}
     assert len(found) > 100
     assert [one[:2] for one, test in found.items() if not test] == []
-    for test in sorted({*found.values(), *BY_PAGE.values(), *BY_TEST.values()}):
+    for test in sorted({*found.values(), *RUN_BY}):
         file, _, name = test.partition("::")
         assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), test
     used = [command.replace('"', "") for _, command, _ in found]
-    assert [start for start in BY_TEST if not any(c.startswith(start) for c in used)] == []
+    starts = [name for name in BY_NAME if not name.startswith("docs/")]
+    assert [start for start in starts if not any(c.startswith(start) for c in used)] == []
 
 
 def test_a_command_that_nobody_runs_is_noticed() -> None:
@@ -216,7 +198,7 @@ def test_a_command_of_minutes_succeeds(command: str, tmp_path: Path) -> None:
 
 def test_every_command_in_the_docs_parses() -> None:
     pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *DOCS.rglob("*.py")]
-    text = "\n".join(page.read_text(encoding="utf-8") for page in pages).replace("\\\n", " ")
+    text = "\n".join(page.read_text("utf-8") for page in pages).replace("\\\n", " ")
     lines = re.findall(r"^(?:[!$] ?)?(verify .+)$", "\n".join(code_in(text)), flags=re.MULTILINE)
     assert len(lines) > 50
     parser = build_parser()

@@ -37,11 +37,6 @@ class TakesTheFirstCut(XfemSolver):
         return super().solve(changed(scene, cuts=scene.cuts[:1]), level, repetitions)
 
 
-class TakesTheLastCut(XfemSolver):
-    def solve(self, scene, level, repetitions=1):
-        return super().solve(changed(scene, cuts=scene.cuts[-1:]), level, repetitions)
-
-
 class TakesOneMaterial(XfemSolver):
     def solve(self, scene, level, repetitions=1):
         return super().solve(changed(scene, material=scene.material.each[0]), level, repetitions)
@@ -154,20 +149,6 @@ class TooStiffInSpace(XfemSolver):
         return super().solve(scene, level, repetitions)
 
 
-class SwapsTheSides(XfemSolver):
-    """Gives each of the two nodes at a place on the cut what the other has."""
-
-    def solve(self, scene, level, repetitions=1):
-        solution = super().solve(scene, level, repetitions)
-        keys = {}
-        for node, point in enumerate(np.round(solution.points, 12)):
-            keys.setdefault(tuple(point), []).append(node)
-        order = np.arange(len(solution.points))
-        for pair in keys.values():
-            order[pair] = pair[::-1]
-        return replace(solution, displacement=solution.displacement[:, order])
-
-
 class HalfAsStiff(XfemSolver):
     def solve(self, scene, level, repetitions=1):
         soft = scene.material.model_copy(update={"young": 0.5 * scene.material.young})
@@ -204,12 +185,6 @@ class TurnsALittle(XfemSolver):
 class LumpsAsTheThesis(XfemSolver):
     def solve(self, scene, level, repetitions=1):
         return super().solve(scene, level, repetitions, mass="thesis")
-
-
-class StatesStrainOfRotation(XfemSolver):
-    def solve(self, scene, level, repetitions=1):
-        solution = super().solve(scene, level, repetitions)
-        return replace(solution, ledger={"strain": np.array([1e-3])})
 
 
 class LosesEnergySlowly(XfemSolver):
@@ -289,18 +264,6 @@ class Noisy(XfemSolver):
         solution = super().solve(scene, level, repetitions)
         noise = 1e-9 * np.random.default_rng().standard_normal(solution.displacement.shape)
         return replace(solution, displacement=solution.displacement + noise)
-
-
-class Remembers(XfemSolver):
-    """Is right only the first time in a process."""
-
-    calls = 0
-
-    def solve(self, scene, level, repetitions=1):
-        solution = super().solve(scene, level, repetitions)
-        Remembers.calls += 1
-        factor = 1 + 1e-9 * (Remembers.calls - 1)
-        return replace(solution, displacement=factor * solution.displacement)
 
 
 class LosesAPiece(XfemSolver):

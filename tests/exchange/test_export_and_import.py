@@ -62,12 +62,7 @@ def test_an_exported_case_holds_mesh_cuts_supports_and_material(tmp_path):
 
 SPACE = (
     body_text(
-        "A cube that falls apart",
-        "It shall fall.",
-        [1.0, 1.0, 1.0],
-        [[2, 2, 2]],
-        young="1e4",
-        density="1000.0",
+        "A cube that falls apart", "It shall fall.", [1.0] * 3, [[2, 2, 2]], "1e4", density="1000.0"
     )
     + '[analysis]\nkind = "dynamic"\nduration = 0.4\ntime_step = 0.1\noutputs = 3\n'
     + '[initial]\nkind = "equilibrium"\n'

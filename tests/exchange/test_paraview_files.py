@@ -58,9 +58,7 @@ def six(tensor):
     return tensor[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
 
 
-@pytest.mark.parametrize(
-    "case", ["statics/f1_3d", "statics/f1_patch", "material/plane_stress_patch"]
-)
+@pytest.mark.parametrize("case", ["statics/f1_3d", "material/plane_stress_patch"])
 def test_a_linear_motion_has_its_times_and_one_strain_and_stress_at_each(tmp_path, case):
     d = load_scene(case).dimension
     times = (0.0, 0.025, 0.1)
@@ -94,11 +92,8 @@ def test_a_linear_motion_has_its_times_and_one_strain_and_stress_at_each(tmp_pat
 
 @pytest.mark.parametrize(
     "case",
-    [
-        "statics/f1_patch", "material/plane_stress_patch", "statics/f1_3d",
-        "rotation/turned_apart", "rotation/turned_apart_solid", "statics/membrane_halves",
-    ],
-)  # fmt: skip
+    ["material/plane_stress_patch", "rotation/turned_apart_solid", "statics/membrane_halves"],
+)
 def test_half_of_stress_times_strain_is_the_energy_that_the_comparison_measures(case):
     random = np.random.default_rng(7)
     scene, solution = moved(case, lambda points, _: 0.02 * random.standard_normal(points.shape))

@@ -98,9 +98,8 @@ def assert_same_motion(found, expected, relative):
         assert np.abs(field - other).max() <= relative * np.abs(other).max(), name
 
 
-@pytest.mark.parametrize("case", ["dynamics/block_falls_apart", "dynamics/prestrained_bar_solid"])
-def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, tmp_path):
-    scene = undamped(case)
+def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(modules, tmp_path):
+    scene = undamped("dynamics/prestrained_bar_solid")
     export_case(scene, tmp_path, [0], conforming=True)
     laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
     modules["motion"].run_engine(laid, newmark(modules["example"]))
@@ -217,9 +216,7 @@ def test_total_lagrangian_elements_of_kratos_are_those_of_the_conforming_solver(
     assert off.max() < 1e-11 * np.abs(expected.displacement).max()
 
 
-@pytest.mark.parametrize("name", [
-    "stretched_halves", "torn_block", "turned_apart", "freed_half",
-])  # fmt: skip
+@pytest.mark.parametrize("name", ["torn_block", "freed_half"])
 def test_vertex_block_descent_takes_the_cases_of_its_own_law_alone(name):
     takes, scene = foreign_solver("vbd").takes, load_scene(f"rotation/neo_{name}")
     assert takes.refusal(scene) is None

@@ -1,8 +1,6 @@
 """Tip functions of GetFEM: the cells that show them, and the orders that they are there for."""
 
-import json
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 from verify.cli import main
 from verify.foreign import foreign_solver, state_of
 from verify.foreign.records import PROGRAMS
-from verify.result import read_result
 from verify.scene import load_scene
 from verify.study.measured_scenes import measurements, variant_of
 
@@ -101,27 +98,6 @@ def test_tip_functions_have_the_orders_of_a_smooth_field():
     for error, order in (("displacement_l2", 1.75), ("energy_norm", 0.8)):
         coarse, fine = (one.value for one in found if one.quantity == error)
         assert coarse / fine >= 2**order, error
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize(
-    "blunt, sharp", [("xfem tip=inside", "xfem"), ("getfem", "getfem tip=functions")]
-)
-def test_a_solver_with_its_tips_stands_beside_the_one_without_in_one_report(tmp_path, blunt, sharp):
-    """An end that is where it is asked to be has less than three quarters of the error."""
-    if blunt == "getfem" and not state_of(foreign_solver("getfem")).python:
-        pytest.skip("GetFEM is not installed")
-    text = Path(load_scene("statics/griffith_inside").file).read_text(encoding="utf-8")
-    case, out = tmp_path / "griffith.toml", tmp_path / "run"
-    case.write_text(text.replace(", [64, 64], [128, 128]", ""), encoding="utf-8")
-    asked = ["--solver", blunt, "--solver", sharp, "--repetitions", "1"]
-    main(["run", str(case), *asked, "--no-conform", "--out", str(out)])
-    result = read_result(out / "cases" / "griffith" / "result.json")
-    found = {(s.solver, s.level): s.metric("displacement_l2").value for s in result.solves}
-    for level in (0, 1):
-        assert found[sharp, level] < 0.75 * found[blunt, level]
-    assert json.loads((out / "ranking.json").read_text())["solvers"] == [blunt, sharp]
-    assert max(blunt, sharp, key=len).split()[1] in (out / "report.html").read_text("utf-8")
 
 
 @pytest.mark.heavy

@@ -73,19 +73,17 @@ def verdicts(answer):
 
 
 def test_a_folder_of_answers_is_judged_where_only_numpy_and_scipy_are(tmp_path, root):
-    """The check is of the displacement, at most 18 % wrong: the answer passes, 1.3 of it fails."""
+    """The check is of the displacement, at most 18 % wrong: 1.3 of a right answer fails."""
     (tmp_path / "sitecustomize.py").write_text(
         f"import sys\nsys.modules.update(dict.fromkeys({FORBIDDEN}))\n"
     )
     environment = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
-    case, found = "cutting/plate_crossed_quick", {}
-    for name, factor in (("right", 1.0), ("wrong", 1.3)):
-        answers_of_another(load_scene(case), tmp_path / name, factor)
-        asked = ["import", case, tmp_path / name, "--solver", "mine", "--out", f"out-{name}"]
-        answer = said(sys.executable, tmp_path, *asked, "--json", environment=environment)
-        found[name] = verdicts(answer)[case]["displacement_l2"]
-        assert "<svg" in (tmp_path / json.loads(answer.out)["report"]).read_text()
-    assert found == {"right": "PASS", "wrong": "FAIL"}
+    case = "cutting/plate_crossed_quick"
+    answers_of_another(load_scene(case), tmp_path / "wrong", 1.3)
+    asked = ["import", case, tmp_path / "wrong", "--solver", "mine", "--out", "out"]
+    answer = said(sys.executable, tmp_path, *asked, "--json", environment=environment)
+    assert verdicts(answer)[case]["displacement_l2"] == "FAIL"
+    assert "<svg" in (tmp_path / json.loads(answer.out)["report"]).read_text()
 
 
 @pytest.fixture(scope="session")

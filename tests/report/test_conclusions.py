@@ -23,7 +23,7 @@ from verify.report.benchmark_page import (
     write_benchmark,
 )
 from verify.report.conclusions import answer
-from verify.report.evidence import Evidence, benchmark_scenes, beside, ends_inside
+from verify.report.evidence import Evidence, benchmark_scenes, beside
 from verify.report.front_page import arena_head, figures, write_front
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
@@ -205,10 +205,7 @@ def test_a_difference_that_positions_of_the_mesh_do_not_show_is_none():
     cases = changed({REMESHED: (0.7, 5.0)})
     assert sentence.of(made(cases, positions=wide)).text.startswith("Not for accuracy: ")
     assert sentence.of(made(cases, positions=[])) is None
-
-
-def test_a_difference_is_claimed_only_where_positions_of_the_mesh_show_it():
-    """The protocol: the 90 % range excludes 1; without the study there is no claim."""
+    # the protocol: the 90 % range excludes 1; without the study there is no claim
     lacking = {own.question: own.lacking for own in answer(made(positions=[]))}
     assert lacking["Accuracy at a tip"] == ["tip functions, on several positions of the mesh"]
     wide = [{**row, "value": str(float(row["value"]) * (3.0 if row["position"] < "2" else 1.0))}
@@ -248,6 +245,9 @@ def test_groups_share_a_row_and_refusals_and_failures_are_told_apart():
     table = [[text.strip() for text in line.strip("|").split("|")]
              for line in whole_table(evidence)]  # fmt: skip
     assert table[0] == ["discretisation", "C1", "C2", "C3", "C4", "C7", "C8"]
+    scenes = benchmark_scenes([case("benchmark/c8_slivers", "through"),
+                               case("benchmark/c8_slivers_corner", "through", True)])  # fmt: skip
+    assert list(scenes) == ["C8", "C8 motion"]
     of = {row[0]: row[1:] for row in table[2:]}
     assert of[FUNCTIONS][:3] == ["**1**", "**1**", "–"]
     assert of["ngsxfem"][1] == "–"
@@ -266,22 +266,6 @@ def test_one_interval_over_the_best_is_no_loss():
     table = whole_table(made(bare))
     row = next(line for line in table if line.startswith("| XFEM |"))
     assert row.split("|")[2].strip() == "**2.2 [2.2, 2.2]**"
-
-
-def test_motion_and_rest_of_a_scene_are_two_columns():
-    cases = [case("benchmark/c8_slivers", "through"),
-             case("benchmark/c8_slivers_corner", "through", True),
-             case("benchmark/c5_blade_01", "edge", True),
-             case("benchmark/c5_blade_06", "edge", True)]  # fmt: skip
-    scenes = benchmark_scenes(cases)
-    assert list(scenes) == ["C5", "C8", "C8 motion"]
-    assert len(scenes["C5"]) == 2
-
-
-def test_ends_inside_looks_at_every_cut():
-    assert ends_inside({"cuts": [{"expected": "through"}, {"expected": "inner"}]})
-    assert not ends_inside({"cuts": [{"expected": "through"}, {}]})
-    assert not ends_inside({})
 
 
 @pytest.mark.parametrize("foreign", [[], ["getfem", "kratos", "ngsxfem", "vbd"]])
@@ -332,11 +316,7 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     assert head.startswith("- **Accuracy at rest**: XFEM or a conforming mesh")
     assert "answered of asked. " in head
     assert "SOFA" not in head  # of another run
-
-
-def test_bars_of_coverage_count_scenes(tmp_path):
-    head = "\n".join(arena_head(made(), [], tmp_path))
-    assert "snapping 7 of 8" in head
+    assert "snapping 7 of 8" in head  # bars count scenes
     assert "getfem 2 of 3" in head
 
 

@@ -135,9 +135,6 @@ def test_what_a_run_has_not_is_said_and_which_case_would_fill_it():
     assert [one.question for one in found] == ["Accuracy", "Energy", "Slivers", "Cost"]
     assert all("would tell" in one.sentence for one in found)
     assert answer_panels([], found, Palette()) == [None] * 4
-
-
-def test_an_exact_answer_is_called_so():
     exact = case("a", solve("xfem", 0, 1e-15), solve("conforming", 0, 2e-15))
     assert answers([exact])[0].sentence == "All displacement errors are at round-off."
 

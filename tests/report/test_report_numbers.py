@@ -25,7 +25,6 @@ from verify.result import Status, Verdict, VerdictRecord
 @pytest.mark.parametrize(
     ("value", "half", "written"),
     [
-        (1.995, 0.03, "1.995 [1.965, 2.025]"),
         (7.3651e-4, 1e-7, "7.365×10⁻⁴ [7.364×10⁻⁴, 7.366×10⁻⁴]"),
         (1.0017, 2e-5, "1.00170 [1.00168, 1.00172]"),
         (1.0443504632, 4e-11, "1.044 ± 4×10⁻¹¹"),
@@ -50,13 +49,6 @@ def test_a_number_that_is_rounded_up_to_a_power_of_ten_has_no_digit_more(value, 
     assert number(value, 3) == written
 
 
-def checked_error(value, half):
-    return VerdictRecord(
-        "error", "xfem", "energy_norm", Verdict.PASS, value, max(0.0, value - half), value + half,
-        "relative error ≤ 0.1", "",
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("error", "uncertainty", "written"),
     [
@@ -70,11 +62,6 @@ def checked_error(value, half):
 )
 def test_an_error_that_is_not_above_its_uncertainty_is_no_number(error, uncertainty, written):
     assert error_text(error, uncertainty) == written
-
-
-def test_nor_is_it_one_in_the_row_of_its_check():
-    assert check_row(checked_error(2e-3, 5e-3))[1] == "not resolved (< 0.0070)"
-    assert "[" in check_row(checked_error(6e-3, 5e-3))[1]
 
 
 def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
@@ -134,16 +121,10 @@ def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(
     assert stored == json.loads((root / "ranking.json").read_text())
 
 
-def test_what_does_not_conform_is_said_with_its_claim(tmp_path, suite):
-    root = make_run(tmp_path / "run", pictures=False)
-    ranked(root, conformance=True)
-    page = parsed(render(root).read_text(encoding="utf-8"))
-    assert "two halves contract each for itself" in page.text
-
-
 def test_conformance_is_taken_over_until_the_solver_changes(tmp_path, suite, monkeypatch):
     root = make_run(tmp_path / "run", pictures=False)
     ranked(root, conformance=True)
+    assert "two halves contract each for itself" in text_of(root)
     first = list(suite)
     # 'other' is no solver that could be asked
     assert [name for name, _ in first] == ["xfem", "conforming"]

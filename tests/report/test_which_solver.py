@@ -3,8 +3,6 @@
 import itertools
 from dataclasses import asdict
 
-import pytest
-
 from verify.report.which import baseline, which_view
 from verify.result import Comparison, LeftOut, Pair, Ranking, Standing
 
@@ -67,11 +65,8 @@ def test_each_kind_of_scene_and_metric_has_its_table():
     one["pairs"] += ranking("jump_l2")["pairs"] + ranking(kind="motion")["pairs"]
     said = [table.caption for table in which_view(one)["errors"]]
     assert len(said) == 3
-    assert [words.rpartition(", scenes ")[2] for words in said] == [
-        "at rest",
-        "in motion",
-        "at rest",
-    ]
+    kinds = [words.rpartition(", scenes ")[2] for words in said]
+    assert kinds == ["at rest", "in motion", "at rest"]
     assert "jump" in said[2]
 
 
@@ -84,12 +79,11 @@ def test_without_conforming_ratios_are_to_the_first_that_answered_most():
     assert table.head[1].text == "ratio to a"
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(["a", "conforming", "twin", "b"])))
-def test_the_order_of_solvers_moves_no_number(order):
+def test_the_order_of_solvers_moves_no_number():
     one = ranking(without=("none",))
     before = rows(which_view(one)["errors"][0])
-    after = rows(which_view({**one, "solvers": list(order)})["errors"][0])
-    assert after == before
+    for order in itertools.permutations(["a", "conforming", "twin", "b"]):
+        assert rows(which_view({**one, "solvers": list(order)})["errors"][0]) == before
 
 
 def test_a_pair_without_a_ratio_says_so_and_is_last():
@@ -102,14 +96,10 @@ def test_a_pair_without_a_ratio_says_so_and_is_last():
     a = next(row for row in rows(table) if row[0][0] == "a")
     assert a[1][0] == "–"
     assert a[2][0] == "4, 1, 8"
-
-
-def test_of_one_scene_there_is_no_range():
-    one = ranking()
+    one = ranking()  # of one scene there is no range
     for pair in one["pairs"]:
         pair.update(count=1, low=pair["ratio"], high=pair["ratio"])
-    (table,) = which_view(one)["errors"]
-    assert rows(table)[1][1] == ("1.40", "1 scene")
+    assert rows(which_view(one)["errors"][0])[1][1] == ("1.40", "1 scene")
 
 
 def test_energy_has_its_ranks_and_what_was_left_out_once_for_all_metrics():

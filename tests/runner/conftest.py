@@ -14,8 +14,8 @@ from command_line import forking, run_here
 
 HERE = Path(__file__).parent
 HARMLESS = {f"fake_solvers:{name}" for name in (
-    "Instant", "Other", "Wrong", "Straining", "Frozen", "Refusing", "RefusingLate", "Raising",
-    "NotFinite", "HangingOnLevelOne",
+    "Instant", "Wrong", "Straining", "Refusing", "RefusingLate", "Raising",
+    "NotFinite", "HangingOnLevelOne", "Hanging", "Hungry",
 )}  # fmt: skip
 
 CASE = (
@@ -59,7 +59,7 @@ class CommandLine:
         """Run in this process, and fork the solvers that do no harm to theirs."""
         if "--cluster" in arguments or "PYTHONPATH" in environment:  # of a fresh process
             process = self.start(*arguments, **environment)
-            out, err = process.communicate(timeout=120)
+            out, err = process.communicate(timeout=300)
             return subprocess.CompletedProcess(arguments, process.returncode, out, err)
         if arguments[0] == "run":
             arguments = (*arguments, "--no-report")

@@ -55,10 +55,6 @@ class Instant:
         )
 
 
-class Other(Instant):
-    name = "other"
-
-
 class Straining(Instant):
     """Stretches by its parameter."""
 
@@ -67,16 +63,6 @@ class Straining(Instant):
     def solve(self, scene, level, repetitions=1, strain=0.1, way="along"):
         self.strain = strain
         return super().solve(scene, level, repetitions)
-
-
-class Frozen(Straining):
-    """Allows nothing to be set on it."""
-
-    def __setattr__(self, name, value):
-        raise AttributeError(f"no {name} can be set")
-
-    def solve(self, scene, level, repetitions=1, strain=0.1):
-        return Straining().solve(scene, level, repetitions, strain)
 
 
 class Wrong(Instant):

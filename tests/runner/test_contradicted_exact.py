@@ -78,27 +78,6 @@ def _penny(rng):
     }
 
 
-def _smooth(rng):
-    """Sinusoids with a body force on each side of an inclined cut."""
-    angle = rng.uniform(-25, 25)
-    slope = np.tan(np.deg2rad(angle))
-    rows = {
-        side: [[rng.uniform(0.05, 0.2), rng.uniform(1, 3), rng.uniform(0, 1)] for _ in range(2)]
-        for side in ("above", "below")
-    }
-    return {
-        "supports": _HELD,
-        "loads": [{"kind": "body_force", "force": "exact"}],
-        "exact": {
-            "solution": "smooth",
-            "parameters": {"point": [0.5, 0.5], "angle": angle, **rows},
-        },
-        "cuts": [
-            {"kind": "polyline", "points": [[-0.2, 0.5 - 0.7 * slope], [1.2, 0.5 + 0.7 * slope]]}
-        ],
-    }
-
-
 def _support_off(content, rng):
     d, slope = _dimension(content), rng.choice([-0.01, 0.01])
     other = {"where": "right", "displacement": [f"1e-3 + {slope} * x", *[0.0] * (d - 1)]}
@@ -153,7 +132,6 @@ _CHANGES = {
     _griffith: (_support_off, _free_face, _cut_moved, _cut_of_other_size, _no_load, _weight),
     _halves: (_support_off, _free_face, _cut_moved, _weight),
     _penny: (_support_off, _free_face, _cut_moved, _cut_of_other_size, _weight),
-    _smooth: (_support_off, _free_face, _cut_moved, _no_load),
 }
 
 

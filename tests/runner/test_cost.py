@@ -24,11 +24,10 @@ from verify.runner.selection import Options
 from verify.scene import ToolPathCut
 from verify.solvers.body_of_scene import background_mesh
 
-STRUCTURED = ["statics/f1_patch", "controls/hanging_bar", "cutting/hanging_block_quick"]
 SCENES = {name: rows[0] for name, rows in catalogue().items()}
 
 
-@pytest.mark.parametrize("name", [*STRUCTURED, "benchmark/c3_strip"])
+@pytest.mark.parametrize("name", ["cutting/hanging_block_quick", "benchmark/c3_strip"])
 def test_unknowns_are_those_of_the_uncut_mesh(name):
     scene = SCENES[name]
     for row in solver_costs(scene, "xfem"):
@@ -60,12 +59,6 @@ def test_no_blade_of_a_judged_scene_goes_farther_than_half_an_element_in_a_step(
             found[name] = max(speeds) * scene.analysis.time_step / finest[1]
     assert len(found) > 10
     assert {name: share for name, share in found.items() if share > 0.5} == {}
-
-
-def test_a_reference_level_has_the_unknowns_of_halved_elements():
-    coarse, fine, finest = solver_costs(SCENES["benchmark/c3_strip"], "reference")
-    assert 3.5 < fine.unknowns / coarse.unknowns < 4.0
-    assert 3.5 < finest.unknowns / fine.unknowns < 4.0
 
 
 def test_a_step_of_the_reference_s_own_is_in_its_forecast():
@@ -210,23 +203,19 @@ def test_the_smallest_suite_comes_first():
     assert suites_line([], jobs=2) == ""
 
 
-def test_a_mesh_that_no_machine_holds_is_warned_of_in_one_line(tmp_path, case_text, capsys):
+def test_check_says_the_cost_and_warns_in_one_line_of_a_mesh_that_no_machine_holds(
+    tmp_path, case_text, capsys
+):
     file = tmp_path / "case.toml"
     file.write_text(case_text)
     assert main(["check", str(file)]) == 0
-    assert capsys.readouterr().err == ""
+    said = capsys.readouterr()
+    assert ("unknowns" in said.out, said.err) == (True, "")
+    assert main(["check", "--json", str(file)]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert (row["cost"][0]["solver"], row["cost"][0]["unknowns"] > 0) == ("xfem", True)
     assert "cells = [[2, 2], [4, 4]]" in case_text
     file.write_text(case_text.replace("cells = [[2, 2], [4, 4]]", "sizes = [0.5, 2e-5]"))
     assert main(["check", str(file)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert "warning: level 1 of xfem would take about 1.25e+04 GB" in line
-
-
-def test_the_command_says_it_of_a_file(tmp_path, case_text, capsys):
-    (tmp_path / "case.toml").write_text(case_text)
-    assert main(["check", str(tmp_path / "case.toml")]) == 0
-    assert "unknowns" in capsys.readouterr().out
-    assert main(["check", "--json", str(tmp_path / "case.toml")]) == 0
-    (row,) = json.loads(capsys.readouterr().out)
-    assert row["cost"][0]["solver"] == "xfem"
-    assert row["cost"][0]["unknowns"] > 0

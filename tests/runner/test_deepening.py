@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
-from verify.judge.checks import result_without_verdicts
 from verify.judge.intervals import sufficiency
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.directory import Job
@@ -132,10 +131,3 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
     assert f"{len(levels) + 1} finished solves of before were reused" in again.stdout
     said = json.loads((verify.folder / "out/cases/slit/result.json").read_text())["reference"]
     assert said["suffices_reason"] == result["reference"]["suffices_reason"]
-
-
-def test_a_case_without_a_comparison_is_kept_in_the_keys_of_a_case_file(scene):
-    content = result_without_verdicts(scene, [], "no reference", {}).scene
-    again = Scene.model_validate(content)
-    assert again.model_dump() == scene.model_dump()
-    assert content["schema"] == 1

@@ -1,7 +1,7 @@
 """Solves that end badly: each is a record with its reason, and the others go on."""
 
 import json
-import time
+from pathlib import Path
 
 import pytest
 from command_line import without_waits
@@ -20,12 +20,19 @@ ENDINGS = {
 
 def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(verify):
     solvers = [f"--solver=fake_solvers:{name}" for name in ("Instant", *ENDINGS)]
-    done = verify("run", "square.toml", "--out", "out", "-j", "2", "--no-conform", *solvers)
+    asked = ("--out", "out", "-j", "2", "--no-conform", "--repetitions", "4")
+    done = verify("run", "square.toml", *asked, *solvers)
     records = verify.records()
     for name, (status, reason) in ENDINGS.items():
         assert (records[name, 0]["status"], records[name, 0]["reason"]) == (status, reason)
     assert records["Instant", 0]["status"] == records["Instant", 1]["status"] == "solved"
     assert done.returncode == 3
+    well = records["Instant", 1]
+    assert well["timings"] == {"solve": [1e-3] * 4}
+    assert 0 < well["wall"] < 600
+    assert 20e6 < well["peak_memory"] < 1e9  # an interpreter with numpy
+    assert well["notes"]["threads"] == "1"
+    assert well["notes"]["timing"].startswith("contended")
     # the log keeps the output of the solver
     log = verify.folder / "out/cases/square/fake_solvers_Raising-0/log.txt"
     assert "Traceback" in log.read_text()
@@ -35,13 +42,11 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
 
 def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify):
     mark = verify.folder / "mark"
-    start = time.monotonic()
-    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "6")
+    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "3")
     verify(*command, "--out", "out", HANG_MARK=str(mark))
-    assert time.monotonic() - start < 60
     record = verify.records()["Hanging", 0]
-    assert (record["status"], record["reason"]) == ("timeout", "killed after 6 s")
-    assert 6.0 <= record["wall"] < 30
+    assert (record["status"], record["reason"]) == ("timeout", "killed after 3 s")
+    assert 3.0 <= record["wall"] < 300
     assert not alive_in_group(int(mark.read_text()))
 
 
@@ -56,22 +61,6 @@ def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
     assert record["reason"] == "killed above 400 MB"
     # it touches 16 MB per 5 ms and is looked at every 20 ms (with the machine's own delays)
     assert 0.4e9 < record["peak_memory"] < 1.5e9
-
-
-def test_memory_time_threads_and_repetitions_are_recorded(verify):
-    verify(
-        "run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out"
-    )
-    record = verify.records()["Instant", 1]
-    assert record["timings"] == {"solve": [1e-3] * 4}
-    assert 0 < record["wall"] < 60
-    assert 20e6 < record["peak_memory"] < 1e9  # an interpreter with numpy
-    assert record["notes"]["threads"] == "1"
-
-
-def test_timings_of_solves_that_ran_side_by_side_are_marked(verify):
-    verify("run", "square.toml", "--solver=fake_solvers:Instant", "-j", "2", "--out", "out")
-    assert verify.records()["Instant", 0]["notes"]["timing"].startswith("contended")
 
 
 @pytest.mark.parametrize(
@@ -92,8 +81,6 @@ def test_a_solver_that_was_asked_for_and_does_not_work_is_bad_input(verify, solv
 
 def alive_in_group(leader):
     """Whether a process of the group still runs (zombies do not count)."""
-    from pathlib import Path
-
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rpartition(")")[2].split()

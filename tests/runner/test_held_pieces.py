@@ -34,7 +34,7 @@ def _hold(where, d, components=None):
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_half_that_is_free_or_can_still_move_is_refused_before_a_run(d):
     rng = np.random.default_rng(7)
-    for _ in range(5):
+    for _ in range(3):
         content = _halves(rng, d)
         left, right = _hold("left", d), _hold("right", d)
         # held at one side, or all over one face in one component: that leaves shifts
@@ -52,7 +52,7 @@ def test_a_half_that_is_free_or_can_still_move_is_refused_before_a_run(d):
 
 def test_a_piece_between_cuts_and_a_flap_that_hangs_on():
     rng = np.random.default_rng(8)
-    for _ in range(5):
+    for _ in range(3):
         a, b = rng.uniform(0.2, 0.4), rng.uniform(0.6, 0.8)
         tilt = rng.uniform(-0.1, 0.1)
         lines = [[[x - tilt, -0.1], [x + tilt, 1.1]] for x in (a, b)]
@@ -81,14 +81,3 @@ def test_a_motion_may_have_free_pieces_unless_it_begins_in_equilibrium():
     assert check_refusal(**later, initial=opened) == ""
     unheld = free | {"supports": [], "initial": {"kind": "equilibrium"}}
     assert "can move as a rigid body" in check_refusal(**unheld)
-
-
-def test_an_l_shaped_body_on_an_unstructured_mesh():
-    corners = [[0, 0], [1, 0], [1, 0.4], [0.4, 0.4], [0.4, 1], [0, 1]]
-    body = {
-        "geometry": {"kind": "polygon", "corners": [[float(x), float(y)] for x, y in corners]},
-        "mesh": {"sizes": [0.15], "pattern": "unstructured"},
-        "cuts": [{"kind": "polyline", "points": [[0.6, -0.1], [0.75, 0.5]]}],
-    }
-    assert "can move as a rigid body" in check_refusal(**body, supports=[_hold("edge4", 2)])
-    assert check_refusal(**body, supports=[_hold("edge4", 2), _hold("edge1", 2)]) == ""

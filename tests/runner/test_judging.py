@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verify.compare.errors import nodal_error
-from verify.compare.locate import SolutionField
 from verify.judge import accuracy
 from verify.result import (
     CRITICAL_STEP,
@@ -24,7 +22,6 @@ from verify.runner.directory import MEASURED
 from verify.runner.run import exit_code
 from verify.runner.solve import solve_job
 from verify.scene import load_scene, scene_content
-from verify.solution import Solution
 
 INSTANT, WRONG = "fake_solvers:Instant", "fake_solvers:Wrong"
 
@@ -44,22 +41,8 @@ def verdicts(done):
     return {v["solver"]: (v["verdict"], v["reason"]) for v in case["verdicts"]}
 
 
-def test_a_right_solver_passes_and_a_wrong_one_fails_whatever_else_died(verify):
-    with_checks(verify, check(INSTANT), check(WRONG), check("fake_solvers:Raising"))
-    solvers = [f"--solver={s}" for s in (INSTANT, WRONG, "fake_solvers:Raising")]
-    done = verify(
-        "run", "square.toml", "--out", "out", "--json", "-j", "2", "--no-conform", *solvers
-    )
-    found = verdicts(done)
-    assert found[INSTANT][0] == "PASS"
-    assert found[WRONG][0] == "FAIL"
-    assert found["fake_solvers:Raising"][0] == "ERROR"
-    assert "the pivot is zero" in found["fake_solvers:Raising"][1]
-    assert done.returncode == json.loads(done.stdout)["exit"] == 1
-
-
 RUN = ("run", "square.toml", "--out", "out", "--json", "-j", "2", "--no-conform")
-BESIDE = (*RUN, f"--solver={INSTANT}", f"--solver={WRONG}", "--solver=fake_solvers:Refusing")
+BESIDE = (*RUN, *(f"--solver={s}" for s in (INSTANT, WRONG, "fake_solvers:Refusing")))
 
 
 def test_a_check_without_a_solver_is_made_of_each_that_is_asked_and_does_not_refuse(verify):
@@ -96,13 +79,20 @@ reason = "It stretches twice as much."
     assert verify(*BESIDE).returncode == 1  # another check that it fails is not known
 
 
-@pytest.mark.parametrize(("options", "code"), [((), 0), (("--strict",), 5)])
-def test_a_check_of_a_solver_that_was_not_asked_for_stays_undecided(verify, options, code):
-    with_checks(verify, check(INSTANT), check("xfem"))
-    done = verify("run", "square.toml", "--out", "out", "--json", "--solver", INSTANT, *options)
-    assert verdicts(done)["xfem"] == ("UNDECIDED", "the run was not asked for solver 'xfem'")
-    assert verdicts(done)[INSTANT][0] == "PASS"
-    assert done.returncode == code
+def test_who_died_or_was_not_asked_for_leaves_the_verdicts_of_the_others(verify):
+    died = "fake_solvers:Raising"
+    with_checks(verify, check(INSTANT), check(died), check("xfem"))
+    asked = ("run", "square.toml", "--out", "out", "--json", "--solver", INSTANT)
+    for options, code in (((), 0), (("--strict",), 5), (("--solver", died, "--no-conform"), 3)):
+        if died in options:
+            asked = (*asked[:3], "two", *asked[4:])
+        done = verify(*asked, *options)
+        found = verdicts(done)
+        assert found["xfem"] == ("UNDECIDED", "the run was not asked for solver 'xfem'")
+        assert found[INSTANT][0] == "PASS"
+        assert done.returncode == json.loads(done.stdout)["exit"] == code
+    assert found[died][0] == "ERROR"
+    assert "the pivot is zero" in found[died][1]
 
 
 def test_changed_acceptance_is_judged_again_without_solving(verify):
@@ -196,57 +186,6 @@ def test_the_order_of_the_cases_does_not_matter():
     assert {exit_code(list(order)) for order in itertools.permutations(cases[1:])} == {3}
 
 
-def opened_square(columns: int, height: float) -> Solution:
-    """Two layers on each side of the cut y = 0, the inner ones of this height, opened by 1."""
-    x = np.linspace(0.0, 1.0, columns + 1)
-    points, cells, displacement = [], [], []
-    for sign in (1.0, -1.0):
-        start = len(points)
-        for y in (0.0, sign * height, sign * 0.5):
-            points += [(a, y) for a in x]
-            displacement += [(0.0, 0.5 * sign)] * len(x)
-        for row in range(2):
-            for i in range(columns):
-                a = start + row * (columns + 1) + i
-                b, c, d = a + 1, a + columns + 1, a + columns + 2
-                cells += [(a, b, d), (a, d, c)]
-    return Solution(np.array(points), np.array(cells), np.array(displacement)[None])
-
-
-def test_lips_are_compared_with_their_own_side_however_slender_the_cells() -> None:
-    # the cells at the cut are up to 1e5 times longer than high, and the meshes do not match
-    for height in (1e-1, 1e-3, 1e-6):
-        own, other = opened_square(10, height), opened_square(7, 0.3)
-        assert nodal_error(own, SolutionField(other)).max() <= 1e-12
-
-
-def note(scene, solver, folder):
-    job = {"scene": scene_content(scene), "solver": solver, "level": 0, "repetitions": 1,
-           "parameters": {}}  # fmt: skip
-    outcome = solve_job(job, folder, store=False)
-    assert outcome["status"] == "solved", outcome
-    return outcome["notes"].get(CRITICAL_STEP)
-
-
-def test_every_rival_of_a_motion_says_its_critical_step(tmp_path):
-    """Subdivision makes slivers elements of their own: its step is shorter; springs have none."""
-    scene = load_scene("cutting/plate_crossed_quick")
-    steps = {
-        name: float(note(scene, name, tmp_path).removesuffix(" s"))
-        for name in ("xfem", "conforming", "subdivision")
-    }
-    assert 0.0 < steps["subdivision"] < 0.9 * steps["xfem"]
-    assert steps["conforming"] > 0.0
-    assert "springs" in note(scene, "mass_spring", tmp_path)
-
-
-def test_a_scene_at_rest_has_no_critical_step(tmp_path):
-    scene = load_scene("statics/f1_patch")
-    job = {"scene": scene_content(scene), "solver": "xfem", "level": 0, "repetitions": 1,
-           "parameters": {}}  # fmt: skip
-    assert CRITICAL_STEP not in solve_job(job, tmp_path, store=False)["notes"]
-
-
 DEPTH = 0.0137
 
 
@@ -261,37 +200,38 @@ def value(part):
     return f"[{', '.join(map(value, part))}]" if isinstance(part, list) else json.dumps(part)
 
 
-def pressed_case(dimension):
-    """Two halves of a unit square or cube, pressed rigidly into one another by `DEPTH`."""
-    d = dimension
-    normal = np.array([-0.31, 0.95] if d == 2 else [-0.27, 0.14, 0.95])
+def test_every_rival_of_a_motion_says_its_critical_step(tmp_path):
+    """Subdivision makes slivers elements of their own: its step is shorter; springs have none."""
+    steps = {}
+    for case in ("cutting/plate_crossed_quick", "statics/f1_patch"):
+        for name in ("xfem", "subdivision", "mass_spring")[: 3 if case.startswith("cut") else 1]:
+            job = {"scene": scene_content(load_scene(case)), "solver": name, "level": 0}
+            outcome = solve_job({**job, "repetitions": 1, "parameters": {}}, tmp_path, store=False)
+            steps[name, case[:3]] = outcome["notes"].get(CRITICAL_STEP)
+    own, split = (float(steps[n, "cut"].removesuffix(" s")) for n in ("xfem", "subdivision"))
+    assert 0.0 < split < 0.9 * own
+    assert "springs" in steps["mass_spring", "cut"]
+    assert steps["xfem", "sta"] is None  # at rest
+
+
+def pressed_case():
+    """Two halves of a unit cube, pressed rigidly into one another by `DEPTH`."""
+    normal = np.array([-0.27, 0.14, 0.95])
     normal /= np.linalg.norm(normal)
-    middle = np.full(d, 0.47)
     frame = np.linalg.svd(normal[None])[2][1:]  # along the cut
-    ends = [[-1], [1]] if d == 2 else [[-1, -1], [1, -1], [1, 1], [-1, 1]]
-    points = [(middle + 2 * np.array(end) @ frame).tolist() for end in ends]
-    if d == 2:
-        slope = -normal[0] / normal[1]
-        body = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
-        side = {"slope": slope, "shift": [-DEPTH, 0.0], "strain": [0.0, 0.0]}
-        if (np.array(points[1]) - points[0])[0] < 0:
-            points.reverse()
-    else:
-        body = {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3}
-        shift = [[0.0, 0.0, -DEPTH], [0.0, 0.0, 0.0]]
-        side = {"normal": normal.tolist(), "shift": shift, "strain": [[0.0, 0.0]] * 2}
+    ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    side = {"normal": normal.tolist(), "shift": [[0.0, 0.0, -DEPTH], [0.0] * 3],
+            "point": [0.47] * 3, "strain": [[0.0, 0.0]] * 2}  # fmt: skip
     shared = {"metric": "overlap_depth", "solver": "xfem"}
     return {
         "title": "Pressed halves", "requirement": "Faces shall overlap by the depth given.",
-        "geometry": body, "mesh": {"cells": [[5, 4, 3][:d]]},
-        "material": {"young": 1.0, "poisson": 0.3, **({"plane": "strain"} if d == 2 else {})},
+        "geometry": {"kind": "box", "lower": [0.0] * 3, "upper": [1.0] * 3},
+        "mesh": {"cells": [[5, 4, 3]]}, "material": {"young": 1.0, "poisson": 0.3},
         "supports": [{"where": "boundary", "displacement": "exact"}],
-        "cuts": [{"kind": "polyline" if d == 2 else "polygon", "points": points}],
+        "cuts": [{"kind": "polygon", "points": [(0.47 + 2 * e @ frame).tolist()
+                                                for e in map(np.array, ends)]}],
         "contact": {"expected": "overlap"},
-        "exact": {
-            "solution": "patch" if d == 2 else "solid_patch",
-            "parameters": {"point": middle.tolist(), **side},
-        },
+        "exact": {"solution": "solid_patch", "parameters": side},
         "acceptance": [
             {**shared, "check": "value", "equals": DEPTH, "relative_tolerance": 1e-6,
              "source": "prescribed"},
@@ -301,18 +241,14 @@ def pressed_case(dimension):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_the_depth_of_an_overlap_can_be_asked_and_is_judged(verify, dimension):
-    (verify.folder / "pressed.toml").write_text(text(pressed_case(dimension)))
+def test_the_depth_of_an_overlap_is_judged_and_its_rate_refused_with_what_can_be_asked(verify):
+    (verify.folder / "pressed.toml").write_text(text(pressed_case()))
     done = verify("run", "pressed.toml", "--out", "out", "--json", "--solver", "xfem")
     (case,) = json.loads(done.stdout)["cases"]
     found = [(v["verdict"], v["observed"]) for v in case["verdicts"]]
     assert [verdict for verdict, _ in found] == ["PASS", "PASS", "FAIL"]
     assert found[0][1] == pytest.approx(DEPTH, rel=1e-9)
-
-
-def test_a_rate_of_an_overlap_is_refused_with_what_can_be_asked(verify):
-    case = pressed_case(2) | {"mesh": {"cells": [[4, 4], [8, 8], [16, 16]]}}
+    case = pressed_case() | {"mesh": {"cells": [[2] * 3, [4] * 3, [8] * 3]}}
     case["acceptance"] = [{"check": "rate", "metric": "overlap_depth", "at_least": 1.0}]
     (verify.folder / "pressed.toml").write_text(text(case))
     done = verify("check", "pressed.toml")

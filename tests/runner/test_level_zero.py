@@ -67,13 +67,6 @@ def test_where_all_refuse_nothing_is_solved_for_the_reference(plan):
     assert (plan.held, plan.models, plan.count) == ([], [], 2)
 
 
-def test_a_solver_that_said_nothing_has_no_further_level(plan):
-    assert ends(plan, "one", Status.MEMORY) == [
-        ("reference", 0, ""),
-        ("reference", 0, "kinematics"),
-    ]
-
-
 def test_a_case_that_all_refuse_ends_without_a_reference(verify):
     (verify.folder / "hanging.toml").write_text(HANGING)
     done = verify("run", "hanging.toml", "--solver=fake_solvers:Refusing", "--out", "out")
@@ -83,18 +76,3 @@ def test_a_case_that_all_refuse_ends_without_a_reference(verify):
     result = read_json(verify.folder / "out/cases/hanging/result.json")
     assert [solve["status"] for solve in result["solves"]] == ["refused"]
     assert result["verdicts"] == []
-
-
-def test_levels_that_follow_are_those_that_it_says_and_not_those_of_the_case(verify):
-    """The case has two meshes; the guest has one level."""
-    verify("run", "square.toml", "--solver=guests:Guest", "--out", "out")
-    (record,) = verify.records().values()
-    assert (record["level"], record["status"]) == (0, "solved")
-
-
-def test_a_parameter_that_a_solver_does_not_have_is_bad_input_before_anything_is_written(verify):
-    for solver in ("xfem", "fake_solvers:Straining"):
-        done = verify("run", "square.toml", "--solver", f"{solver} strian=2", "--out", "out")
-        assert done.returncode == 2
-        assert "has no parameter 'strian'" in done.stderr
-        assert not (verify.folder / "out").exists()

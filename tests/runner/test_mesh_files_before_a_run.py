@@ -1,12 +1,11 @@
 """Mesh files in `check`: size and mass, nodes written twice, the reason why one is not read."""
 
-import json
 import warnings
 
 import meshio
 import numpy as np
 import pytest
-from case_texts import cut_text, support_text
+from case_texts import support_text
 
 from verify.cli import main
 from verify.xfem.mesh import box_mesh
@@ -40,21 +39,11 @@ def _torn(share):
     return np.vstack([BOX.points, BOX.points[at] + 1e-8]), cells, len(at)
 
 
-def test_size_and_mass_are_said(tmp_path, capsys):
-    code, out, err = _checked(tmp_path, capsys, BOX.points, BOX.cells)
-    assert (code, err) == (0, "")
-    assert "body: 2 × 1 × 1 m, 60 nodes, 144 cells, 2 m³, 2e+03 kg" in out
-    # millimetres are seen
-    out = _checked(tmp_path, capsys, 1000 * BOX.points, BOX.cells, far=1999)[1]
-    assert "body: 2e+03 × 1e+03 × 1e+03 m" in out
-    assert main(["check", "--json", str(tmp_path / "case.toml")]) == 0
-    assert json.loads(capsys.readouterr().out)[0]["body"].endswith("2e+09 m³, 2e+12 kg")
-
-
 def test_nodes_that_are_written_twice_are_counted_and_placed(tmp_path, capsys):
     points, cells, count = _torn(0.6)
-    code, _, err = _checked(tmp_path, capsys, points, cells)
+    code, out, err = _checked(tmp_path, capsys, points, cells)
     assert code == 0
+    assert f"body: 2 × 1 × 1 m, {len(points)} nodes, 144 cells, 2 m³, 2e+03 kg" in out
     assert f"warning: 'body.vtu' is not joined where {count} pairs of nodes coincide" in err
     assert "one at (1, " in err
     # written apart all over, and one half not held: that is why
@@ -68,11 +57,7 @@ def test_nodes_that_are_written_twice_are_counted_and_placed(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        (
-            "a.vtk",
-            "version https://git-lfs.github.com/spec/v1\n",
-            "Illegal VTK header",
-        ),
+        ("a.vtk", "version https://git-lfs.github.com/spec/v1\n", "Illegal VTK header"),
         (
             "b.vtk",
             "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n",
@@ -87,16 +72,3 @@ def test_the_reason_of_meshio_is_said(tmp_path, capsys, name, text, said):
     err = capsys.readouterr().err
     assert said in err
     assert "SystemExit" not in err
-
-
-def test_a_plane_mesh_may_be_off_its_plane_by_round_off(tmp_path, capsys):
-    points = np.array([[0, 0, 0], [1, 0, 1e-17], [1, 1, 0], [0, 1, -1e-16]], dtype=float)
-    cells = np.array([[0, 1, 2], [0, 2, 3]])
-    text = TEXT.format(file="body.vtu", far=0.9).replace("dimension = 3", "dimension = 2")
-    text = text.replace("[material]\n", '[material]\nplane = "strain"\n').replace("0, 0, 0", "0, 0")
-    text = text.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0]") + cut_text([-0.1, 0.4], [1.1, 0.5])
-    (tmp_path / "case.toml").write_text(text)
-    for height, code in ((1.0, 0), (1e9, 2)):
-        meshio.Mesh(points * [1, 1, height], [("triangle", cells)]).write(tmp_path / "body.vtu")
-        assert main(["check", str(tmp_path / "case.toml")]) == code
-    assert "z coordinates differ by 1.1e-07 m" in capsys.readouterr().err

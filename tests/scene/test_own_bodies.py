@@ -191,18 +191,17 @@ def expected(points, cells, hard, ends, turn):
 
 @pytest.mark.parametrize(
     ("form", "seed"),
-    [*zip(("gmsh22", "gmsh", "medit", "vtk", "abaqus", "xdmf"), range(6), strict=True),
-     ("gmsh", 6), ("vtk", 7), ("medit", 8), ("xdmf", 9)],
-)  # fmt: skip
-def test_groups_of_ten_files_give_the_energy_of_an_independent_program(tmp_path, form, seed):
+    zip(("gmsh22", "gmsh", "medit", "vtk", "abaqus", "xdmf"), range(6), strict=True),
+)
+def test_groups_of_files_give_the_energy_of_an_independent_program(tmp_path, form, seed):
     """Materials by groups of cells, clamps by groups of facets; 1e-9 is of both solves."""
     points, cells, hard, ends, turn = block(seed)
     file, names = write(tmp_path, form, points @ turn, cells, hard, ends)
     scene = case(tmp_path, file, turn, *names)
     value = expected(points, cells, hard, ends, turn)
     assert measured(scene) == pytest.approx(value, rel=1e-9)
-    soft = expected(points, cells, ~hard, ends, turn)
-    assert abs(soft - value) > 0.01 * value  # the materials matter
+    if seed == 0:  # the materials matter
+        assert abs(expected(points, cells, ~hard, ends, turn) - value) > 0.01 * value
 
 
 def said_by_check(folder, capsys, code=0):
@@ -230,20 +229,12 @@ def test_check_and_describe_list_groups_and_warn_of_unused_ones(tmp_path, capsys
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [
-        (
-            {"held": "group:lefd"},
-            "supports[0].where: no group 'lefd' in the mesh file; did you",
-        ),
-        (
-            {"hard": "group:left"},
-            "group 'left' has no cells of the body, only parts",
-        ),
+        ({"held": "group:lefd"}, "supports[0].where: no group 'lefd' in the mesh file; did you"),
+        ({"hard": "group:left"}, "group 'left' has no cells of the body, only parts"),
         ({"hard": "group:nothing"}, "material.regions[0].where: no group 'nothing'"),
     ],
 )
-def test_a_group_that_is_not_there_or_of_another_kind_is_named(
-    tmp_path, capsys, changed, expected
-):  # fmt: skip
+def test_a_wrong_group_is_named(tmp_path, capsys, changed, expected):
     points, cells, hard, ends, _ = block(0)
     file, _ = write(tmp_path, "gmsh", points, cells, hard, ends)
     case(tmp_path, file, **changed)
@@ -264,34 +255,13 @@ def test_a_cell_in_two_groups_of_different_materials_is_refused(tmp_path, capsys
     assert f"{hard.sum()} cells of group 'all' are also in 'group:hard' of another material" in err
 
 
-def test_a_group_belongs_to_a_mesh_file(tmp_path):
-    box = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]\n'
-    text = CASE.format(file="", hard="z < 0.5", held="group:left", held_too="top", geometry="",
-                       cut="[[0.5, -1, -1], [0.5, 2, -1], [0.5, 2, 2], [0.5, -1, 2]]")  # fmt: skip
-    text = text.replace('kind = "file"\nfile = ""\ndimension = 3\n', box)
-    (tmp_path / "case.toml").write_text(text.replace('pattern = "given"', "cells = [[2, 2, 2]]"))
-    with pytest.raises(InputError, match="'group:left' is of a mesh file; the body is a box"):
-        load_scene(tmp_path / "case.toml")
-
-
 def mixed(rng):
     """Layers of hexahedra, of wedges and of pyramids; nodes in any order."""
     points = np.array([[x, y, z] for x in range(4) for y in range(4) for z in range(4)], float)
     cells = {"hexahedron": [], "wedge": [], "pyramid": []}
     for x, y, z in itertools.product(range(3), repeat=3):
-        i = [
-            16 * (x + a) + 4 * (y + b) + z + c
-            for a, b, c in (
-                (0, 0, 0),
-                (1, 0, 0),
-                (1, 1, 0),
-                (0, 1, 0),
-                (0, 0, 1),
-                (1, 0, 1),
-                (1, 1, 1),
-                (0, 1, 1),
-            )
-        ]
+        around = ((0, 0), (1, 0), (1, 1), (0, 1))
+        i = [16 * (x + a) + 4 * (y + b) + z + c for c in (0, 1) for a, b in around]
         if z == 0:
             cells["hexahedron"].append(i)
         elif z == 1:
@@ -308,7 +278,7 @@ def mixed(rng):
     return shuffled, [(kind, number[np.array(some)]) for kind, some in cells.items()]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_cells_that_are_no_simplices_are_split_so_that_neighbours_fit(tmp_path, seed):
     """Any order of the nodes: no volume is lost, and no facet inside has one cell alone."""
     points, blocks = mixed(np.random.default_rng(seed))

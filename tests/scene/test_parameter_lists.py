@@ -64,7 +64,6 @@ def test_a_table_may_hold_in_some_rows_only(tmp_path):
     ("text", "rows", "message"),
     [
         (FAMILY, "[parameters]\nepsilon = 0.5\n", r"parameters.epsilon: expected 1 to 64 numbers"),
-        (FAMILY, "[parameters]\nepsilon = []\n", "1 to 64 numbers"),
         (FAMILY, '[parameters]\nepsilon = [0.5, "x"]\n', r"epsilon\[1\]: expected a finite number"),
         (FAMILY, "[parameters]\nepsilon = [0.5, nan]\n", r"epsilon\[1\]: expected a finite number"),
         (FAMILY, "[parameters]\nepsilon = [true]\n", r"epsilon\[0\]: expected a finite number"),
@@ -99,9 +98,6 @@ def test_faults_are_one_clear_line(tmp_path, text, rows, message):
 def test_a_row_that_there_is_not(tmp_path, source, message):
     with pytest.raises(InputError, match=message):
         load_scene(f"{family(tmp_path, FAMILY)}{source}")
-
-
-def test_a_case_without_parameters_has_no_row(tmp_path):
     with pytest.raises(InputError, match="has no parameters"):
         load_scene(f"{family(tmp_path, WHOLE, '')}[epsilon=0.5]")
 

@@ -16,7 +16,6 @@ from verify.scene import (
     read_mesh,
     restore_scene,
     scene_content,
-    scene_hash,
     scene_schema,
 )
 
@@ -32,24 +31,13 @@ def test_every_case_of_the_project_is_valid():
             assert scene.name == name + (scene.row.label if scene.row else "")
 
 
-def test_the_hash_is_that_of_the_physics(tmp_path):
-    scene = load(tmp_path, WHOLE)
-    (tmp_path / "elsewhere").mkdir()
-    same = load(tmp_path / "elsewhere", WHOLE.replace("A strip", "Another title"))
-    other = load(tmp_path, WHOLE.replace("young = 1e4", "young = 1.1e4"))
-    assert scene_hash(scene) == scene_hash(same) != scene_hash(other)
-
-
 def test_a_scene_survives_the_way_to_another_process(tmp_path):
     scene = load(tmp_path, WHOLE)
-    restored = restore_scene(json.loads(json.dumps(scene_content(scene))))
+    content = json.loads(json.dumps(scene_content(scene)))
+    restored = restore_scene(content)
     assert restored == scene
     assert (restored.name, restored.file) == (scene.name, scene.file)
-
-
-def test_a_static_scene_written_when_cuts_opened_late_by_default_is_read(tmp_path):
-    scene = load(tmp_path, WHOLE)
-    content = json.loads(json.dumps(scene_content(scene)))
+    # of the time when cuts opened late by default
     content["scene"]["analysis"]["opening"] = "late"
     assert restore_scene(content) == scene
 
@@ -62,12 +50,6 @@ def test_the_schema_knows_every_key_and_forbids_others():
     }
     assert schema["additionalProperties"] is False
     assert all(part.get("additionalProperties") is False for part in schema["$defs"].values())
-
-
-def test_two_cuts_on_each_other_are_refused(tmp_path):
-    second = '[[cuts]]\nkind = "polyline"\nname = "twin"\npoints = [[0.2, 1.0], [0.9, 1.0]]\n'
-    with pytest.raises(InputError, match=r"'cut' and 'twin' lie on each other over 0\.3 m"):
-        load(tmp_path, WHOLE + second)
 
 
 def test_a_region_is_an_inequality_and_nothing_else():
@@ -91,7 +73,7 @@ def given_mesh(folder, points=SQUARE, cells=(("triangle", TRIANGLES),), name="bo
 
 
 def test_a_mesh_file_gives_simplices_of_positive_orientation(tmp_path):
-    lonely = np.vstack([SQUARE, [[5.0, 5.0]]])
+    lonely = np.column_stack([np.vstack([SQUARE, [[5.0, 5.0]]]), [0, 1e-17, 0, -1e-16, 0]])
     points, cells = read_mesh(given_mesh(tmp_path, lonely))
     assert points.shape == (4, 2)  # the node that no cell uses is gone
     edges = points[cells[:, 1:]] - points[cells[:, :1]]

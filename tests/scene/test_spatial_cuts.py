@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.geometry.simplices import area_inside, ear_clipping, nearest_parts, overlap_area
+from verify.geometry.simplices import ear_clipping, overlap_area
 from verify.scene import (
     CylinderCut,
     DiscCut,
@@ -101,22 +101,6 @@ def test_a_star_shaped_polygon_is_triangulated_without_overlap(seed, corners):
     shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
     assert np.linalg.norm(normal) == pytest.approx(abs(shoelace), rel=1e-9)
     assert (vectors @ normal >= -1e-12).all()
-
-
-def test_the_area_in_a_box_is_that_of_clipping():
-    surface = PolygonCut(
-        kind="polygon", points=[(-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5)]
-    ).facets()
-    assert area_inside(surface, np.zeros(3), np.ones(3)) == pytest.approx(0.5)
-    on_face = (surface[0] + [0.0, 0.0, 0.5], surface[1])
-    assert area_inside(on_face, np.zeros(3), np.ones(3)) == 0.0
-
-
-def test_the_distance_to_a_cut_is_that_to_its_nearest_point():
-    surface = PolygonCut(**SQUARE).facets()
-    for point, distance in (((0.5, 0.4, 0.9), 0.4), ((0.9, 0.5, 0.5), 0.1), ((1.1, 1.2, 0.5), 0.5)):
-        away, _ = nearest_parts(np.array([point]), surface[0][surface[1]])
-        assert away == pytest.approx([distance])
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,10 @@ def load(folder, text):
     return load_scene(folder / "case.toml")
 
 
-def test_output_times_are_evenly_spaced_and_eleven_unless_said_otherwise(tmp_path):
+def test_output_times_are_evenly_spaced_and_steps_are_counted_between_them(tmp_path):
+    """A step longer than a gap is cut."""
+    analysis = load(tmp_path, MOVING).analysis
+    assert [analysis.steps(largest) for largest in (5.0, 0.2, 0.1, 0.08)] == [10, 10, 20, 30]
     assert load(tmp_path, MOVING).analysis.output_times == pytest.approx(np.linspace(0, 2, 11))
     assert load(tmp_path, MOVING + "outputs = 3\n").analysis.output_times == (0.0, 1.0, 2.0)
     assert load(tmp_path, STATIC + HELD).analysis.output_times == (0.0,)
@@ -40,11 +43,8 @@ def test_a_history_is_linear_between_its_times_and_constant_outside(time, factor
     history = [(1.0, 1.0), (2.0, 3.0), (2.0, -1.0)]
     assert (factor_at(history, time), slope_at(history, time)) == (factor, slope)
     assert (first_factor(history), jumps(history)) == (1.0, [2.0])
-
-
-def test_a_load_that_jumps_at_the_beginning_was_there_before():
-    history = [(0.0, 1.0), (0.0, 0.0)]
-    assert (first_factor(history), factor_at(history, 0.0)) == (1.0, 0.0)
+    at_once = [(0.0, 1.0), (0.0, 0.0)]  # a load that jumps at the beginning was there before
+    assert (first_factor(at_once), factor_at(at_once, 0.0)) == (1.0, 0.0)
 
 
 @pytest.mark.parametrize("axis", [None, (1.0, 2.0, -2.0)])
@@ -110,14 +110,6 @@ def test_arcs_that_touch_do_not_lie_on_each_other(tmp_path, part, touches):
         load(tmp_path, text)
 
 
-def test_polylines_that_touch_at_an_end_within_round_off_do_not_lie_on_each_other(tmp_path):
-    """1/3 + 1/3 + … is a unit of the last place beyond, as sums are."""
-    cuts = ""
-    for name, (a, b) in {"one": (0.1, 0.30000000000000004), "two": (0.3, 0.7)}.items():
-        cuts += f'[[cuts]]\nkind = "polyline"\nname = "{name}"\npoints = [[{a}, 0.5], [{b}, 0.5]]\n'
-    load(tmp_path, STATIC + HELD + cuts)
-
-
 def _path(**given: object) -> ToolPathCut:
     return ToolPathCut.model_validate({"kind": "tool_path", **given})
 
@@ -150,16 +142,6 @@ def test_straight_blade_in_space_passes_by_the_tip_not_by_the_depth() -> None:
     np.testing.assert_allclose(path.passed_at(second), 1 + 2 * share, atol=1e-9)
     assert path.whole().kind == "swept"
     np.testing.assert_allclose(path.whole().along, blade)
-
-
-def test_final_cut_has_the_positive_side_of_motion_times_blade() -> None:
-    path = _path(
-        points=[[0.0, 0.0, 1.0], [0.3, 1.0, 1.0]], direction=[0, 0.1, -1], depth=0.5, speed=1.0
-    )
-    points, triangles = path.facets()
-    a, b, c = points[triangles[0]]
-    normal = np.cross(b - a, c - a)
-    assert normal @ np.cross([0.3, 1.0, 0.0], path.blade[0]) > 0
 
 
 def test_blade_that_turns_in_its_plane_sweeps_a_polygon() -> None:
@@ -223,18 +205,10 @@ def test_overlap_is_the_shared_length_and_a_crossing_has_none():
     assert overlap_length(level, np.array([[2.0, 0.0], [-1.0, 0.0]])) == pytest.approx(1.0)
     assert overlap_length(level, np.array([[0.5, -1.0], [0.5, 1.0]])) == 0.0
     assert overlap_length(level, np.array([[1.0, 0.0], [2.0, 0.0]])) == 0.0
-
-
-def test_a_fraction_of_the_length_is_found_across_kinks():
-    kinked = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]])
-    np.testing.assert_allclose(point_along(kinked, 0.5), [1.0, 1.0], atol=1e-15)
-
-
-def test_steps_are_counted_from_output_to_output(tmp_path):
-    """Outputs 0.2 s apart, of which ten gaps are the motion; a step longer than one is cut."""
-    analysis = load(tmp_path, MOVING).analysis
-    steps = [analysis.steps(largest) for largest in (5.0, 0.2, 0.1, 0.08)]
-    assert steps == [10, 10, 20, 30]
+    # 1/3 + 1/3 + … is a unit of the last place beyond, as sums are
+    one = np.array([[0.1, 0.5], [0.30000000000000004, 0.5]])
+    assert overlap_length(one, np.array([[0.3, 0.5], [0.7, 0.5]])) == 0.0
+    np.testing.assert_allclose(point_along(NOTCHED[:3], 0.5), [2.5, 0.0], atol=1e-15)
 
 
 def test_the_top_speed_is_of_either_end_of_a_blade():
@@ -245,10 +219,3 @@ def test_the_top_speed_is_of_either_end_of_a_blade():
     )  # fmt: skip
     # the other end moves by (0, 0.4 + 1.2, -0.4) in 0.3 s
     assert path.top_speed == pytest.approx(np.hypot(1.6, 0.4) / 0.3)
-
-
-def test_an_opening_rule_is_for_what_moves(tmp_path):
-    with pytest.raises(InputError, match="opening: it belongs to a dynamic analysis"):
-        load(tmp_path, STATIC + HELD + '[analysis]\nopening = "late"\n')
-    with pytest.raises(InputError, match=r"late.*swept"):
-        load(tmp_path, MOVING + HELD.replace("[[", 'opening = "never"\n[[', 1))

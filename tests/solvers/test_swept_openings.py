@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scenes
 from case_texts import support_text, weight_text
 from scipy.interpolate import BSpline
 from tool_path_scenes import (
@@ -29,8 +28,11 @@ from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.body import MotionState
 from verify.xfem.explicit import acceleration_of
 
-METHODS = ("xfem", "virtual_node", "subdivision", "snapping", "conforming")
+METHODS = ("virtual_node", "virtual_node_arbitrary", "subdivision", "snapping",
+           "snapping_subdivision", "mass_spring", "conforming")  # fmt: skip
 GENERAL = ("plane, curved, unstructured, crossed", "solid")
+# of what is let go, and one in which a part without a node moves from one side to the other
+MOVED = ("plane, with a cut at a time", "virtual_node", {}, "corotational")
 
 
 def solve(folder, name, text, **parameters):
@@ -151,50 +153,51 @@ def test_nodes_in_a_row_are_let_go_a_facet_ahead_and_held_half_when_the_blade_is
 
 
 @pytest.mark.parametrize(
-    ("body", "solver", "parameters"),
+    ("body", "solver", "parameters", "kinematics"),
     [
-        *((body, "xfem", {"mass": mass}) for body in BODIES for mass in ("sidewise", "consistent")),
-        *((body, solver, {}) for body in GENERAL for solver in METHODS[1:]),
+        *((body, "xfem", {}, "corotational") for body in BODIES),
+        *((body, "xfem", {"mass": "consistent"}, "linear") for body in GENERAL),
+        *((body, solver, {}, "corotational") for body in GENERAL for solver in METHODS),
+        MOVED,
     ],
 )
-def test_no_acceleration_jumps_at_an_opening(tmp_path, releases, body, solver, parameters):
-    """Nodes that were parted before are parted again; let go at once all would jump."""
+def test_nothing_jumps_at_an_opening_and_all_is_kept_but_the_couple_of_the_forces(
+    tmp_path, openings, releases, body, solver, parameters, kinematics
+):
+    """A free body that spins: energy and momentum steps change nothing else.
+
+    The inherited field is the field, to round-off, whatever is opened and how. Nodes that were
+    parted before are parted again; let go at once all accelerations would jump.
+    """
     if solver == "conforming":
         pytest.importorskip("dolfinx_solver")
     text, paths, spin, velocity = BODIES[body]
-    motion = MOTION.replace("[analysis]", '[analysis]\nkinematics = "corotational"')
-    motion = motion.replace("0.02", "0.005")  # s: a seventh of an element
-    weight = weight_text(len(velocity.split(",")))
-    text += motion + SPUN % (spin, velocity) + weight + paths
-    found = solve(tmp_path, solver, text, **parameters)
-    assert len(releases) >= 4
+    motion = MOTION.replace("[analysis]", f'[analysis]\nkinematics = "{kinematics}"')
+    text += motion.replace("0.02", "0.01") + SPUN % (spin, velocity) + paths  # a third of a cell
+    scheme = "newmark" if solver == "mass_spring" else "energy_momentum"
+    ledger = solve(tmp_path, solver, text, scheme=scheme, **parameters).ledger
+    assert len(openings) >= 2 or solver == "conforming"
+    # that method takes material from one part to another, and the account says what it costs
+    share = 1e-4 if (body, solver) == MOVED[:2] else 1e-12
+    for _, (before, after) in openings:
+        for one, other in zip(before, after, strict=True):
+            np.testing.assert_allclose(other, one, rtol=0.0, atol=share * np.abs(one).max())
+    assert len(releases) >= 2
     tolerance = 1e-9 if solver == "conforming" else 1e-11  # its mass is solved with iteratively
     for before, held, at_once in releases:
         scale = np.abs(before).max() + np.abs(at_once).max()
-        assert np.abs(held - before).max() < tolerance * scale
-    assert max(np.abs(c - b).max() / np.abs(b).max() for b, _, c in releases) > 0.01
-    energy = max(np.abs(found.ledger[name]).max() for name in ("kinetic", "strain"))
-    assert np.ptp(found.ledger["total"]) <= 1e-12 * energy
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("body", GENERAL)
-def test_what_is_let_go_keeps_its_momenta_but_for_the_couple_of_the_forces(tmp_path, body, method):
-    """A free body that spins: energy and momentum steps change nothing else."""
-    if method == "conforming":
-        pytest.importorskip("dolfinx_solver")
-    text, paths, spin, velocity = BODIES[body]
-    motion = MOTION.replace("[analysis]", '[analysis]\nkinematics = "corotational"')
-    text += motion + SPUN % (spin, velocity) + paths
-    ledger = solve(tmp_path, method, text, scheme="energy_momentum").ledger
-    assert np.ptp(ledger["total"]) <= 1e-12 * ledger["kinetic"].max()
+        assert np.abs(held - before).max() <= tolerance * scale
+    assert max(np.abs(c - b).max() / (np.abs(b).max() or 1.0) for b, _, c in releases) > 0.01
+    energy = max(np.abs(ledger[name]).max() for name in ("kinetic", "strain"))
+    for name in ("total", "work_of_loads", "unbalanced"):
+        assert np.ptp(ledger.get(name, np.zeros(1))) <= 1e-10 * energy, name
     assert ledger["cut_work"][-1] != 0.0
-    assert np.abs(ledger["work_of_loads"]).max() <= 1e-12 * ledger["kinetic"].max()
-    axes = "xyz" if body == "solid" else "xy"
+    if share > 1e-12 or kinematics == "linear" or scheme == "newmark":  # a linear body stretches
+        return
+    axes, turning = ("xyz", "xyz") if body.startswith("solid") else ("xy", "z")
     size = np.abs([ledger[f"linear_momentum_{axis}"] for axis in axes]).max()
     for axis in axes:
         assert np.ptp(ledger[f"linear_momentum_{axis}"]) <= 1e-11 * size
-    turning = "xyz" if body == "solid" else "z"
     size = np.abs([ledger[f"angular_momentum_{axis}"] for axis in turning]).max()
     for axis in turning:
         impulse = ledger.get(f"cut_angular_impulse_{axis}", np.zeros(1))
@@ -222,13 +225,13 @@ TWO_BLADES = {
 
 
 @pytest.mark.parametrize(
-    ("method", "scheme"),
+    ("body", "method", "scheme"),
     [
-        ("xfem", "newmark"), ("virtual_node", "central_differences"), ("subdivision", "newmark"),
-        ("snapping", "newmark"), ("conforming", "newmark"),
+        ("plane, unstructured", "xfem", "newmark"), ("solid, crossed", "conforming", "newmark"),
+        ("solid, crossed", "virtual_node", "central_differences"),
+        ("plane, unstructured", "subdivision", "newmark"),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("body", TWO_BLADES)
 def test_the_work_of_each_blade_is_listed_and_they_add_up(tmp_path, body, method, scheme):
     """One by one: what the blade that is not there yet has taken is nothing."""
     if method == "conforming":
@@ -238,7 +241,7 @@ def test_the_work_of_each_blade_is_listed_and_they_add_up(tmp_path, body, method
     text += "".join(support_text(*pull) for pull in pulls)
     ledger = solve(tmp_path, method, text + first + later, scheme=scheme).ledger
     size = np.abs(ledger["cut_work"]).max()
-    if body == "plane, unstructured":  # in the file, where the order means nothing
+    if method == "xfem":  # in the file, where the order means nothing
         other = solve(tmp_path, method, text + later + first, scheme=scheme).ledger
         for name in ("cut_work_first", "cut_work_later"):
             np.testing.assert_allclose(other[name], ledger[name], rtol=0, atol=1e-9 * size)
@@ -248,12 +251,16 @@ def test_the_work_of_each_blade_is_listed_and_they_add_up(tmp_path, body, method
     assert ledger["cut_work_later"][-1] > 0.0
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, scheme):
+@pytest.mark.parametrize(
+    ("scheme", "kinematics"),
+    [*((scheme, "corotational") for scheme in SCHEMES), ("newmark", "linear"),
+     ("central_differences", "linear")],
+)  # fmt: skip
+def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, openings, scheme, kinematics):
     """Stretched and cut: the forces take energy, and the explicit step is that of before."""
-    motion = MOTION
+    motion = MOTION.replace("[analysis]", f'[analysis]\nkinematics = "{kinematics}"')
     if scheme == "forward_euler":  # unstable without damping: short
-        motion = MOTION.replace("0.02", "0.0005")
+        motion = motion.replace("0.02", "0.0005")
     pulled = (
         '[initial]\nkind = "equilibrium"\n'
         + support_text("left", [-0.02, 0.01]) + support_text("right", [0.02, 0.0])
@@ -261,13 +268,17 @@ def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, scheme):
     text = UNSTRUCTURED + motion + pulled + KINKED.replace("[-0.05, 0.1,", "[0.0, 0.1,")
     found = solve(tmp_path, "xfem", text, scheme=scheme)
     ledger = found.ledger
-    assert np.ptp(ledger["total"]) <= 1e-12 * ledger["strain"].max()
+    assert len(openings) >= 6
+    scale = ledger["strain"].max() + np.abs(ledger["work_of_supports"]).max()
+    for name in ("total", "unbalanced"):  # Newton's method: 1e-10 of the forces
+        assert np.ptp(ledger[name]) <= (1e-12 if kinematics == "linear" else 1e-10) * scale, name
     if scheme != "forward_euler":
         assert ledger["cut_work"][-1] > 1e-3 * ledger["strain"][0]
-    scene = load_scene(tmp_path / "swept.toml")
-    late = find_solver("xfem").solve(scene, 0, 0, scheme=scheme, opening="late")
-    assert found.notes["step from"] == late.notes["step from"]
-    assert "cut_work" not in late.ledger
+    if kinematics == "linear":
+        scene = load_scene(tmp_path / "swept.toml")
+        late = find_solver("xfem").solve(scene, 0, 0, scheme=scheme, opening="late")
+        assert found.notes["step from"] == late.notes["step from"]
+        assert "cut_work" not in late.ledger
 
 
 @pytest.mark.parametrize("slivers", ["keep", "merge", "drop", "penalise"])
@@ -285,6 +296,9 @@ def test_every_sliver_policy_is_held_too_and_keeps_the_momentum(tmp_path, sliver
     assert found.notes["a tool path opens"].endswith("fade with what it has swept")
     assert np.ptp(ledger["total"]) <= 1e-12 * ledger["kinetic"].max()
     assert ledger["cut_work"].any()
+    if slivers == "merge":  # which has an entry of its own: the scheme dissipates nothing
+        assert np.abs(ledger["projection"]).max() > 1e-9 * ledger["kinetic"].max()
+        assert np.abs(ledger["algorithmic"]).max() < 1e-9 * ledger["kinetic"].max()
     size = np.abs([ledger[f"linear_momentum_{axis}"] for axis in "xy"]).max()
     for axis in "xy":
         assert np.ptp(ledger[f"linear_momentum_{axis}"]) <= 1e-11 * size
@@ -299,7 +313,7 @@ def test_cells_that_are_removed_are_late(tmp_path):
         solve(tmp_path, "removal", text)
 
 
-@pytest.mark.parametrize("solver", ["xfem", "virtual_node", "subdivision"])
+@pytest.mark.parametrize("solver", ["xfem", "subdivision"])
 def test_a_scene_says_the_rule_for_all_and_without_it_nothing_is_late(tmp_path, solver):
     text = PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0])
     told = solve(tmp_path, solver, text).displacement
@@ -316,18 +330,6 @@ def test_a_scene_says_the_rule_for_all_and_without_it_nothing_is_late(tmp_path, 
     assert note.endswith("more than half of one: openings are late")
     assert np.abs(late.displacement - told).max() > 1e-3 * np.abs(told).max()
     assert "cut_work" not in find_solver("removal").solve(scene, 0, 0).ledger
-
-
-def test_what_merging_projects_away_has_an_entry_of_its_own(tmp_path):
-    """The trapezoidal rule of a linear body dissipates nothing: the scheme's entry is round-off."""
-    text = PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0])
-    (tmp_path / "merged.toml").write_text(text)
-    scene = load_scene(tmp_path / "merged.toml")
-    ledger = find_solver("xfem").solve(scene, 0, 0, slivers="merge").ledger
-    energy = ledger["kinetic"].max()
-    assert np.abs(ledger["projection"]).max() > 1e-9 * energy
-    assert np.abs(ledger["algorithmic"]).max() < 1e-10 * energy
-    assert np.ptp(ledger["total"]) <= 1e-12 * energy
 
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -351,54 +353,42 @@ def l2_and_cut_work(solver, case, level, **parameters):
     return error, work / area / exact.energy_release_rate
 
 
-def halved(solver, case, levels, most, **parameters):
-    """Check the order 1 in h, and that the cut takes G to within a share at last."""
+@pytest.mark.parametrize(
+    ("solver", "speed", "count", "most", "parameters"),
+    [
+        ("xfem", "03", 2, 0.25, {}),
+        *(pytest.param(*one, marks=pytest.mark.heavy) for one in (
+            ("conforming", "06", 2, 0.1, {}), ("subdivision", "03", 2, 0.25, {}),
+            ("conforming", "01", 3, 0.1, {}), ("conforming", "03", 3, 0.05, {}),
+            ("conforming", "06", 3, 0.05, {}), ("xfem", "06", 3, 0.1, {"mass": "consistent"}),
+            ("xfem", "03", 3, 0.15, {}),
+        )),
+    ],
+)  # fmt: skip
+def test_on_the_strip_the_order_is_one_the_cut_takes_g_and_late_openings_cost_twice_the_error(
+    solver, speed, count, most, parameters
+):
+    """By the trapezoidal rule all that is released at once stays.
+
+    Late is three quarters of an element and half a step; facets that open at their centroids
+    release a node half an element late. Forces that fade have no lag, and take what conservative
+    steps else leave as waves: G but for what the lattice radiates, 0.03 at 0.6 c (blade.md), and
+    twice that for the ends of 10 elements of advance.
+    """
+    if solver == "conforming":
+        pytest.importorskip("dolfinx_solver")
+    case = f"benchmark/c5_blade_{speed}"
     scene = load_scene(CASES / f"{case}.toml")
-    runs = [l2_and_cut_work(solver, case, k, **parameters) for k in levels]
-    across = [scene.mesh.cells[k][1] for k in levels]
+    runs = [l2_and_cut_work(solver, case, k, **parameters) for k in range(count)]
+    across = [scene.mesh.cells[k][1] for k in range(count)]
     orders = -np.diff(np.log([error for error, _ in runs])) / np.diff(np.log(across))
     assert orders.min() > 0.9, orders
     assert abs(runs[-1][1] - 1.0) < most, runs
-    return runs[-1][0]
-
-
-def test_on_a_conforming_mesh_the_error_is_below_that_of_facets_that_open_at_their_centroids():
-    """The strip at 0.6 c; the trapezoidal rule, by which all that is released at once stays.
-
-    Facets that open at their centroids release a node half an element late. Forces that fade have
-    no lag, and take what conservative steps else leave as waves: G but for what the lattice
-    radiates, 0.03 at 0.6 c (blade.md), and twice that for the ends of 10 elements of advance.
-    """
-    pytest.importorskip("dolfinx_solver")
-    swept = halved("conforming", "benchmark/c5_blade_06", (0, 1), 0.1)
-    half = -0.5 * 0.6 / 51 / 0.6  # s: the blade passes half an element
-    asked = {"delay": half, "opening": "late"}
-    assert swept < l2_and_cut_work("conforming", "benchmark/c5_blade_06", 1, **asked)[0]
-
-
-@pytest.mark.parametrize("solver", ["xfem", pytest.param("subdivision", marks=pytest.mark.heavy)])
-def test_on_cut_elements_the_error_is_less_than_half_of_what_late_openings_cost(solver):
-    """At 0.3 c. Late is three quarters of an element and half a step; what is left is the mesh."""
-    swept = halved(solver, "benchmark/c5_blade_03", (0, 1), 0.25)
-    assert swept < 0.5 * l2_and_cut_work(solver, "benchmark/c5_blade_03", 1, opening="late")[0]
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize(
-    ("solver", "case", "most", "parameters"),
-    [
-        ("conforming", "benchmark/c5_blade_01", 0.1, {}),
-        ("conforming", "benchmark/c5_blade_03", 0.05, {}),
-        ("conforming", "benchmark/c5_blade_06", 0.05, {}),
-        ("xfem", "benchmark/c5_blade_06", 0.1, {"mass": "consistent"}),
-        ("xfem", "benchmark/c5_blade_03", 0.15, {}),
-    ],
-)
-def test_three_meshes_of_the_strip(solver, case, most, parameters):
-    if solver == "conforming":
-        pytest.importorskip("dolfinx_solver")
-    swept = halved(solver, case, (0, 1, 2), most, **parameters)
-    assert swept < 0.5 * l2_and_cut_work(solver, case, 2, opening="late", **parameters)[0]
+    late, share = {"opening": "late"}, 0.5
+    if (solver, speed, count) == ("conforming", "06", 2):  # s: the blade passes half an element
+        late, share = late | {"delay": -0.5 * 0.6 / 51 / 0.6}, 1.0
+    error, _ = l2_and_cut_work(solver, case, count - 1, **late, **parameters)
+    assert runs[-1][0] < share * error
 
 
 PHI = {  # solver and mass, to the speeds over c up to which the cut takes G to within a twentieth
@@ -441,38 +431,3 @@ def test_the_share_of_the_released_energy_that_the_forces_take(solver, mass, spe
     print(f"{solver:10} {mass:10} {speed:.1f} c  " + "  ".join(f"{phi:.3f}" for phi in found))
     if speed <= PHI[solver, mass]:
         assert abs(found[-1] - 1.0) <= 0.05, found
-
-
-@pytest.mark.heavy
-def test_the_account_of_ten_thousand_steps_with_twenty_blades_closes():
-    """Explicit steps, which solve nothing: what is left is round-off, 1e-16 per step at most."""
-    cuts = [
-        {
-            "kind": "tool_path",
-            "name": f"cut {k}",
-            "points": [[0.03 + 0.047 * k, -0.05], [0.04 + 0.047 * k, 0.55 if k % 2 else 0.4]],
-            "times": [0.1 + 0.09 * k, 0.25 + 0.09 * k],
-        }
-        for k in range(20)
-    ]
-    scene = scenes.scene(
-        cuts,
-        geometry=scenes.box([1.0, 0.6]),
-        mesh={"cells": [[20, 12]]},
-        material={"young": 1e4, "poisson": 0.3, "density": 1e3, "plane": "strain"},
-        supports=[{"where": "top", "displacement": [0, 0]}],
-        loads=[{"kind": "gravity", "acceleration": [0, -2.0]}],
-        analysis={
-            "kind": "dynamic", "duration": 2.2, "time_step": 2.2e-4, "outputs": 3,
-        },
-    )  # fmt: skip
-    found = find_solver("xfem").solve(scene, 0, 0, scheme="central_differences")
-    ledger = found.ledger
-    assert found.iterations["steps"] == 10_000
-    largest = max(np.abs(ledger["kinetic"]).max(), np.abs(ledger["strain"]).max())
-    largest = max(largest, np.ptp(ledger["gravity"]))
-    assert np.ptp(ledger["total"]) < 1e-12 * largest
-    assert (np.diff(ledger["cut_work"]) > 0.0).all()
-    each = np.array([ledger[f"cut_work_cut {k}"] for k in range(20)])
-    assert (each[:, -1] > 0.0).all()
-    np.testing.assert_allclose(each.sum(axis=0), ledger["cut_work"], atol=1e-12 * largest)

@@ -30,17 +30,13 @@ def below(solution, y=0.05):
 
 
 @pytest.mark.parametrize(
-    "scheme, fallen",
+    "scheme, fallen, kinematics",
     [
-        ("newmark", -1.225),
-        ("energy_momentum", -1.225),
-        ("central_differences", -1.225),
-        ("implicit_euler", -1.2495),
-        ("symplectic_euler", -1.2495),
-        ("forward_euler", -1.2005),
+        ("newmark", -1.225, "linear"), ("energy_momentum", -1.225, "corotational"),
+        ("central_differences", -1.225, "linear"), ("implicit_euler", -1.2495, "corotational"),
+        ("symplectic_euler", -1.2495, "corotational"), ("forward_euler", -1.2005, "linear"),
     ],
-)
-@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
+)  # fmt: skip
 def test_a_freed_half_falls_by_the_parabola_of_its_scheme(tmp_path, scheme, fallen, kinematics):
     """Independent of where the cut passes; the discrete parabola is known in closed form."""
     way = ("[analysis]", f'[analysis]\nkinematics = "{kinematics}"')
@@ -99,8 +95,10 @@ def test_before_a_cut_opens_its_two_sides_move_together(tmp_path):
     assert (gaps[3:] > 1e-3).all()
 
 
-@pytest.mark.parametrize("name", ["xfem", "conforming", "subdivision"])
-@pytest.mark.parametrize("off", [-8e-10, 3e-12, 1e-10, 8e-10])  # of the duration
+@pytest.mark.parametrize(  # of the duration
+    "name, off",
+    [("xfem", -8e-10), ("xfem", 3e-12), ("conforming", 8e-10), ("subdivision", 1e-10)],
+)
 def test_a_cut_that_opens_just_beside_an_output_opens_at_it(tmp_path, name, off):
     """Though a load jumps at the output: nothing is late by a step, or put out twice."""
     pulled = '[[loads]]\nkind = "traction"\nwhere = "bottom"\ntraction = [300.0, 0.0]\n'
@@ -114,13 +112,6 @@ def test_a_cut_that_opens_just_beside_an_output_opens_at_it(tmp_path, name, off)
     np.testing.assert_allclose(beside.velocity, at.velocity, atol=1e-7)
     for name, column in at.ledger.items():
         np.testing.assert_allclose(beside.ledger[name], column, atol=1e-6 * 9800.0)
-
-
-def test_the_energy_is_continuous_where_a_cut_opens(tmp_path):
-    text = SQUARE + HELD + WEIGHT + CUT
-    wait = ("[1.1, 0.41]]", "[1.1, 0.41]]\nopens_at = 0.23")
-    found = solve(tmp_path, text, wait, ("outputs = 6", "outputs = 51"), scheme="energy_momentum")
-    assert np.ptp(found.ledger["total"]) <= 1e-8 * found.ledger["kinetic"].max()
 
 
 def test_a_cut_that_opens_at_once_releases_the_equilibrium_of_the_uncut_body(tmp_path):
@@ -165,9 +156,9 @@ points = [[0.503, -0.1], [0.503, 0.2]]
     assert sorted(np.sign(moved).tolist()) == [-1.0] * (len(moved) // 2) + [1.0] * (len(moved) // 2)
 
 
-@pytest.mark.parametrize("centre", [[0.5, 0.5], [0.0, 0.0]])
-def test_a_cut_body_that_spins_freely_keeps_its_momenta_and_its_energy(tmp_path, centre):
+def test_a_cut_body_that_spins_freely_keeps_its_momenta_and_its_energy(tmp_path):
     """Its halves part, so only the sums are constant; of an energy-momentum scheme all three."""
+    centre = [0.0, 0.0]
     spinning = f'[initial]\nkind = "moving"\nspin = 2.0\ncentre = {centre}\nvelocity = [1.0, 0.0]\n'
     turning = ("[analysis]", '[analysis]\nkinematics = "finite_rotation"')
     found = solve(tmp_path, SQUARE + spinning + CUT, turning, scheme="energy_momentum")
@@ -224,8 +215,9 @@ def test_an_explicit_scheme_takes_no_more_than_its_share_of_the_critical_step(tm
     assert 12 <= slow.iterations["steps"] / 5 <= 14
 
 
-@pytest.mark.parametrize("height", [0.99, 0.95, 0.876])
-@pytest.mark.parametrize("scheme", ["newmark", "central_differences"])
+@pytest.mark.parametrize(
+    "height, scheme", [(0.99, "newmark"), (0.95, "central_differences"), (0.876, "newmark")]
+)
 def test_what_a_cut_frees_beside_its_support_falls_too(tmp_path, height, scheme):
     """The cut passes within the elements that hang on the support: their nodes there are held."""
     close = ("[[-0.1, 0.45], [1.1, 0.41]]", f"[[-0.1, {height}], [1.1, {height}]]")
@@ -236,8 +228,13 @@ def test_what_a_cut_frees_beside_its_support_falls_too(tmp_path, height, scheme)
 SECOND = '[[cuts]]\nname = "second"\nkind = "polyline"\npoints = [[0.47, -0.1], [0.52, 1.1]]\n'
 
 
-@pytest.mark.parametrize("times", [(0.0, 0.2), (0.3, 0.1), (0.23, 0.23), (0.5, 0.0)])
-@pytest.mark.parametrize("slivers", ["keep", "merge", "drop", "penalise"])
+@pytest.mark.parametrize(
+    "times, slivers",
+    [
+        ((0.0, 0.2), "keep"), ((0.3, 0.1), "keep"), ((0.23, 0.23), "keep"), ((0.5, 0.0), "merge"),
+        ((0.3, 0.1), "merge"), ((0.0, 0.2), "drop"), ((0.3, 0.1), "penalise"),
+    ],
+)  # fmt: skip
 def test_cuts_that_cross_open_in_any_order_and_no_energy_is_lost(tmp_path, times, slivers):
     """The cut that opens last comes last for the solver, whichever comes first in the file."""
     first, second = times

@@ -53,18 +53,18 @@ MESH, METHOD = "fine → own h, conforming P1", "conforming P1 → XFEM"
 CUT = "cut as asked → as realised"
 
 
-@pytest.mark.parametrize("metric", ["displacement_l2", "energy_norm"])
-def test_without_tips_xfem_is_as_far_from_the_truth_as_conforming_elements(metric):
+def test_without_tips_xfem_is_as_far_from_the_truth_as_conforming_elements():
     """Within 5 % of the error of conforming P1 elements, which differ by the cut cells only."""
-    found = parts(budget_of(load_scene("statics/f3_inclined")), metric)
-    assert found.keys() == {MESH, METHOD, "total"}  # the cut is realised as asked
-    assert found[METHOD] <= 0.05 * found[MESH]
-    assert found["total"] == pytest.approx(found[MESH], rel=0.05)
+    study = budget_of(load_scene("statics/f3_inclined"))
+    for metric in ("displacement_l2", "energy_norm"):
+        found = parts(study, metric)
+        assert found.keys() == {MESH, METHOD, "total"}  # the cut is realised as asked
+        assert found[METHOD] <= 0.05 * found[MESH]
+        assert found["total"] == pytest.approx(found[MESH], rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["statics/f1_patch", "statics/f1_3d"])
-def test_what_both_methods_reproduce_has_no_part_at_all(name):
-    study = budget_of(load_scene(name))
+def test_what_both_methods_reproduce_has_no_part_at_all():
+    study = budget_of(load_scene("statics/f1_3d"))
     assert study.missing == []
     for metric in ("displacement_l2", "energy_norm"):
         assert max(map(abs, parts(study, metric).values())) < 1e-11
@@ -98,14 +98,6 @@ def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_
     assert energy[CUT] > 0.9 * total  # relative to the release of the larger crack
 
 
-PLANE = {
-    "geometry": scenes.box([1.0, 0.5]),
-    "mesh": {"cells": [[4, 2]]},
-    "material": scenes.soft() | {"young": 1e4},
-    "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
-    "loads": [{"kind": "traction", "where": "right", "traction": [10.0, 3.0]}],
-    "reference": {"size": 0.25},
-}
 SOLID = {
     "geometry": scenes.box([1.0, 0.5, 0.5]),
     "mesh": {"cells": [[4, 2, 2]]},
@@ -116,9 +108,8 @@ SOLID = {
 }
 
 
-@pytest.mark.parametrize("body", [PLANE, SOLID], ids=["plane", "solid"])
-def test_without_a_cut_xfem_is_the_conforming_elements_and_all_is_the_mesh(body):
-    found = parts(budget_of(scenes.scene(quantities=[ENERGY], **body)), "displacement_l2")
+def test_without_a_cut_xfem_is_the_conforming_elements_and_all_is_the_mesh():
+    found = parts(budget_of(scenes.scene(quantities=[ENERGY], **SOLID)), "displacement_l2")
     assert CUT not in found
     assert found[METHOD] < 1e-10 < 1e-2 < found[MESH]
 

