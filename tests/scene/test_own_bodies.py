@@ -191,7 +191,7 @@ def expected(points, cells, hard, ends, turn):
 
 @pytest.mark.parametrize(
     ("form", "seed"),
-    zip(("gmsh22", "gmsh", "medit", "vtk", "abaqus", "xdmf"), range(6), strict=True),
+    [*zip(("gmsh22", "gmsh", "medit", "vtk", "abaqus", "xdmf"), range(6), strict=True)],
 )
 def test_groups_of_files_give_the_energy_of_an_independent_program(tmp_path, form, seed):
     """Materials by groups of cells, clamps by groups of facets; 1e-9 is of both solves."""
