@@ -126,8 +126,19 @@ def _evaluate_quadratic(points, found, origins, first, bends, slopes, axes, acro
 
 def squares(values: Floats) -> Floats:
     """Sum (n,) of the squares of the entries of each of `values` (n, ...)."""
-    rows = values.reshape(len(values), -1)
-    return np.asarray(np.einsum("nk,nk->n", rows, rows))
+    if not COMPILED:
+        return np.asarray((values**2).reshape(len(values), -1).sum(axis=1))
+    found = np.empty(len(values))
+    _squares(np.ascontiguousarray(values).reshape(len(values), -1), found)
+    return found
+
+
+@njit(cache=True)
+def _squares(values, found):
+    for i in range(values.shape[0]):
+        found[i] = 0.0
+        for c in range(values.shape[1]):
+            found[i] += values[i, c] ** 2
 
 
 def difference_squares(found: Floats, expected: Floats) -> Floats:
