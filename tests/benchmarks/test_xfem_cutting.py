@@ -13,7 +13,6 @@ import pytest
 from verify.simulator.embedded_surface import EmbeddedSurface
 from verify.simulator.moving_surface import BodySurface
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.simulator.surfaces import SurfaceCollider
 from verify.xfem.cuts import ToolPath
 from verify.xfem.mesh import box_mesh
 
@@ -111,14 +110,3 @@ def test_the_cost_of_a_cut_is_that_of_the_elements_touched() -> None:
     exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
     # 0.015 seen; 1 if it were proportional to the mesh; more of a small mesh stays in cache
     assert exponent < 0.12
-
-
-def test_mapping_and_refitting_take_a_small_part_of_a_step_of_1_ms(benchmark) -> None:
-    cutter, surfaces = slab_under_the_knife()
-    insert(cutter, surfaces)
-    surface = surfaces[1].surface
-    collider = SurfaceCollider(surface)
-    displacement = np.random.default_rng(0).normal(size=(cutter.body.node_count, 3))
-    surface.positions(displacement)
-    benchmark(lambda: collider.follow(surface.positions(displacement)))
-    assert benchmark.stats["median"] < 1e-4

@@ -8,7 +8,6 @@ from verify.geometry.patches import CylinderPatch, DiscPatch, PlanePatch, Sphere
 from verify.geometry.simplices import (
     distance_to_pieces,
     ear_clipping,
-    feet,
     frame,
     measures,
     nearest_parts,
@@ -58,7 +57,7 @@ def samples(piece, count):
 def test_the_foot_is_on_the_piece_and_no_sample_is_nearer(name):
     piece = PIECES[name]
     on, apart = samples(piece, 24)
-    points = np.random.default_rng(3).uniform(-1.2, 1.6, (100, on.shape[1]))
+    points = np.random.default_rng(3).uniform(-1.2, 1.6, (40, on.shape[1]))
     foot = piece.foot(points)
     away = np.linalg.norm(points - foot, axis=1)
     nearest = np.linalg.norm(points[:, None] - on, axis=2).min(axis=1)
@@ -137,19 +136,6 @@ def test_the_measure_of_a_simplex_is_that_of_gram_and_its_normal_is_square_to_it
         assert (np.linalg.det(frames) > 0.0).all()
 
 
-def test_the_depth_of_an_ellipse_is_that_beyond_its_rim_to_first_order():
-    ellipse = PIECES["ellipse"]
-    turn = np.linspace(0.0, 2 * np.pi, 40)
-    outward = np.column_stack([np.cos(turn) / 0.7, np.sin(turn) / 0.3]) @ AXES[:2]
-    outward /= np.linalg.norm(outward, axis=1)[:, None]
-    rim = ellipse.point(np.column_stack([np.ones(40), turn]))
-    for off in (1e-2, 1e-3, 1e-4):
-        beyond = rim + off * outward
-        assert np.linalg.norm(ellipse.foot(beyond) - rim, axis=1).max() <= 1e-9
-        # the next term is the curvature, a / b² = 7.8 per metre at most, times the square
-        assert np.abs(ellipse.depth(beyond) + off).max() <= 7.8 * off**2
-
-
 AREAS = {
     "polygon": 0.5,  # the shoelace formula, by hand
     "disc": np.pi * 0.25,
@@ -162,28 +148,22 @@ AREAS = {
 
 
 @pytest.mark.parametrize("name", AREAS)
-def test_the_stretch_integrates_to_the_area(name):
+def test_the_stretch_integrates_to_the_area_and_the_bounds_hold_every_point(name):
+    piece = PIECES[name]
     x, w = np.polynomial.legendre.leggauss(12)
     s, t = (v.ravel() for v in np.meshgrid(0.5 + 0.5 * x, 0.5 + 0.5 * x))
     weights = 0.25 * np.outer(w, w).ravel()
     total = 0.0
-    for a, b, c in PIECES[name].cells:  # the square folded onto the triangle (Duffy)
+    for a, b, c in piece.cells:  # the square folded onto the triangle (Duffy)
         uv = a + np.outer(s, b - a) + np.outer(s * t, c - b)
         det = abs(np.linalg.det([b - a, c - a]))
-        total += float((weights * s * PIECES[name].stretch(uv)).sum() * det)
+        total += float((weights * s * piece.stretch(uv)).sum() * det)
     assert total == pytest.approx(AREAS[name], rel=1e-12)
-
-
-@pytest.mark.parametrize("name", [name for name in PIECES if name in AREAS])
-def test_the_bounds_hold_every_point_and_those_of_a_disc_and_a_cap_are_reached(name):
-    piece = PIECES[name]
     on, apart = samples(piece, 24)
     low, high = piece.bounds()
-    assert (on >= low - 1e-12).all()
-    assert (on <= high + 1e-12).all()
-    if "cylinder" not in name and name != "sector":
-        assert (on.min(axis=0) <= low + apart).all()
-        assert (on.max(axis=0) >= high - apart).all()
+    assert ((on >= low - 1e-12) & (on <= high + 1e-12)).all()
+    if name not in ("cylinder", "sector"):  # reached
+        assert ((on.min(axis=0) <= low + apart) & (on.max(axis=0) >= high - apart)).all()
 
 
 @pytest.mark.parametrize("corners", [2, 3])
@@ -191,16 +171,11 @@ def test_the_nearest_of_segments_or_triangles_is_that_of_dense_samples(corners):
     random = np.random.default_rng(corners)
     parts = random.uniform(-1.0, 1.0, (7, corners, 3))
     points = random.uniform(-1.5, 1.5, (60, 3))
-    grid = np.stack(np.meshgrid(*[np.arange(61)] * corners, indexing="ij"), axis=-1) / 60
+    grid = np.stack(np.meshgrid(*[np.arange(31)] * corners, indexing="ij"), axis=-1) / 30
     shares = grid[np.abs(grid.sum(axis=-1) - 1.0) < 1e-9]
     on = np.einsum("sk,mkd->msd", shares, parts)
     sampled = np.linalg.norm(points[:, None, None] - on, axis=3).min(axis=2)
     distance, number = nearest_parts(points, parts)
     assert (distance <= sampled.min(axis=1) + 1e-12).all()
-    assert distance == pytest.approx(sampled.min(axis=1), abs=0.5 * 3.5 / 60)
-    assert (sampled[np.arange(60), number] <= distance + 0.5 * 3.5 / 60).all()
-
-
-def test_the_foot_on_a_segment_without_length_is_its_place():
-    place = np.array([[0.3, 0.4]])
-    assert feet(np.array([[1.0, 1.0]]), place, place) == pytest.approx(place)
+    assert distance == pytest.approx(sampled.min(axis=1), abs=0.5 * 3.5 / 30)
+    assert (sampled[np.arange(60), number] <= distance + 0.5 * 3.5 / 30).all()

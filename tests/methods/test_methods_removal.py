@@ -10,7 +10,7 @@ from verify.methods.removal import bisect_cells
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.mesh import box_mesh, rectangle_mesh
 
-FEW = settings(max_examples=30, deadline=None, derandomize=True)
+FEW = settings(max_examples=12, deadline=None, derandomize=True)
 
 
 def crossed(mesh, plane):

@@ -10,7 +10,6 @@ from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
-TETRAHEDRON = SimplexMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
 CROSS = [Plane([0.3, 0.3], [1.0, 0.1]), Plane([0.3, 0.3], [0.1, 1.0])]
 
 
@@ -24,15 +23,6 @@ def test_a_triangle_can_be_in_three_copies_but_not_in_four():
     assert merged.count == 1
     assert merged.size in smallest.fraction
     assert body.phantom.volumes.sum() == pytest.approx(0.5, rel=1e-14)
-
-
-def test_a_tetrahedron_in_eight_parts_has_at_most_four_copies():
-    cuts = [Plane([0.2, 0.2, 0.2], np.eye(3)[k] + 0.05) for k in range(3)]
-    arbitrary = cut_by("virtual_node_arbitrary", TETRAHEDRON, cuts)
-    assert arbitrary.counts.elements == 8
-    body = cut_by("virtual_node", TETRAHEDRON, cuts)
-    assert body.counts.elements <= 4
-    assert body.phantom.volumes.sum() == pytest.approx(1 / 6, rel=1e-13)
 
 
 def test_one_cut_makes_both_algorithms_the_same_as_xfem():

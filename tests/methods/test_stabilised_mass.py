@@ -23,23 +23,20 @@ XFEM = find_solver("xfem")
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_a_generalised_stabilisation_keeps_the_mass_of_every_part_and_raises_none_other(body):
+def test_a_stabilisation_keeps_the_mass_of_every_part_or_adds_thousandths_and_lowers_nothing(body):
+    """By eigenvalues: at most d modes of a part, each with ε_S m (1·φ)² ≤ 1e-3 (d + 1) of it."""
     v = body()
-    plain = consistent_mass(v, DENSITY).matrix
-    more = generalised_eigenvalue_stabilised_mass(v, DENSITY).matrix
-    np.testing.assert_allclose(
-        more.sum(axis=0), plain.sum(axis=0), atol=1e-12 * abs(plain.sum(axis=0)).max()
-    )
-    least = np.linalg.eigvalsh((more - plain).toarray())[0]
+    plain, generalised, more = (
+        mass(v, DENSITY).matrix
+        for mass in (
+            consistent_mass, generalised_eigenvalue_stabilised_mass, eigenvalue_stabilised_mass
+        )
+    )  # fmt: skip
+    sums = plain.sum(axis=0)
+    np.testing.assert_allclose(generalised.sum(axis=0), sums, atol=1e-12 * abs(sums).max())
+    least = np.linalg.eigvalsh((generalised - plain).toarray())[0]
     assert least > -1e-12 * abs(plain).max()
-
-
-@pytest.mark.parametrize("body", BODIES)
-def test_an_eigenvalue_stabilisation_adds_thousandths_of_the_mass_of_the_cut_cells(body):
-    """At most d modes of a part, each with ε_S m (1·φ)² ≤ 1e-3 (d + 1) of the part."""
-    v = body()
-    plain, more = consistent_mass(v, DENSITY), eigenvalue_stabilised_mass(v, DENSITY)
-    added, corners = (more.matrix - plain.matrix).sum(), v.cells.shape[1]
+    added, corners = (more - plain).sum(), v.cells.shape[1]
     assert 0.0 <= added <= 1e-3 * corners * (corners - 1) * DENSITY * v.volumes[v.split].sum()
 
 
@@ -54,8 +51,9 @@ def uncut_bound(scene):
     return 2.0 / np.sqrt((2 * shear + 2 * lame) * largest)
 
 
-@pytest.mark.parametrize("epsilon", ["0.1", "0.0001", "1e-12"])
-@pytest.mark.parametrize("case", ["slivers/plane_edges", "benchmark/c8_slivers"])
+@pytest.mark.parametrize(
+    ("case", "epsilon"), [("slivers/plane_edges", "1e-12"), ("benchmark/c8_slivers", "0.0001")]
+)
 def test_no_sliver_makes_the_step_with_a_generalised_stabilisation_less_than_a_cell_may(
     case, epsilon
 ):
@@ -66,16 +64,15 @@ def test_no_sliver_makes_the_step_with_a_generalised_stabilisation_less_than_a_c
     assert step["consistent"] < bound
 
 
-@pytest.mark.parametrize("mass", ["evs", "gevs"])
-def test_a_stabilised_mass_moves_the_lowest_frequency_less_than_lumping(mass):
-    """By less than the lumped mass does, on the coarse mesh of the family, whatever the sliver."""
+def test_a_stabilised_mass_moves_the_lowest_frequency_less_than_lumping():
+    """On the coarse mesh of the family, whatever the sliver."""
     for epsilon in ("0.1", "1e-06"):
         scene = load_scene(f"slivers/plane_edges[epsilon={epsilon}]")
-        own, plain, lumped = (
+        evs, gevs, plain, lumped = (
             lowest_frequency(XFEM.system(scene, 0, mass=name))
-            for name in (mass, "consistent", "sidewise")
+            for name in ("evs", "gevs", "consistent", "sidewise")
         )
-        assert abs(own - plain) < abs(lumped - plain)
+        assert max(abs(evs - plain), abs(gevs - plain)) < abs(lumped - plain)
 
 
 @pytest.mark.parametrize("distance", [1e-8, 1e-10])
@@ -127,7 +124,7 @@ STABILISED = [
 
 
 @pytest.mark.parametrize(("mass", "raised"), STABILISED)
-@pytest.mark.parametrize("off", [1e-3, 1e-2, 0.05])
+@pytest.mark.parametrize("off", [1e-3, 0.05])
 def test_pieces_that_no_cut_keeps_apart_are_one_cell_to_a_stabilised_mass(mass, raised, off):
     """Planes past the point of a fork cut thin pieces off thick parts: no elements of their own."""
     cuts = fork(np.array([0.375, 0.5 + off]), np.array([0.3, 2.2, 4.5]))

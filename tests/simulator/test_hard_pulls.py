@@ -10,7 +10,6 @@ from verify.simulator import Session, quality_of
 from verify.xfem.body import RayleighDamping
 
 FRAME = 1.0 / 60.0
-NONE, SOME = RayleighDamping(0.0, 0.0), RayleighDamping(4.0, 0.01)
 
 
 @pytest.fixture(scope="module")
@@ -19,16 +18,15 @@ def incised(coarse_face):
     return replace(coarse_face, strokes=stage("face_incision").strokes)
 
 
-def pulled(incised, times, within, damping=SOME, time_step=FRAME) -> Session:
+def pulled(incised, times, within, damping=4.0, time_step=FRAME) -> Session:
     """Pull as in the case but that many times as far, within some seconds."""
     hooks = [
         replace(hook, vector=times * hook.vector, duration=within)
         for hook in stage("face_incision").hooks
     ]
     duration = hooks[0].begin + within + 0.4
-    session = Session(
-        replace(incised, hooks=hooks, damping=damping, time_step=time_step, duration=duration)
-    )
+    given = {"damping": RayleighDamping(damping, damping / 400.0), "time_step": time_step}
+    session = Session(replace(incised, hooks=hooks, duration=duration, **given))
     session.run()
     return session
 
@@ -39,11 +37,6 @@ def gain(session) -> float:
     return max(record.mechanical - record.work for record in session.records) / work
 
 
-@pytest.mark.parametrize(("times", "within", "damping"), [(3.0, 0.8, NONE), (3.0, 0.2, SOME)])
-def test_hard_pulls_gain_no_energy_in_any_step(incised, times, within, damping) -> None:
-    assert_no_gain(pulled(incised, times, within, damping))
-
-
 def assert_no_gain(session) -> None:
     assert quality_of(session).largest_stretch > 2.0
     work = max(record.work for record in session.records)
@@ -52,6 +45,10 @@ def assert_no_gain(session) -> None:
     assert gain(session) < 1e-12
     for record in session.records:
         assert abs(record.balance) < 1e-12 * work
+
+
+def test_hard_pulls_gain_no_energy_in_any_step(incised) -> None:
+    assert_no_gain(pulled(incised, 3.0, 0.4, 0.0))
 
 
 def test_a_pull_within_two_frames_gains_for_a_moment_and_ends_where_short_steps_end(

@@ -43,7 +43,7 @@ def test_the_face_has_openings_for_eyes_and_mouth_and_the_nodes_of_the_thesis() 
     assert np.ptp(points, axis=0)[1] == pytest.approx(0.204, rel=0.01)
 
 
-@pytest.mark.parametrize("wanted", [200, 400, 600, 800, 1000])
+@pytest.mark.parametrize("wanted", [200, 1000])
 def test_the_hand_has_the_thesis_numbers_of_tetrahedra(wanted, tmp_path) -> None:
     skin = Skin(kind="skin", shape="hand", elements=wanted, thickness=2e-3)
     mesh = skin_mesh(skin, tmp_path)
@@ -72,7 +72,7 @@ def test_a_plane_sheet_thickened_has_its_volume_and_a_closed_shell(layers) -> No
     assert len(border_loops(facets)) == 0
 
 
-@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtu"])
+@pytest.mark.parametrize("suffix", ["stl", "vtu"])
 def test_a_surface_of_ones_own_becomes_a_membrane_or_a_solid(suffix, tmp_path) -> None:
     plane, triangles, _ = plane_mesh(SQUARE, [HOLE], 0.2)
     sheet = np.pad(plane, ((0, 0), (0, 1)))

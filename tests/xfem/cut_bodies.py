@@ -74,20 +74,12 @@ def rotation(dim, angle, axis=(1.0, 2.0, -0.5)):
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def boundary_nodes(phantom):
-    """Dof nodes on the boundary of the uncut mesh."""
-    mesh = phantom.mesh
-    on_boundary = np.zeros(len(mesh.points), dtype=bool)
-    for cell, opposite in mesh.boundary_facets:
-        on_boundary[np.delete(mesh.cells[cell], opposite)] = True
-    return on_boundary[phantom.node_parent]
-
-
 def shaken(mesh, seed, amount=0.2):
-    """Inner nodes moved at random: every element is cut in its own way."""
+    """Inner nodes of a box moved at random: every element is cut in its own way."""
     random = np.random.default_rng(seed)
     points = mesh.points.copy()
-    inner = ((points > 1e-9) & (points < 1.0 - 1e-9)).all(axis=1)
+    low, high = points.min(axis=0), points.max(axis=0)
+    inner = ((points > low + 1e-9) & (points < high - 1e-9)).all(axis=1)
     size = np.linalg.norm(mesh.edge_vectors, axis=2).min()
     points[inner] += amount * size * random.uniform(-1.0, 1.0, (inner.sum(), mesh.space))
     return SimplexMesh(points, mesh.cells)

@@ -3,25 +3,18 @@
 import numpy as np
 from cut_bodies import DENSITY, material, shaken
 
+import verify.xfem as xfem
 from verify.xfem.block_pattern import body_pattern
-from verify.xfem.body import DynamicBody
-from verify.xfem.cuts import Plane
-from verify.xfem.explicit import CentralDifferences, critical_step
-from verify.xfem.internal_force import InternalForce, inverted_cells
-from verify.xfem.loads_and_supports import Supports
-from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import box_mesh, rectangle_mesh
-from verify.xfem.phantom import cut_mesh
-from verify.xfem.slivers import treat_slivers
+from verify.xfem.internal_force import inverted_cells
 
 STRAIN, POISSON = 0.15, 0.3
 
 
 def rest_step(phantom, mass, stuff):
-    force = InternalForce(phantom, stuff, "linear")
+    force = xfem.InternalForce(phantom, stuff, "linear")
     pattern = body_pattern(phantom)
     blocks = force.stiffness(pattern, np.zeros_like(phantom.node_points), "rotation-fixed")
-    return critical_step(pattern.matrix(blocks), mass)
+    return xfem.critical_step(pattern.matrix(blocks), mass)
 
 
 def stretched(points):
@@ -45,20 +38,20 @@ def uniform(points):
 
 def aggregated(phantom):
     """The body and the report of the default sliver policy, held where `let_go` holds it."""
-    return treat_slivers(phantom, supported=phantom.node_points[:, 0] < 1e-9)
+    return xfem.treat_slivers(phantom, supported=phantom.node_points[:, 0] < 1e-9)
 
 
 def let_go(phantom, share, steps, every=10, start=stretched):
     """Largest energy over that at the start, and at how many instants a piece was inverted."""
     stuff = material(phantom.mesh.dim)
-    mass = side_wise_mass(phantom, DENSITY)
-    force = InternalForce(phantom, stuff)
-    supports = Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 0] < 1e-9)
-    dynamic = DynamicBody(force, mass, supports=supports)
+    mass = xfem.side_wise_mass(phantom, DENSITY)
+    force = xfem.InternalForce(phantom, stuff)
+    supports = xfem.Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 0] < 1e-9)
+    dynamic = xfem.DynamicBody(force, mass, supports=supports)
     state = dynamic.rest()
     state.displacement[:] = start(phantom.node_points)
     before = force.evaluate(state.displacement)[1]
-    integrator = CentralDifferences(dynamic, share * rest_step(phantom, mass, stuff))
+    integrator = xfem.CentralDifferences(dynamic, share * rest_step(phantom, mass, stuff))
     largest, inverted = 0.0, 0
     for step in range(steps):
         integrator.step(state)
@@ -74,12 +67,12 @@ def let_go(phantom, share, steps, every=10, start=stretched):
 def plate(seed):
     random = np.random.default_rng(100 + seed)
     normal = random.normal(size=2)
-    mesh = shaken(rectangle_mesh((8, 8)), seed, 0.1)
-    return cut_mesh(mesh, [Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 2), normal)])
+    mesh = shaken(xfem.rectangle_mesh((8, 8)), seed, 0.1)
+    return xfem.cut_mesh(mesh, [xfem.Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 2), normal)])
 
 
 def cube(seed):
     random = np.random.default_rng(100 + seed)
     normal = random.normal(size=3)
-    cut = Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 3), normal)
-    return cut_mesh(box_mesh((3, 3, 3)), [cut])
+    cut = xfem.Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 3), normal)
+    return xfem.cut_mesh(xfem.box_mesh((3, 3, 3)), [cut])

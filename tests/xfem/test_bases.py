@@ -1,22 +1,18 @@
-"""One space, three bases: equal displacements; and the thesis' blocks as an independent check."""
+"""One space, two bases: the thesis' blocks as an independent check of the stiffness."""
 
 import numpy as np
 import pytest
-import xfem_exact_fields as exact
-from thesis_blocks import shifted_stiffness, transformation, transformed_matrix
-from xfem_bodies import boundary_nodes, sparse_stiffness
+from thesis_blocks import shifted_stiffness, transformed_matrix
+from xfem_bodies import sparse_stiffness
 
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.element import isotropic
-from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.statics import solve_static
 
 CASES = {
-    "through": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.0], [2.0, 1.0]])),
-    "edge crack": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.52], [0.5, 0.52]])),
-    "along edges": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.5], [2.0, 0.5]])),
+    "through": (rectangle_mesh((5, 5)), Polyline([[-1.0, 0.0], [2.0, 1.0]])),
+    "edge crack": (rectangle_mesh((5, 5)), Polyline([[-1.0, 0.52], [0.5, 0.52]])),
     "through nodes": (rectangle_mesh((6, 6)), Polyline([[-0.5, 0.0], [1.5, 1.0]])),
     "cube": (box_mesh((2, 3, 2)), Plane([0.5, 0.5, 0.5], [-1.0, -2.0, 3.0])),
 }
@@ -56,27 +52,6 @@ def test_the_sign_printed_in_2_64_makes_the_stiffness_indefinite():
     wrong = np.linalg.eigvalsh(blocks_by_the_thesis(phantom, sign_of_kaa=-1.0))
     assert right[0] > -1e-14
     assert wrong[0] < -0.1 * wrong[-1]
-
-
-@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
-def test_all_bases_give_the_same_displacement_to_round_off(basis):
-    """The system solved in its own unknowns, Dirichlet values included, by a dense solver."""
-    mesh, cut = CASES["through"]
-    phantom = cut_mesh(mesh, [cut])
-    nodes = boundary_nodes(mesh)
-    supports = Supports.none(phantom).prescribe(phantom, nodes, exact.f3)
-    sidewise = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports).displacement
-    K = transformed_matrix(phantom, basis, sparse_stiffness(phantom))
-    T = transformation(phantom, basis)
-    given = np.linalg.solve(T, supports.values)
-    # an enriched node with a prescribed value has both u and a prescribed
-    on_boundary = np.isin(
-        np.concatenate([np.arange(len(mesh.points)), phantom.enriched_nodes]), nodes
-    )
-    fixed = np.repeat(on_boundary, 2)
-    q = given.ravel().copy()
-    q[~fixed] = np.linalg.solve(K[np.ix_(~fixed, ~fixed)], -K[np.ix_(~fixed, fixed)] @ q[fixed])
-    assert np.abs(T @ q.reshape(-1, 2) - sidewise).max() < 1e-13
 
 
 def test_two_parts_beyond_one_cut_have_unknowns_of_their_own():

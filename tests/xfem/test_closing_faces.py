@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from cut_bodies import material, rotation, shaken
 from scipy.linalg import eigh
-from scipy.optimize import minimize
 from xfem_bodies import boundary_nodes, sparse_stiffness
 
 import verify.xfem as xfem
@@ -21,23 +21,18 @@ SHEAR = 0.5 / (1.0 + NU)
 KOLOSOV = 3.0 - 4.0 * NU
 
 
-def moved(mesh, size=0.2, seed=1):
+def grid(dim, n, seed=1):
     """A mesh whose inner nodes are moved at random, so that it has no lines."""
+    mesh = xfem.rectangle_mesh((n, n)) if dim == 2 else xfem.box_mesh((n, n, n))
     points, inner = mesh.points.copy(), np.ones(len(mesh.points), dtype=bool)
     inner[boundary_nodes(mesh)] = False
-    h = mesh.measures.mean() ** (1 / mesh.dim)
     random = np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
-    points[inner] += size * h * random[inner]
+    points[inner] += 0.2 * mesh.measures.mean() ** (1 / dim) * random[inner]
     return xfem.SimplexMesh(points, mesh.cells)
 
 
-def grid(dim, n, seed=1):
-    mesh = xfem.rectangle_mesh((n, n)) if dim == 2 else xfem.box_mesh((n, n, n))
-    return moved(mesh, seed=seed)
-
-
-def material(dim):
-    return xfem.isotropic(1.0, NU, "plane strain" if dim == 2 else "solid")
+def soft(dim):
+    return material(dim, 1.0)
 
 
 def closed(mesh, cuts, field, tip="inside"):
@@ -47,8 +42,8 @@ def closed(mesh, cuts, field, tip="inside"):
     outer = np.zeros(len(mesh.points), dtype=bool)
     outer[boundary_nodes(mesh)] = True
     fixed = np.repeat(outer[phantom.node_parent, None], mesh.dim, axis=1)
-    faces = ClosingFaces(phantom, material(mesh.dim))
-    force = xfem.InternalForce(phantom, material(mesh.dim), "linear")
+    faces = ClosingFaces(phantom, soft(mesh.dim))
+    force = xfem.InternalForce(phantom, soft(mesh.dim), "linear")
     supports = xfem.Supports(fixed, np.where(fixed, exact, 0.0))
     return phantom, faces, solve_closed(force, faces, supports), exact
 
@@ -66,17 +61,15 @@ def overlap(faces, displacement):
 
 BENT = xfem.Polyline([[-0.1, 0.2], [0.3, 0.3], [0.6, 0.55], [0.8, 1.1]])
 CUTS = {
-    "inclined": (2, [xfem.Plane([0.47, 0.47], [0.6, 0.8])]),
-    "bent": (2, [BENT]),
+    "none": (2, []),
     "crossing": (2, [xfem.Plane([0.47, 0.47], [0.6, 0.8]), BENT]),
     "ends inside": (2, [xfem.Polyline([[0.21, 0.33], [0.77, 0.58]])]),
     "along faces": (2, [xfem.Plane([0.5, 0.5], [0.0, 1.0])]),
-    "in space": (3, [xfem.Plane([0.47] * 3, [0.5, 0.6, 0.62])]),
     "two in space": (
         3,
         [xfem.Plane([0.47] * 3, [0.5, 0.6, 0.62]), xfem.Plane([0.6] * 3, [1, -0.3, 0.2])],
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CUTS)
@@ -87,7 +80,7 @@ def test_under_pressure_from_all_sides_a_cut_is_not_felt(name):
     strain = -P / (dim * lame + 2.0 * SHEAR)
     _, _faces, found, exact = closed(mesh, cuts, lambda x, _: strain * x)
     assert np.abs(found.displacement - exact).max() < 1e-12 * np.abs(exact).max()
-    assert np.abs(found.pressure / P - 1.0).max() < 1e-10
+    assert np.abs(found.pressure / P - 1.0).max(initial=0.0) < 1e-10
 
 
 def bending(normal, origin):
@@ -121,13 +114,11 @@ def by_sliver(dim, n, direction, share):
     return error, *misses(faces, found.pressure, pressure(faces.points))
 
 
-@pytest.mark.parametrize(
-    ("dim", "n", "direction"), [(2, 8, [0.3, 1.0]), (2, 8, [0.0, 1.0]), (3, 4, [0.2, 0.35, 1.0])]
-)
+@pytest.mark.parametrize(("dim", "n", "direction"), [(2, 8, [0.3, 1.0]), (3, 3, [0.2, 0.35, 1.0])])
 def test_errors_of_displacement_and_pressure_do_not_grow_with_a_sliver(dim, n, direction):
     # twice: the cut goes elsewhere through its cells, as on another mesh of the same size
     usual = np.array(by_sliver(dim, n, direction, 0.5))
-    for share in (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
+    for share in (1e-2, 1e-6, 1e-12):
         assert (np.array(by_sliver(dim, n, direction, share)) < 2.0 * usual).all(), share
 
 
@@ -138,7 +129,7 @@ def test_pressure_converges_with_the_first_order_beside_a_sliver():
     assert (rates[1:] > 0.9).all()
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_the_stress_on_faces_is_bounded_by_the_energy(seed):
     # ∫ σ²/γ ≤ a(u, u)/c for every u, or a body whose faces are apart has no stable equilibrium
     random, dim = np.random.default_rng(seed), 2 + seed % 2
@@ -148,7 +139,7 @@ def test_the_stress_on_faces_is_bounded_by_the_energy(seed):
         for k in random.integers(len(mesh.points), size=3)
     ]
     phantom = xfem.cut_mesh(mesh, planes)
-    faces = ClosingFaces(phantom, material(dim))
+    faces = ClosingFaces(phantom, soft(dim))
     pattern = body_pattern(phantom, faces.couplings)
     blocks = np.zeros((len(pattern.columns), dim, dim))
     faces.add_stiffness(pattern, blocks, False)
@@ -159,65 +150,34 @@ def test_the_stress_on_faces_is_bounded_by_the_energy(seed):
     assert 0.02 < largest < 1.0 / STABILITY
 
 
-def turned(angle, origin, field):
-    """A field of the crack −1 < x < 1 on y = 0, turned and moved; and coordinates along it."""
-    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-    def moved_field(x, inside):
-        own, side = (x - origin) @ R, (inside - origin) @ R
-        y = own[:, 1]
-        own[:, 1] = np.where(y * side[:, 1] > 0.0, y, np.copysign(1e-14, side[:, 1]))
-        return field(own) @ R.T
-
-    return (
-        moved_field,
-        lambda x: (x - origin) @ R,
-        np.array([[-1.0, 0.0], [1.0, 0.0]]) @ R.T + origin,
-    )
-
-
-def partly_closed(x):
-    """Displacement of a crack that σ_yy → σ′x closes from −a to −a/3.
+def westergaard(x):
+    """Stress function of a crack that σ_yy → σ′x closes from −a to −a/3, and its integral.
 
     Z = σ′(ξ − c/2)√((ξ + c)/(ξ − c)), c = 2a/3, ξ = z − a/3.
     """
-    Z, integral = westergaard(x)
-    y = x[:, 1]
-    u = 0.5 * (KOLOSOV - 1.0) * integral.real - y * Z.imag
-    v = 0.5 * (KOLOSOV + 1.0) * integral.imag - y * Z.real
-    return np.stack([u, v], axis=1) / (2.0 * SHEAR)
-
-
-def westergaard(x):
     c, xi = 2.0 / 3.0, x[..., 0] - 1.0 / 3.0 + 1j * x[..., 1]
     root = np.sqrt(xi - c) * np.sqrt(xi + c)
     return P * (xi - 0.5 * c) * (xi + c) / root, 0.5 * P * (xi + c) * root
 
 
-def test_the_field_of_the_partly_closed_crack_is_in_equilibrium_and_closes():
-    step, x = 1e-4, np.array([[0.3, 0.4], [-0.7, -0.2], [1.4, 0.5]])
-    # σ = λ tr ε + 2με by differences; Navier's equation by differences of the displacement
-    shift = step * np.eye(2)
-
-    def second(i, j):
-        ends = [(a, b) for a in (-1, 1) for b in (-1, 1)]
-        sums = sum(a * b * partly_closed(x + a * shift[i] + b * shift[j]) for a, b in ends)
-        return sums / (4.0 * step**2)
-
-    lame = NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
-    xx, yy, xy = second(0, 0), second(1, 1), second(0, 1)
-    div = np.stack([xx[:, 0] + xy[:, 1], xy[:, 0] + yy[:, 1]], axis=1)
-    assert np.abs((lame + SHEAR) * div + SHEAR * (xx + yy)).max() < 1e-5 * P
-    line = np.linspace(-0.99, -0.34, 50)
-    above, below = (partly_closed(np.stack([line, s + 0 * line], axis=1)) for s in (1e-14, -1e-14))
-    assert np.abs((above - below)[:, 1]).max() < 1e-12
-    assert (westergaard(np.stack([line, 0 * line], axis=1))[0].real < 0.0).all()
-
-
 def partly(n):
-    field, local, ends = turned(0.4, 0.013, partly_closed)
-    mesh = moved(xfem.rectangle_mesh((n, n), (-2.0, -2.0), (2.0, 2.0)), 0.15)
-    _phantom, faces, found, exact = closed(mesh, [xfem.Polyline(ends)], field)
+    """A crack −1 < x < 1, turned and moved; the sign of y on it is that of the material."""
+    origin, R = 0.013, rotation(2, 0.4)
+
+    def local(x):
+        return (x - origin) @ R
+
+    def field(x, inside):
+        own, side = local(x), local(inside)[:, 1]
+        y = np.where(own[:, 1] * side > 0.0, own[:, 1], np.copysign(1e-14, side))
+        Z, integral = westergaard(np.column_stack([own[:, 0], y]))
+        u = 0.5 * (KOLOSOV - 1.0) * integral.real - y * Z.imag
+        v = 0.5 * (KOLOSOV + 1.0) * integral.imag - y * Z.real
+        return np.stack([u, v], axis=1) @ R.T / (2.0 * SHEAR)
+
+    crack = xfem.Polyline(np.array([[-1.0, 0.0], [1.0, 0.0]]) @ R.T + origin)
+    mesh = shaken(xfem.rectangle_mesh((n, n), (-2.0, -2.0), (2.0, 2.0)), 1, 0.15)
+    _phantom, faces, found, exact = closed(mesh, [crack], field)
     at = local(faces.points)
     pressure = np.maximum(0.0, -westergaard(at * [1.0, 0.0])[0].real)
     touching = at[..., 0][found.pressure > 1e-3 * found.pressure.max()]
@@ -236,32 +196,6 @@ def test_a_partly_closed_crack_opens_where_it_shall():
     assert np.log2(pressure[0] / pressure[-1]) / 2.0 > 0.5
     assert pressure[-1] < 0.05
     assert np.log2(error[0] / error[-1]) / 2.0 > 0.6
-
-
-def closed_shear(x):
-    """Uniform pressure across the crack, and mode II: faces slide and stay together."""
-    y, z = x[:, 1], x[:, 0] + 1j * x[:, 1]
-    root = np.sqrt(z - 1.0) * np.sqrt(z + 1.0)
-    Z = 0.6 * P * z / root
-    u = 0.5 * (KOLOSOV + 1.0) * 0.6 * P * root.imag + y * Z.real
-    v = -0.5 * (KOLOSOV - 1.0) * 0.6 * P * root.real - y * Z.imag
-    u = u / (2.0 * SHEAR) + P * NU * (1.0 + NU) * x[:, 0]
-    return np.stack([u, v / (2.0 * SHEAR) - P * (1.0 - NU**2) * y], axis=1)
-
-
-def test_a_closed_inclined_crack_slides_under_uniform_pressure():
-    errors = []
-    for n in (20, 40, 80):
-        field, local, ends = turned(0.9, 0.013, closed_shear)
-        mesh = moved(xfem.rectangle_mesh((n, n), (-2.0, -2.0), (2.0, 2.0)), 0.15)
-        _phantom, faces, found, exact = closed(mesh, [xfem.Polyline(ends)], field)
-        inner = np.abs(local(faces.points)[..., 0]) < 0.8
-        wrong = np.abs(found.pressure / P - 1.0)[inner]
-        errors.append(
-            [np.linalg.norm(found.displacement - exact) / np.linalg.norm(exact), wrong.mean()]
-        )
-    rates = np.log2(np.array(errors[0]) / errors[-1]) / 2.0
-    assert (rates > 0.8).all()  # its ends are within an element
 
 
 def test_faces_that_slide_along_a_circle_bear_the_pressure_as_if_they_did_not():
@@ -284,8 +218,8 @@ def test_faces_that_slide_along_a_circle_bear_the_pressure_as_if_they_did_not():
         outer = np.zeros(len(mesh.points), dtype=bool)
         outer[boundary_nodes(mesh)] = True
         fixed = np.repeat((held | outer[phantom.node_parent])[:, None], 2, axis=1)
-        faces = ClosingFaces(phantom, material(2), [circle])
-        force = xfem.InternalForce(phantom, material(2), "linear")
+        faces = ClosingFaces(phantom, soft(2), [circle])
+        force = xfem.InternalForce(phantom, soft(2), "linear")
         answer = solve_closed(force, faces, xfem.Supports(fixed, np.where(fixed, exact, 0.0)))
         # it is this that normals of facets would take for gaps
         taken = faces.stiffness[:, None] * faces.slid(answer.displacement)
@@ -296,66 +230,7 @@ def test_faces_that_slide_along_a_circle_bear_the_pressure_as_if_they_did_not():
     assert found[2] < 1.0 / (16 * 56 * radius)
 
 
-def test_a_ring_cut_along_a_circle_has_the_pressure_of_lame():
-    # u_r = A r + B/r about a centre outside of the body; its cut is a curve
-    centre, radius = np.array([-0.3, -0.4]), 1.1
-    A, B = -P, 0.4 * P
-
-    def field(x, _):
-        r = x - centre
-        return r * (A + B / (r**2).sum(axis=1)[:, None])
-
-    lame = NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
-    pressure = -(2.0 * (lame + SHEAR) * A - 2.0 * SHEAR * B / radius**2)
-    angles = np.linspace(-0.2, 1.8, 200)
-    arc = xfem.Polyline(centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    errors = []
-    for n in (8, 16, 32):
-        _, faces, found, _exact = closed(grid(2, n), [arc], field)
-        errors.append(misses(faces, found.pressure, np.full(faces.weights.shape, pressure)))
-    assert errors[-1][0] < 0.01
-    assert errors[-1][1] < 0.05
-    assert np.log2(errors[0][0] / errors[-1][0]) / 2.0 > 0.8
-
-
-def wedge(push):
-    """A block cut twice, its wedge pressed back by a force over its top; and its solution."""
-    mesh = grid(2, 9)
-    cuts = [xfem.Plane([0.3, 0.5], [1.0, 0.35]), xfem.Plane([0.72, 0.5], [1.0, -0.3])]
-    phantom = xfem.cut_mesh(mesh, cuts)
-    between = (phantom.node_side == [1, -1]).all(axis=1)
-    points = phantom.node_points
-    fixed = (points[:, 1] == 0.0) & ~between
-    load = np.zeros_like(points)
-    load[between & (points[:, 1] == 1.0)] = push
-    supports = xfem.Supports(np.repeat(fixed[:, None], 2, axis=1), np.zeros_like(points))
-    faces = ClosingFaces(phantom, material(2))
-    force = xfem.InternalForce(phantom, material(2), "linear")
-    return force, faces, supports, load
-
-
-def test_a_wedge_that_only_faces_hold_is_in_balance_and_at_the_least_energy():
-    force, faces, supports, load = wedge([0.2 * P, -P])
-    found = solve_closed(force, faces, supports, load)
-    assert found.residual < 1e-10
-    assert 0 < (found.pressure > 0.0).sum() < found.pressure.size
-    free = ~supports.fixed
-
-    def energy(values):
-        u = np.zeros_like(load)
-        u[free] = values
-        elastic, stored = force.evaluate(u)
-        slope = elastic + faces.force(u) - load
-        return stored + faces.energy(u) - np.vdot(load, u), slope[free]
-
-    start = found.displacement[free]
-    least = energy(start)[0]
-    random = np.random.default_rng(0).normal(size=start.shape) * np.abs(start).mean()
-    other = minimize(energy, start + random, jac=True, method="L-BFGS-B", options={"maxiter": 500})
-    assert other.fun > least - 1e-12 * abs(least)
-
-
-@pytest.mark.parametrize("seed", [28, 122, *range(12)])
+@pytest.mark.parametrize("seed", [28, 122, *range(4)])
 def test_any_cuts_and_any_movement_of_the_boundary_find_a_balance(seed):
     # of the first two a piece between the cuts is loose until faces hold it
     random, dim = np.random.default_rng(seed), 2 + seed % 2
@@ -379,28 +254,24 @@ def test_any_cuts_and_any_movement_of_the_boundary_find_a_balance(seed):
     assert np.abs(found.pressure - np.maximum(0.0, -trial)).max() < 1e-12
 
 
-def test_a_body_without_faces_is_solved_as_ever():
-    phantom = xfem.cut_mesh(xfem.rectangle_mesh((3, 3)), [])
-    y = phantom.mesh.points[:, 1]
-    held = (
-        xfem.Supports.none(phantom).prescribe(phantom, y == 0.0).prescribe(phantom, y == 1.0, 0.1)
-    )
-    force = xfem.InternalForce(phantom, material(2), "linear")
-    found = solve_closed(force, ClosingFaces(phantom, material(2)), held)
-    usual = xfem.solve_static(phantom, material(2), held)
-    assert np.abs(found.displacement - usual.displacement).max() < 1e-14
-
-
 def test_what_nothing_holds_is_named():
     mesh = xfem.rectangle_mesh((5, 5))
     phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.5, 0.53], [0.0, 1.0])])
     held = xfem.Supports.none(phantom).prescribe(phantom, mesh.points[:, 1] == 0.0)
-    force = xfem.InternalForce(phantom, material(2), "linear")
+    force = xfem.InternalForce(phantom, soft(2), "linear")
     with pytest.raises(UnsupportedBodyError, match="around"):  # it can slide
-        solve_closed(force, ClosingFaces(phantom, material(2)), held)
-    force, faces, supports, load = wedge([0.0, P])
+        solve_closed(force, ClosingFaces(phantom, soft(2)), held)
+    # a wedge between two cuts, which only their faces hold, is pulled out
+    planes = [xfem.Plane([0.3, 0.5], [1.0, 0.35]), xfem.Plane([0.72, 0.5], [1.0, -0.3])]
+    phantom = xfem.cut_mesh(grid(2, 9), planes)
+    between, y = (phantom.node_side == [1, -1]).all(axis=1), phantom.node_points[:, 1]
+    fixed, load = np.zeros((2, phantom.node_count, 2))
+    fixed[(y == 0.0) & ~between], load[between & (y == 1.0), 1] = 1.0, P
+    force = xfem.InternalForce(phantom, soft(2), "linear")
     with pytest.raises(xfem.XfemError, match="faces or supports that hold"):
-        solve_closed(force, faces, supports, load)
+        solve_closed(
+            force, ClosingFaces(phantom, soft(2)), xfem.Supports(fixed > 0.0, 0.0 * fixed), load
+        )
 
 
 def impact(n, dim=2, gap=0.0, tilt=0.0, scheme=xfem.EnergyMomentum, step=1.0):
@@ -437,7 +308,7 @@ def impact(n, dim=2, gap=0.0, tilt=0.0, scheme=xfem.EnergyMomentum, step=1.0):
 @pytest.mark.parametrize("gap", [0.0, pytest.param(1e-3, marks=pytest.mark.heavy)])
 def test_halves_that_collide_exchange_velocities_and_gain_no_energy(gap):
     lost, wrong = [], []
-    for n in (20, 40, 80, 160):
+    for n in (20, 40, 80):
         means, pressure, own, depth = impact(n, gap=gap)
         assert own.max() < 1.0 + 1e-12
         assert depth < 0.1
@@ -446,22 +317,20 @@ def test_halves_that_collide_exchange_velocities_and_gain_no_energy(gap):
         # waves run through each half and back: together for 2L/c under ρ c v₀
         since = means[:, 0] - 0.5 * gap / 0.01
         assert np.abs(means[:, 1] - np.clip(since - 1.0, -1.0, 1.0)).max() < 0.15
-        together = (since > 0.6) & (since < 1.4)
+        together = (since > 0.9) & (since < 1.4)
         assert pressure[-1] == 0.0
-    assert np.abs(pressure[together] - 1.0).max() < 0.02
-    assert lost[-1] < 0.02
-    assert wrong[-1] < 0.02
-    assert np.log2(lost[0] / lost[-1]) / 3.0 > 0.8  # first order
-    assert np.log2(wrong[0] / wrong[-1]) / 3.0 > 0.6
+    assert np.abs(pressure[together] - 1.0).max() < 0.06
+    assert max(lost[-1], wrong[-1]) < 0.04
+    assert np.log2(lost[0] / lost[-1]) / 2.0 > 0.8  # first order
+    assert np.log2(wrong[0] / wrong[-1]) / 2.0 > 0.6
 
 
 @pytest.mark.parametrize(
     "given",
     [
-        {"dim": 3, "tilt": 0.4},
+        {"dim": 3, "tilt": 0.4, "step": 4.0},
         {"tilt": 0.5, "scheme": Trapezoidal},
         {"scheme": ImplicitEuler, "gap": 1e-3},
-        {"step": 8.0, "tilt": 0.3},
     ],
 )
 def test_no_impact_gains_energy(given):
@@ -473,12 +342,12 @@ def test_no_impact_gains_energy(given):
 def test_schemes_without_contact_refuse_by_name():
     phantom = xfem.cut_mesh(xfem.rectangle_mesh((3, 3)), [xfem.Plane([0.4, 0.0], [1.0, 0.0])])
     mass = xfem.side_wise_mass(phantom, 1.0)
-    faces = ClosingFaces(phantom, material(2), moving=True)
-    linear = xfem.InternalForce(phantom, material(2), "linear")
+    faces = ClosingFaces(phantom, soft(2), moving=True)
+    linear = xfem.InternalForce(phantom, soft(2), "linear")
     body = xfem.DynamicBody(linear, mass, contact=faces)
     for scheme in (xfem.CentralDifferences, SymplecticEuler, RealTimeEuler, GeneralisedAlpha):
         with pytest.raises(xfem.XfemError, match="no contact of the faces"):
             scheme(body, 1e-3)
-    turning = xfem.InternalForce(phantom, material(2))
+    turning = xfem.InternalForce(phantom, soft(2))
     with pytest.raises(xfem.XfemError, match="finite rotation"):
         xfem.DynamicBody(turning, mass, contact=faces)

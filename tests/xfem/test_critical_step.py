@@ -11,10 +11,9 @@ from verify.xfem.cuts import Plane
 from verify.xfem.explicit import CentralDifferences, critical_step, element_critical_steps
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 
-EPSILONS = (0.5, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)
 MASSES = {
     "side-wise": side_wise_mass,
     "consistent": consistent_mass,
@@ -22,10 +21,6 @@ MASSES = {
     "row sum": lambda v, rho: shifted_mass(v, rho, "row sum"),
     "weighted diagonal": lambda v, rho: shifted_mass(v, rho, "weighted diagonal"),
 }
-
-
-def _mesh(dim):
-    return rectangle_mesh((8, 8)) if dim == 2 else box_mesh((3, 3, 4))
 
 
 def _stiffness(v):
@@ -38,24 +33,9 @@ def _step(v, mass):
 
 
 def _sliver(dim, epsilon):
-    mesh = _mesh(dim)
-    size = 1.0 / 8.0 if dim == 2 else 1.0 / 4.0
     up = np.eye(dim)[-1]
-    return cut_mesh(mesh, [Plane(np.full(dim, 0.5) + epsilon * size * up, up)])
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("epsilon", EPSILONS)
-def test_side_wise_mass_keeps_the_step_and_the_thesis_lumping_most_of_it(dim, epsilon):
-    element = element_critical_steps(_mesh(dim), material(dim), DENSITY).min()
-    uncut = _step(cut_mesh(_mesh(dim), []), "side-wise")
-    v = _sliver(dim, epsilon)
-    side_wise, thesis = _step(v, "side-wise"), _step(v, "enrichment")
-    # a piece is its element times a factor: λ_max ≤ that of the elements (1e-9: eigenvalues)
-    assert side_wise >= (1.0 - 1e-9) * element
-    assert side_wise >= 0.75 * uncut
-    # proven: ≥ 1/√2
-    assert thesis >= 0.70 * element
+    mesh = rectangle_mesh((8, 8)) if dim == 2 else box_mesh((2, 2, 4))
+    return cut_mesh(mesh, [Plane(np.full(dim, 0.5) + epsilon / (8 if dim == 2 else 4) * up, up)])
 
 
 def catalogue_cuts(dim, size):
@@ -72,52 +52,32 @@ def catalogue_cuts(dim, size):
     yield [Plane((1.0 - 1.0 / n - shift) * all_, all_)]
 
 
-@pytest.mark.parametrize("diagonal", ["right", "alternating", "crossed", "box"])
+@pytest.mark.parametrize("diagonal", ["alternating", "crossed", "box"])
 def test_on_regular_meshes_every_sliver_of_the_catalogue_leaves_three_quarters_of_the_step(
     diagonal,
 ):
-    """Of the assembled uncut body's; that of the smallest element always. The least seen: .81."""
+    """Of the assembled uncut body's; that of the smallest element always. The least seen: .81.
+
+    The thesis' lumping leaves 1/√2 of the element's, as is proven.
+    """
     dim = 3 if diagonal == "box" else 2
     mesh = box_mesh((4, 4, 4)) if dim == 3 else rectangle_mesh((8, 8), diagonal=diagonal)
     uncut = _step(cut_mesh(mesh, []), "side-wise")
     element = element_critical_steps(mesh, material(dim), DENSITY).min()
-    for size in (1e-1, 1e-4, 1e-12, 0.0):
+    for size in (1e-1, 1e-12, 0.0):
         for cuts in catalogue_cuts(dim, size):
             step = _step(cut_mesh(mesh, cuts), "side-wise")
+            # a piece is its element times a factor (1e-9: eigenvalues)
             assert step >= (1.0 - 1e-9) * element
             assert step >= 0.75 * uncut
+        assert _step(cut_mesh(mesh, [cuts[0]]), "enrichment") >= 0.70 * element
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("mass", ["consistent", "row sum", "weighted diagonal"])
-def test_the_step_of_the_other_masses_vanishes_with_the_sliver(dim, mass):
-    # a sliver of 1e-5 takes 1e-15 of the cells that it meets in a corner: a piece still
-    coarse, fine, finest = (_step(_sliver(dim, e), mass) for e in (1e-2, 1e-4, 1e-5))
-    # in proportion to its size
-    assert fine / coarse == pytest.approx(1e-2, rel=0.05)
-    assert finest / fine == pytest.approx(1e-1, rel=0.05)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("shift", [0.03, 0.08])
-def test_on_distorted_meshes_the_element_bound_holds_and_the_assembled_step_on_mild_ones(
-    dim, shift
-):
-    rng = np.random.default_rng(11)
-    for _ in range(15):
-        mesh = rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2))
-        inner = ((mesh.points > 1e-9) & (mesh.points < 1.0 - 1e-9)).all(axis=1)
-        moved = inner[:, None] * rng.uniform(-shift, shift, size=mesh.points.shape)
-        mesh = SimplexMesh(mesh.points + moved, mesh.cells)
-        v = cut_mesh(mesh, [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim))])
-        element = element_critical_steps(mesh, material(dim), DENSITY).min()
-        side_wise, thesis = _step(v, "side-wise"), _step(v, "enrichment")
-        assert side_wise >= (1.0 - 1e-9) * element
-        assert thesis >= 0.70 * element
-        if shift < 0.05:
-            # not a bound: a cut takes the mass of its neighbours from a bad element, and on
-            # meshes distorted by a third of their size ratios down to .53 were seen
-            assert side_wise >= 0.75 * _step(cut_mesh(mesh, []), "side-wise")
+def test_the_step_of_the_other_masses_vanishes_with_the_sliver(dim):
+    for mass in ("consistent", "row sum", "weighted diagonal"):
+        coarse, fine = (_step(_sliver(dim, e), mass) for e in (1e-2, 1e-4))
+        assert fine / coarse == pytest.approx(1e-2, rel=0.05)  # in proportion to its size
 
 
 @pytest.mark.parametrize("factor", [0.99, 1.01])

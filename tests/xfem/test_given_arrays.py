@@ -71,7 +71,7 @@ def test_what_makes_no_sense_is_refused_in_one_sentence(make, message):
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])
+@pytest.mark.parametrize("v", [cut_body(2), cut_membrane()], ids=["2D", "sheet"])
 def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
     """They check no bounds: an array that was too short was written to beyond its end."""
     force = InternalForce(v, material(v.mesh.dim))
@@ -79,28 +79,27 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
     space, at = good.shape[1], force.configuration(good)
     blocks = np.zeros((len(pattern.columns), space, space))
     other = block_pattern(v.mesh.cells[:1] * 0 + np.arange(v.mesh.dim + 1), v.mesh.dim + 1)
-    few = np.zeros((len(other.columns), space, space))
+    calls = [
+        lambda x: force.evaluate(x),
+        lambda x: force.evaluate(good, out=x),
+        lambda x: force.configuration(x),
+        lambda x: force.add_tangent_product(at, x, 1.0, good),
+        lambda x: force.add_tangent_product(at, good, 1.0, x),
+        lambda x: force.linearise(pattern, x, good, 1.0, 1.0, good, blocks),
+        lambda x: force.linearise(pattern, good, x, 1.0, 1.0, good, blocks),
+        lambda x: force.linearise(pattern, good, good, 1.0, 1.0, x, blocks),
+        lambda x: collapsed_cells(force, x, 1e-3),
+    ]
+    if force.is_membrane:
+        calls.append(lambda x: force.add_tension_product(at, x, 1.0, good))
     for wrong in (good[:-1], good[:, :1], good.astype("f4"), good.tolist()):
-        for call in (
-            lambda x: force.evaluate(x),
-            lambda x: force.evaluate(good, out=x),
-            lambda x: force.configuration(x),
-            lambda x: force.add_tangent_product(at, x, 1.0, good),
-            lambda x: force.add_tangent_product(at, good, 1.0, x),
-            lambda x: force.linearise(pattern, x, good, 1.0, 1.0, good, blocks),
-            lambda x: force.linearise(pattern, good, x, 1.0, 1.0, good, blocks),
-            lambda x: force.linearise(pattern, good, good, 1.0, 1.0, x, blocks),
-            lambda x: collapsed_cells(force, x, 1e-3),
-        ):
+        for call in calls:
             with pytest.raises(XfemError, match=r"of shape .*; expected \(\d+, \d\), float64"):
                 call(wrong)
         with pytest.raises(XfemError, match="of shape"):
             force.linearise(pattern, wrong, good, 1.0, 1.0, good, blocks)
-        if force.is_membrane:
-            with pytest.raises(XfemError, match="of shape"):
-                force.add_tension_product(at, wrong, 1.0, good)
     for wrong in (blocks[:-1], blocks.astype("f4"), blocks[:, :, :1]):
         with pytest.raises(XfemError, match="blocks of shape"):
             force.add_stiffness(at, pattern, wrong)
     with pytest.raises(XfemError, match="expected that of the body"):
-        force.add_stiffness(at, other, few)
+        force.add_stiffness(at, other, np.zeros((len(other.columns), space, space)))

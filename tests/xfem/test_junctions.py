@@ -8,16 +8,10 @@ from cut_bodies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
+import verify.xfem as xfem
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath
-from verify.xfem.element import isotropic
+from verify.xfem.cuts import ImplicitCut, PolygonPatch, ToolPath
 from verify.xfem.faceted_cuts import Polyline
-from verify.xfem.loads_and_supports import Supports, body_force
-from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
-from verify.xfem.phantom import cut_mesh
-from verify.xfem.slivers import treat_slivers
-from verify.xfem.statics import solve_static
-from verify.xfem.subdivision import subdivide
 
 
 def sectors(rng, count, least=0.35):
@@ -39,36 +33,27 @@ def areas(phantom):
     return np.sort(np.bincount(phantom.bodies[phantom.cells[:, 0]], phantom.volumes))
 
 
-def sector_areas(point, angles):
-    """Areas of the sectors of the unit square: by the border, walked in small steps."""
-    way = np.linspace(0.0, 1.0, 4001)[:-1]
-    border = np.concatenate(
-        [np.stack(x, 1) for x in ((way, 0 * way), (1 + 0 * way, way), (1 - way, 1 + 0 * way))]
-        + [np.stack((0 * way, 1 - way), 1)]
-    )
-    spokes, following = border - point, np.roll(border, -1, axis=0) - point
-    area = 0.5 * (spokes[:, 0] * following[:, 1] - spokes[:, 1] * following[:, 0])
-    middle = 0.5 * (spokes + following)
-    turn = np.arctan2(middle[:, 1], middle[:, 0]) % (2.0 * np.pi)
-    return np.sort(np.bincount(np.searchsorted(angles, turn) % len(angles), area))
-
-
-@pytest.mark.parametrize("count", [2, 3, 4, 5])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("count", "seed"), [(2, 0), (3, 1), (3, 2), (4, 3), (5, 4)])
 def test_cuts_that_end_in_one_point_of_an_element_leave_a_part_for_each_sector(count, seed):
-    """Rigid modes are those of as many parts, each with the area of its sector."""
+    """Rigid modes are those of as many parts, and no part has pieces of two sectors."""
     rng = np.random.default_rng([count, seed])
-    mesh = shaken(rectangle_mesh((3, 3)), seed)
+    mesh = shaken(xfem.rectangle_mesh((3, 3)), seed)
     point, angles = rng.uniform(0.3, 0.7, 2), sectors(rng, count)
     cuts = fork(point, angles)
-    for order in list(permutations(range(count)))[:: max(1, count - 2)][:6]:
-        phantom = cut_mesh(mesh, [cuts[k] for k in order])
+    for order in list(permutations(range(count)))[:: max(1, count - 2)][:3]:
+        phantom = xfem.cut_mesh(mesh, [cuts[k] for k in order])
         assert phantom.bodies.max() + 1 == count
         modes, following = zero_modes(phantom)
         assert modes == 3 * count
         assert following > 1e-9
-        # straight cuts are realised exactly; the border is sampled in steps of 1/4000
-        np.testing.assert_allclose(areas(phantom), sector_areas(point, angles), atol=5e-4)
+        # a part's pieces in a cell together lie in one sector: straight cuts are exact
+        parts, number = np.unique(phantom.part, return_inverse=True)
+        weights = np.bincount(number, phantom.volumes)
+        x, y = (np.bincount(number, phantom.volumes * c) for c in phantom.piece_centroids.T)
+        turn = np.arctan2(y / weights - point[1], x / weights - point[0]) % (2.0 * np.pi)
+        sector = np.searchsorted(angles, turn) % count
+        body = phantom.bodies[phantom.cells[parts, 0]]
+        assert len(np.unique(np.stack([body, sector]), axis=1).T) == count
 
 
 def half_planes(rng, count):
@@ -83,40 +68,33 @@ def half_planes(rng, count):
     return cuts
 
 
-@pytest.mark.parametrize("count", [2, 3, 4])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("count", "seed"), [(2, 0), (3, 1), (4, 2)])
 def test_half_planes_that_end_on_one_line_in_tetrahedra_leave_a_part_for_each_sector(count, seed):
     rng = np.random.default_rng([3, count, seed])
-    mesh = shaken(box_mesh((2, 2, 2)), seed)
+    mesh = shaken(xfem.box_mesh((2, 2, 2)), seed)
     cuts = half_planes(rng, count)
-    phantom = cut_mesh(mesh, cuts)
+    phantom = xfem.cut_mesh(mesh, cuts)
     assert phantom.bodies.max() + 1 == count
     modes, following = zero_modes(phantom)
     assert modes == 6 * count
     assert following > 1e-9
-    divided = subdivide(phantom)
+    divided = xfem.subdivide(phantom)
     torn = facet_measures(divided.cut_facets).sum()
     # facets as thin as round-off measure up to its root, 1e-8 of their length
     assert exterior(divided) == pytest.approx(6.0 + 2.0 * torn, abs=1e-6)
     assert divided.cell_piece.max() + 1 == len(phantom.cells)
 
 
-def forked_slit(point, angles, reach):
-    """Three slits that leave a point and end inside the body."""
-    ends = point + reach * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return [Polyline([point, end]) for end in ends]
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_a_fork_that_ends_inside_is_one_slit_that_opens_to_its_ends(seed):
     """The faces of the cut are as long as the slits, but for the elements in which they end."""
     rng = np.random.default_rng([7, seed])
     cells, reach = 12, 0.3
-    mesh = shaken(rectangle_mesh((cells, cells)), seed)
+    mesh = shaken(xfem.rectangle_mesh((cells, cells)), seed)
     point, angles = rng.uniform(0.4, 0.6, 2), sectors(rng, 3)
-    phantom = cut_mesh(mesh, forked_slit(point, angles, reach))
+    phantom = xfem.cut_mesh(mesh, fork(point, angles, reach))
     assert phantom.bodies.max() == 0
-    divided = subdivide(phantom)
+    divided = xfem.subdivide(phantom)
     torn = facet_measures(divided.cut_facets).sum()
     # each loses less than the way through an element at its tip, at most its longest edge
     assert 3.0 * (reach - np.sqrt(2.0) / cells * 1.3) < torn <= 3.0 * reach + 1e-12
@@ -129,11 +107,11 @@ def test_a_fork_that_ends_inside_is_one_slit_that_opens_to_its_ends(seed):
 
 
 @pytest.mark.parametrize("bend", [15.0, 40.0])
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
     """It leaves the stem steeper than that bends: on the convex side it would miss it else."""
     rng = np.random.default_rng([int(bend), seed])
-    mesh = shaken(rectangle_mesh((5, 5)), seed)
+    mesh = shaken(xfem.rectangle_mesh((5, 5)), seed)
     point, way = rng.uniform(0.35, 0.65, 2), rng.uniform(0.0, 2.0 * np.pi)
     turn, least = np.radians(bend), np.radians(bend + 10.0)
     side = rng.choice([1.0, -1.0])
@@ -145,7 +123,7 @@ def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
     stem = Polyline([2.0 * point - off(0.0), point, off(turn)])
     branch = Polyline([point, off(turn + away)])
     for cuts in ([stem, branch], [branch, stem]):
-        phantom = cut_mesh(mesh, cuts)
+        phantom = xfem.cut_mesh(mesh, cuts)
         assert phantom.bodies.max() + 1 == 3
         assert zero_modes(phantom)[0] == 9
 
@@ -153,14 +131,14 @@ def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
 @pytest.mark.parametrize("policy", ["merge", "drop"])
 def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(policy):
     """A fork just inside an edge: planes past the point cut thin pieces off thick parts."""
-    mesh = rectangle_mesh((4, 4))
+    mesh = xfem.rectangle_mesh((4, 4))
     point = np.array([0.375, 0.5 + 1e-4])
     cuts = fork(point, np.array([0.3, 2.2, 4.5]))
-    phantom = cut_mesh(mesh, cuts)
+    phantom = xfem.cut_mesh(mesh, cuts)
     assert phantom.fraction.min() < 1e-3
     cell = phantom.parent[phantom.fraction.argmin()]
     assert len(np.unique(phantom.part[phantom.parent == cell])) == 3
-    treated, report = treat_slivers(phantom, policy)
+    treated, report = xfem.treat_slivers(phantom, policy)
     assert treated.bodies.max() + 1 == 3
     # only what is dropped goes to another part
     moved = report.volume_share if policy == "drop" else 0.0
@@ -172,39 +150,38 @@ def without_a_quarter(mesh):
     centre = mesh.points[mesh.cells].mean(axis=1)
     cells = mesh.cells[~((centre[:, 0] < 0.5) & (centre[:, 1] > 0.5))]
     used, numbers = np.unique(cells, return_inverse=True)
-    return SimplexMesh(mesh.points[used], numbers.reshape(cells.shape))
+    return xfem.SimplexMesh(mesh.points[used], numbers.reshape(cells.shape))
 
 
 def angle_body(dim):
-    return without_a_quarter(rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2)))
+    return without_a_quarter(xfem.rectangle_mesh((4, 4)) if dim == 2 else xfem.box_mesh((2, 2, 2)))
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("slope", [1.0, 0.6, 1.7])
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("slope", "side"), [(1.0, 1.0), (0.6, -1.0), (1.7, 1.0)])
 def test_a_cut_through_a_re_entrant_corner_leaves_no_hinge(dim, slope, side):
     """Above the line are two parts that meet in the corner only, whichever side is called plus."""
     mesh = angle_body(dim)
     normal = side * np.array([-slope, 1.0, 0.0])[:dim]
-    phantom = cut_mesh(mesh, [Plane([0.5] * dim, normal)])
+    phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.5] * dim, normal)])
     assert phantom.bodies.max() + 1 == 3
     assert zero_modes(phantom)[0] == 3 * (3 if dim == 2 else 6)
     above = phantom.mesh.points[:, 1] - 0.5 - slope * (phantom.mesh.points[:, 0] - 0.5)
     assert len(np.unique(phantom.bodies[: len(mesh.points)][above > 1e-9])) == 2
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("way", [1.0, -1.0])
-@pytest.mark.parametrize("tip", ["inside", "through", "nearest"])
+@pytest.mark.parametrize(
+    ("side", "way", "tip"), [(1.0, 1.0, "inside"), (-1.0, -1.0, "through"), (1.0, -1.0, "nearest")]
+)
 def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
     """Pieces without volume beside the stem must not hold the two sides of the branch together."""
     end = 0.5 + 3.0 * way
-    plate = rectangle_mesh((4, 4))
+    plate = xfem.rectangle_mesh((4, 4))
     branches = [Polyline([[0.47, 0.5], [0.6, end]]), Polyline([[0.6, end], [0.47, 0.5]])]
     for branch in branches:
-        stem = Plane([0.5, 0.5], [0.0, side])
+        stem = xfem.Plane([0.5, 0.5], [0.0, side])
         for cuts in ([stem, branch], [branch, stem]):
-            assert cut_mesh(plate, cuts, tip).bodies.max() + 1 == 3
+            assert xfem.cut_mesh(plate, cuts, tip).bodies.max() + 1 == 3
     path = ToolPath.of_tip([[0.6, end], [0.47, 0.5]], [2.0, 3.0])
     cutter = SemiProgressiveCutter(plate)
     for stroke in (ToolPath.of_tip([[0.5 - side, 0.5], [0.5 + side, 0.5]], [0.0, 1.0]), path):
@@ -212,11 +189,11 @@ def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
         cutter.advance(stroke.times[-1])
     assert cutter.phantom_mesh().bodies.max() + 1 == 3
 
-    block = box_mesh((2, 2, 2))
+    block = xfem.box_mesh((2, 2, 2))
     rim = [[0.45, -1.0, 0.5], [0.45, 2.0, 0.5], [0.55, 2.0, end], [0.55, -1.0, end]]
     for outline in (rim, rim[::-1]):
-        cuts = [Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
-        phantom = cut_mesh(block, cuts, tip)
+        cuts = [xfem.Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
+        phantom = xfem.cut_mesh(block, cuts, tip)
         assert phantom.bodies.max() + 1 == 3
 
 
@@ -225,62 +202,46 @@ def doubled(mesh, on_cut, above):
     new = np.full(len(mesh.points), -1)
     new[on_cut] = len(mesh.points) + np.arange(on_cut.sum())
     cells = np.where(above[:, None] & (new[mesh.cells] >= 0), new[mesh.cells], mesh.cells)
-    return SimplexMesh(np.concatenate([mesh.points, mesh.points[on_cut]]), cells)
+    return xfem.SimplexMesh(np.concatenate([mesh.points, mesh.points[on_cut]]), cells)
 
 
-def through(x):
-    return np.ones(len(x), dtype=bool)
+PLATE, BLOCK = xfem.rectangle_mesh((6, 6)), xfem.box_mesh((2, 2, 2))
 
 
-def half_way(x):
-    return x[:, 0] < 0.5 - 1e-9
-
-
-PLATE = rectangle_mesh((8, 8))
-SLANTED = SimplexMesh(PLATE.points @ np.array([[1.0, 0.3], [0.2, 1.1]]).T, PLATE.cells)
-BLOCK = box_mesh((4, 2, 4))
-
-
-@pytest.mark.parametrize("reach", [through, half_way])
-@pytest.mark.parametrize("plane", ["level", "diagonal"])
-@pytest.mark.parametrize("name", ["plate", "slanted plate", "block"])
-def test_a_cut_along_element_faces_equals_the_mesh_with_doubled_nodes(name, plane, reach):
-    mesh = {"plate": PLATE, "slanted plate": SLANTED, "block": BLOCK}[name]
-    dim = mesh.dim
-    # the level set in the reference coordinates of the structured mesh, as a plane in space
-    reference = PLATE.points if dim == 2 else BLOCK.points
-    last = dim - 1
-    height = reference[:, last] - (0.5 if plane == "level" else reference[:, 0])
-    fit = np.linalg.lstsq(np.c_[mesh.points, np.ones(len(mesh.points))], height, rcond=None)[0]
-    to_reference = np.linalg.lstsq(np.c_[mesh.points, np.ones(len(mesh.points))], reference, None)[
-        0
-    ]
-    flat = Plane(-fit[dim] * fit[:dim] / (fit[:dim] @ fit[:dim]), fit[:dim])
+@pytest.mark.parametrize("half_way", [False, True])
+@pytest.mark.parametrize("diagonal", [False, True])
+@pytest.mark.parametrize("plain", [PLATE, BLOCK], ids=["slanted plate", "block"])
+def test_a_cut_along_element_faces_equals_the_mesh_with_doubled_nodes(plain, diagonal, half_way):
+    """Parallel to an axis or along diagonals, through the body or to its middle."""
+    dim, last, reference = plain.dim, plain.dim - 1, plain.points
+    slant = np.array([[1.0, 0.3], [0.2, 1.1]]) if dim == 2 else np.eye(3)
+    mesh, back = xfem.SimplexMesh(reference @ slant.T, plain.cells), np.linalg.inv(slant).T
+    # the level set in the coordinates of the structured mesh, as a plane in space
+    height = reference[:, last] - (reference[:, 0] if diagonal else 0.5)
+    normal = back @ (np.eye(dim)[last] - diagonal * np.eye(dim)[0])
+    flat = xfem.Plane(slant @ np.full(dim, 0.5), normal)
 
     def depth(x):
-        first = (np.c_[x, np.ones(len(x))] @ to_reference)[:, 0]
-        return np.full(len(x), np.inf) if reach is through else 0.5 - first
+        return 0.5 - (x @ back)[:, 0] if half_way else np.full(len(x), np.inf)
 
-    phantom = cut_mesh(mesh, [ImplicitCut(flat.level_set, depth)])
-    on_cut = (np.abs(height) < 1e-9) & reach(reference)
-    above = height[mesh.cells].mean(axis=1) > 0.0
-    conforming = doubled(mesh, on_cut, above)
+    phantom = xfem.cut_mesh(mesh, [ImplicitCut(flat.level_set, depth)])
+    on_cut = (np.abs(height) < 1e-9) & ((not half_way) | (reference[:, 0] < 0.5 - 1e-9))
+    conforming = doubled(mesh, on_cut, height[mesh.cells].mean(axis=1) > 0.0)
     assert phantom.node_count == len(conforming.points)
     assert (phantom.fraction == 1.0).all()
 
-    state = "plane strain" if dim == 2 else "solid"
-    material, gravity = isotropic(1.0, 0.3, state), np.eye(dim)[last] * -0.1
+    material = xfem.isotropic(1.0, 0.3, "plane strain" if dim == 2 else "solid")
     solutions = []
-    for body in (phantom, cut_mesh(conforming, [])):
+    for body in (phantom, xfem.cut_mesh(conforming, [])):
         place = np.concatenate([reference, reference[on_cut]])[body.node_parent]
         held = (place[:, last] < 1e-9) | (place[:, last] > 1.0 - 1e-9)
-        held = held & ~((np.abs(place[:, 0]) < 1e-9) & (plane == "diagonal"))
-        supports = Supports(np.repeat(held[:, None], dim, axis=1), np.zeros((len(held), dim)))
-        solutions.append(solve_static(body, material, supports, body_force(body, gravity)))
+        held = held & ~((np.abs(place[:, 0]) < 1e-9) & diagonal)
+        supports = xfem.Supports(np.repeat(held[:, None], dim, axis=1), np.zeros((len(held), dim)))
+        load = xfem.body_force(body, -0.1 * np.eye(dim)[last])
+        solutions.append(xfem.solve_static(body, material, supports, load))
     ours, theirs = solutions
     assert ours.strain_energy == pytest.approx(theirs.strain_energy, rel=1e-12)
     # compare cell by cell: the numbering of the doubled nodes differs
-    order = np.argsort(phantom.parent)
-    got = ours.displacement[phantom.cells[order]]
+    got = ours.displacement[phantom.cells[np.argsort(phantom.parent)]]
     want = theirs.displacement[conforming.cells]
     assert np.abs(got - want).max() < 1e-12 * np.abs(want).max()

@@ -40,22 +40,20 @@ def _moving(body, strain, spin=0.0):
     return state
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    ("scheme", "dim"), [*((s, 3) for s in SCHEMES), (CentralDifferences, 2), (EnergyMomentum, 2)]
+)
 def test_the_account_closes_for_every_scheme_with_loads_supports_and_damping(scheme, dim):
     v = cut_body(dim)
-    X = v.node_points
+    X, along = v.node_points, np.eye(dim)[0]
     fixed = np.repeat(X[:, -1:] == 0.0, dim, axis=1)
 
     def motion(t):
-        along = np.eye(dim)[0]
-        return np.outer(0.02 * np.sin(9 * t) * np.ones(len(X)), along), np.outer(
-            0.18 * np.cos(9 * t) * np.ones(len(X)), along
+        return tuple(
+            np.tile(x * along, (len(X), 1)) for x in (0.02 * np.sin(9 * t), 0.18 * np.cos(9 * t))
         )
 
-    mass = side_wise_mass(v, DENSITY)
-    rng = np.random.default_rng(1)
-    push = rng.normal(size=X.shape)
+    mass, push = side_wise_mass(v, DENSITY), np.random.default_rng(1).normal(size=X.shape)
     body = DynamicBody(
         InternalForce(v, material(dim)),
         mass,
@@ -65,26 +63,19 @@ def test_the_account_closes_for_every_scheme_with_loads_supports_and_damping(sch
         damping=RayleighDamping(0.5, 1e-3),
     )
     state = body.rest()
-    account = run(scheme(body, 0.005), body, state, 40)
+    account = run(scheme(body, 0.005), body, state, 20)
     size = np.ptp(account.gravity) + account.kinetic.max()
     for column in ("load_work", "support_work", "damping"):
         assert np.abs(getattr(account, column)).max() > 1e-6 * size
-    conserves = scheme is EnergyMomentum
-    assert (np.abs(account.algorithmic).max() < 1e-12 * size) == conserves
+    assert (np.abs(account.algorithmic).max() < 1e-12 * size) == (scheme is EnergyMomentum)
     assert np.ptp(account.balance) <= 1e-9 * size
     assert np.ptp(account.balance - account.unbalanced) <= 1e-12 * size
-    assert (np.diff(account.damping) > -1e-12 * size).all() or scheme in (
-        CentralDifferences,
-        SymplecticEuler,
-        ForwardEuler,
-    )
-    where, _ = motion(state.time)
-    assert np.abs(state.displacement - where)[fixed].max() < 1e-15
-    if scheme is GeneralisedAlpha:  # its momentum is later by a share of a step
-        return
-    # impulses account for the momentum
-    gained = account.momentum - account.momentum[0]
-    assert np.abs(gained - account.impulse).max() < 1e-9 * np.abs(account.momentum).max()
+    explicit = scheme in (CentralDifferences, SymplecticEuler, ForwardEuler)
+    assert explicit or np.diff(account.damping).min() > -1e-12 * size
+    assert np.abs(state.displacement - motion(state.time)[0])[fixed].max() < 1e-15
+    if scheme is not GeneralisedAlpha:  # its momentum is later by a share of a step
+        gained = account.momentum - account.momentum[0]
+        assert np.abs(gained - account.impulse).max() < 1e-9 * np.abs(account.momentum).max()
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -93,11 +84,11 @@ def test_a_free_body_keeps_its_momentum_and_turns_on_by_those_schemes_that_shoul
     for scheme in SCHEMES:
         body = _free(cut_body(dim))
         state = _moving(body, 0.05, 2.0)
-        account = run(scheme(body, 0.5 * _critical(body)), body, state, 100)
+        account = run(scheme(body, 0.5 * _critical(body)), body, state, 40)
         drift = np.abs(account.momentum - account.momentum[0]).max()
-        # round-off of the largest momenta that cancel, over 100 steps
+        # round-off of the largest momenta that cancel, over 40 steps
         largest = np.sqrt(2.0 * account.kinetic.max() * DENSITY)
-        assert drift < 100 * 64 * np.finfo(float).eps * largest
+        assert drift < 40 * 64 * np.finfo(float).eps * largest
         turning = account.angular_momentum
         drifts[scheme] = np.abs(turning - turning[0]).max() / np.abs(turning).max()
     for scheme in (CentralDifferences, SymplecticEuler, EnergyMomentum):
@@ -106,30 +97,14 @@ def test_a_free_body_keeps_its_momentum_and_turns_on_by_those_schemes_that_shoul
         assert drifts[scheme] > 1e-4
 
 
-@pytest.mark.parametrize(("share", "bound"), [(0.9, 1e-4), (0.5, 3e-5), (0.25, 1e-5)])
-def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_steps(share, bound):
-    body = _free(cut_square(4))
-    state = _moving(body, 1e-4)
-    state.velocity[:] = 0.0
-    step = share * _critical(body)
-    scheme = CentralDifferences(body, step)
-    account = run(scheme, body, state, 10_000)
-    # the energy itself oscillates with (ωh)²; drift is what is left of it on average
-    first, last = account.mechanical[:2000].mean(), account.mechanical[-2000:].mean()
-    assert abs(last / first - 1.0) <= bound
-    assert np.ptp(account.balance) <= 1e-10 * account.mechanical[0]
-
-
 @pytest.mark.parametrize(
-    ("body", "strain", "spin", "share", "steps", "most"),
+    ("body", "share", "steps", "most"),
     [
         # what a step leaves unsolved adds up: a tenth of what 2000 steps may drift
-        (lambda: cut_square(2), 0.4, 3.0, 0.9, 200, 1e-9),
-        (lambda: cut_square(2), 0.4, 3.0, 4.0, 200, 1e-9),
+        (lambda: cut_square(2), 4.0, 60, 1e-9),
         *(
-            pytest.param(make, 0.3, 2.0, share, 10_000, 1e-8, marks=pytest.mark.heavy)
+            pytest.param(make, share, 10_000, 1e-8, marks=pytest.mark.heavy)
             for make, share in (
-                (lambda: cut_square(4), 0.9),
                 (lambda: cut_square(4), 4.0),
                 (lambda: cut_cube(1, (0.5, 0.53, 0.47)), 0.9),
             )
@@ -137,10 +112,10 @@ def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_
     ],
 )
 def test_the_energy_momentum_scheme_conserves_at_large_amplitude_over_many_steps(
-    body, strain, spin, share, steps, most
+    body, share, steps, most
 ):
     body = _free(body())
-    state = _moving(body, strain, spin)
+    state = _moving(body, 0.3, 2.0)
     account = run(EnergyMomentum(body, share * _critical(body)), body, state, steps)
     assert account.drift <= most
     turning = account.angular_momentum
@@ -152,7 +127,6 @@ def test_the_energy_momentum_scheme_conserves_at_large_amplitude_over_many_steps
     ("make", "law"),
     [
         (lambda: cut_square(3), "neo_hookean"),
-        (lambda: cut_square(3), "stable_neo_hookean"),
         (lambda: cut_cube(1, (0.5, 0.53, 0.47)), "neo_hookean"),
         (lambda: cut_cube(1, (0.5, 0.53, 0.47)), "stable_neo_hookean"),
     ],
@@ -164,7 +138,7 @@ def test_neo_hookean_parts_keep_energy_and_momenta_step_by_step(make, law):
     body = DynamicBody(force, side_wise_mass(v, DENSITY))
     state = _moving(body, 0.4, 3.0)
     state.velocity[v.node_points[:, -1] > 0.5, -1] += 0.3
-    account = run(EnergyMomentum(body, 0.03), body, state, 40)
+    account = run(EnergyMomentum(body, 0.03), body, state, 25)
     for kept in (account.mechanical, account.momentum, account.angular_momentum):
         assert np.abs(np.diff(kept, axis=0)).max() < 1e-10 * np.abs(kept).max()
     assert np.ptp(account.strain) > 0.1 * account.mechanical[0]
@@ -193,20 +167,19 @@ def _slowest_mode():
     return body, np.sqrt(values[mode]), (vectors[:, mode] / root).reshape(body.shape)
 
 
-def test_implicit_euler_halves_the_energy_of_a_mode_in_ln_2_over_omega_squared_h():
+@pytest.mark.parametrize("scheme", [ImplicitEuler, RealTimeEuler])
+def test_implicit_euler_halves_the_energy_of_a_mode_in_ln_2_over_omega_squared_h(scheme):
     body, omega, shape = _slowest_mode()
-    for scheme in (ImplicitEuler, RealTimeEuler):
-        h = 0.02 / omega
-        state = body.rest()
-        state.displacement[:] = 1e-3 * shape
-        steps = round(np.log(2.0) / (omega**2 * h) / h)
-        account = run(scheme(body, h), body, state, steps)
-        # each step divides by 1 + (ωh)²: exact; the formula differs by (ωh)²/2
-        exact = (1.0 + (omega * h) ** 2) ** -steps
-        assert account.mechanical[-1] / account.mechanical[0] == pytest.approx(exact, rel=1e-8)
-        assert account.mechanical[-1] / account.mechanical[0] == pytest.approx(0.5, rel=1e-3)
-        lost = account.mechanical[0] - account.mechanical[-1]
-        assert account.algorithmic[-1] == pytest.approx(lost, rel=1e-9)
+    h, state = 0.05 / omega, body.rest()
+    state.displacement[:] = 1e-3 * shape
+    steps = round(np.log(2.0) / (omega * h) ** 2)
+    account = run(scheme(body, h), body, state, steps)
+    # each step divides by 1 + (ωh)²: exact; the formula differs by (ωh)²/2
+    left = account.mechanical[-1] / account.mechanical[0]
+    assert left == pytest.approx((1.0 + (omega * h) ** 2) ** -steps, rel=1e-8)
+    assert left == pytest.approx(0.5, rel=3e-3)
+    lost = account.mechanical[0] - account.mechanical[-1]
+    assert account.algorithmic[-1] == pytest.approx(lost, rel=1e-9)
 
 
 @pytest.mark.parametrize("scheme", [s for s in SCHEMES if s is not RealTimeEuler])

@@ -1,24 +1,16 @@
 """Explicit steps of corotational motion: what bounds them, and what the time grid does to them."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, isotropic, material, rotation
 from swings import aggregated, cube, let_go, plate, uniform
 
+import verify.xfem as xfem
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.body import DynamicBody, StepFailedError
-from verify.xfem.explicit import (
-    RESONANCE_FREE,
-    CentralDifferences,
-    critical_step,
-    element_critical_steps,
-)
-from verify.xfem.internal_force import InternalForce
-from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh, box_mesh
-from verify.xfem.phantom import cut_mesh
-
-STATES = {(2, 2): "plane strain", (3, 3): "solid", (2, 3): "plane stress"}
+from verify.xfem.body import StepFailedError
+from verify.xfem.explicit import RESONANCE_FREE, element_critical_steps
 
 
 def deformed(random, mesh, strain):
@@ -36,29 +28,30 @@ def deformed(random, mesh, strain):
     return mesh.points @ (F - np.eye(space)).T
 
 
-@pytest.mark.parametrize("dim,space", STATES)
-@pytest.mark.parametrize("strain", [0.0, 0.15, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("dim", "space", "state"), [(2, 2, "plane strain"), (3, 3, "solid"), (2, 3, "plane stress")]
+)
 def test_no_stretch_in_reach_and_no_rotation_makes_the_exact_step_of_an_element_smaller(
-    dim, space, strain
+    dim, space, state
 ):
     random = np.random.default_rng(5)
-    for poisson in (0.0, 0.3, 0.49):
-        stuff = isotropic(1e4, poisson, STATES[dim, space])
-        for _ in range(25):
-            mesh = SimplexMesh(random.normal(size=(dim + 1, space)), [range(dim + 1)])
-            phantom = cut_mesh(mesh, [])
-            force = InternalForce(phantom, stuff)
+    for strain, poisson in product((0.15, 1.0, 2.0), (0.0, 0.49)):
+        stuff = isotropic(1e4, poisson, state)
+        for _ in range(8):
+            mesh = xfem.SimplexMesh(random.normal(size=(dim + 1, space)), [range(dim + 1)])
+            phantom = xfem.cut_mesh(mesh, [])
+            force = xfem.InternalForce(phantom, stuff)
             pattern = block_pattern(phantom.cells, phantom.node_count)
             K = pattern.matrix(force.stiffness(pattern, deformed(random, mesh, strain)))
-            exact = critical_step(K, side_wise_mass(phantom, DENSITY))
+            exact = xfem.critical_step(K, xfem.side_wise_mass(phantom, DENSITY))
             bound = element_critical_steps(mesh, stuff, DENSITY, strain)[0]
             assert exact >= (1.0 - 1e-9) * bound
 
 
-def growth(phantom, turn, steps=3000):
+def growth(phantom, turn, steps=2000):
     """Largest energy over that of the start, from the highest mode at 5 % strain, with ωh given."""
-    force, mass = InternalForce(phantom, material(3)), side_wise_mass(phantom, DENSITY)
-    body = DynamicBody(force, mass)
+    force, mass = xfem.InternalForce(phantom, material(3)), xfem.side_wise_mass(phantom, DENSITY)
+    body = xfem.DynamicBody(force, mass)
     K = body.pattern.matrix(force.stiffness(body.pattern, np.zeros(body.shape))).toarray()
     root = np.repeat(np.sqrt(mass.diagonal), 3)
     values, vectors = np.linalg.eigh(K / np.outer(root, root))
@@ -67,7 +60,7 @@ def growth(phantom, turn, steps=3000):
     state = body.rest()
     state.displacement[:] = 0.05 / np.linalg.norm(slopes, ord=2, axis=(1, 2)).max() * mode
     start, largest = force.evaluate(state.displacement)[1], 0.0
-    scheme = CentralDifferences(body, turn / np.sqrt(values[-1]))
+    scheme = xfem.CentralDifferences(body, turn / np.sqrt(values[-1]))
     for step in range(steps):
         try:
             scheme.step(state)
@@ -83,33 +76,39 @@ def growth(phantom, turn, steps=3000):
 
 def test_an_uncut_cube_blows_up_where_three_turns_of_its_fastest_mode_are_a_full_one():
     """ωh = √3, .87 of the linear critical step; a little below, and at √2, nothing happens."""
-    phantom = cut_mesh(box_mesh((2, 2, 2)), [])
+    phantom = xfem.cut_mesh(xfem.box_mesh((2, 2, 2)), [])
     assert growth(phantom, np.sqrt(3.0)) > 100.0
-    for turn in (0.97 * np.sqrt(3.0), np.sqrt(2.0), 0.9 * np.sqrt(2.0)):
-        assert growth(phantom, turn) < 1.01
+    assert growth(phantom, 0.97 * np.sqrt(3.0)) < 1.01
+    assert growth(phantom, np.sqrt(2.0)) < 1.01
 
 
 def test_an_uncut_cube_let_go_from_a_uniform_stretch_needs_the_smaller_step_too():
     """15 % strain: at .9 of the linear step it blows up, at .9 of the resonance-free one not."""
-    phantom = cut_mesh(box_mesh((3, 3, 3)), [])
+    phantom = xfem.cut_mesh(xfem.box_mesh((3, 3, 3)), [])
     assert let_go(phantom, 0.9, 2_000, start=uniform)[0] > 10.0
-    largest, inverted = let_go(phantom, 0.9 * RESONANCE_FREE, 10_000, start=uniform)
+    largest, inverted = let_go(phantom, 0.9 * RESONANCE_FREE, 2_000, start=uniform)
     assert inverted == 0
     assert largest < 1.01
 
 
-def oblique(dim, seed):
-    cut = plate(seed) if dim == 2 else cube(seed)
+@pytest.mark.parametrize(
+    ("make", "seed", "steps"),
+    [
+        (plate, 0, 2_000),
+        (cube, 0, 2_000),
+        *(
+            pytest.param(make, seed, 10_000, marks=pytest.mark.heavy)
+            for make in (plate, cube)
+            for seed in (0, 1, 2)
+        ),
+    ],
+)
+def test_nine_tenths_of_the_resonance_free_step_neither_inverts_nor_blows_up(make, seed, steps):
+    """15 % nominal strain; cuts askew, default sliver policy. The scheme's energy oscillates."""
+    cut = make(seed)
     treated, report = aggregated(cut)
-    assert report.extension is not None
+    assert report.aggregated > 0
     assert treated.bodies.max() == cut.bodies.max()
-    return treated
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", [0, 2])
-def test_nine_tenths_of_the_resonance_free_step_neither_inverts_nor_blows_up(dim, seed):
-    """15 % nominal strain; default sliver policy; 10⁴ steps. The scheme's own energy oscillates."""
-    largest, inverted = let_go(oblique(dim, seed), 0.9 * RESONANCE_FREE, 10_000)
+    largest, inverted = let_go(treated, 0.9 * RESONANCE_FREE, steps)
     assert inverted == 0
     assert largest < 1.01

@@ -4,22 +4,19 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from cut_bodies import shaken
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 
 from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
 from verify.xfem.element import isotropic
-from verify.xfem.join import join_parts
 from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.statics import solve_static
-from verify.xfem.subdivision import subdivide
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 1, 2, 3]])
@@ -59,7 +56,7 @@ def check_pieces(mesh, cuts):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_any_nodal_values_give_pieces_that_fill_their_cells(dim, data):
     mesh = MESHES[dim]
     cuts = [
@@ -70,11 +67,11 @@ def test_any_nodal_values_give_pieces_that_fill_their_cells(dim, data):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_ten_thousand_random_and_degenerate_cuts_lose_no_volume_and_no_piece(dim):
-    """One mesh of 5000 separate simplices, each with its own nodal values."""
+def test_thousands_of_random_and_degenerate_cuts_lose_no_volume_and_no_piece(dim):
+    """One mesh of 2000 separate simplices, each with its own nodal values."""
     rng = np.random.default_rng(dim)
     one = TRIANGLE if dim == 2 else TETRAHEDRON
-    count, corners = 5000, dim + 1
+    count, corners = 2000, dim + 1
     offsets = np.zeros((count, dim))
     offsets[:, 0] = 2.0 * np.arange(count)
     mesh = SimplexMesh(
@@ -106,82 +103,22 @@ def share(own, others):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-9, 1e-12])
-def test_a_cut_off_corner_keeps_all_digits_of_its_volume(dim, size):
+def test_a_cut_off_corner_keeps_all_digits_of_its_volume(dim):
     """φ = size − Σx cuts off the corner at the origin: a fraction of size^dim."""
     mesh = TRIANGLE if dim == 2 else TETRAHEDRON
-    phantom = cut_mesh(mesh, [Plane([0.5 * size] * 2 + [0.0] * (dim - 2), -np.ones(dim))])
-    if size == 1.0 or size**dim < ROUND_OFF_SHARE:
-        assert phantom.fraction == pytest.approx([1.0], rel=1e-15)
-    else:
-        # φ itself carries a round-off of some 1e-17 from subtracting coordinates of size 1e-12
-        assert phantom.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", range(4))
-def test_the_subdivision_is_watertight_and_fills_the_body(dim, seed):
-    """Every facet has two cells, or lies on the body's surface or on the cut, twice."""
-    rng = np.random.default_rng(seed)
-    mesh = MESHES[dim]
-    cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(2)]
-    body = subdivide(cut_mesh(mesh, cuts))
-    corners = body.points[body.cells]
-    edges = corners[:, 1:] - corners[:, :1]
-    volumes = np.linalg.det(edges) / (2 if dim == 2 else 6)
-    assert (volumes > 0.0).all()
-    assert volumes.sum() == pytest.approx(1.0, rel=1e-13)
-    keep = np.array([[j for j in range(dim + 1) if j != k] for k in range(dim + 1)])
-    facets, count = np.unique(
-        np.sort(body.cells[:, keep].reshape(-1, dim), axis=1), axis=0, return_counts=True
-    )
-    assert count.max() == 2
-    free = body.points[facets[count == 1]]
-    on_box = ((np.abs(free) < 1e-12).all(axis=1) | (np.abs(free - 1.0) < 1e-12).all(axis=1)).any(1)
-    assert (~on_box).sum() == 2 * len(body.cut_facets)
-    # Gauss: the outward normals of a closed surface add up to zero, body by body
-    area = _areas(free).sum()
-    assert area == pytest.approx((4 if dim == 2 else 6) + 2 * _areas(body.cut_facets).sum())
-
-
-def _areas(facets):
-    if facets.shape[1] == 2:
-        return np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1)
-    return np.linalg.norm(np.cross(*(facets[:, k] - facets[:, 0] for k in (1, 2))), axis=1) / 2
-
-
-def test_a_thin_layer_between_two_cuts_keeps_its_volume():
-    gap = 1e-9
-    cuts = [Plane([0.5, 0.52], [0.0, 1.0]), Plane([0.5, 0.52 + gap], [0.0, 1.0])]
-    phantom = check_pieces(rectangle_mesh((4, 4)), cuts)
-    layer = phantom.bodies[phantom.cells[:, 0]]
-    volumes = np.bincount(layer, phantom.volumes)
-    assert len(volumes) == 3
-    # positions carry round-off of 1e-16, the gap a relative 1e-7 of it
-    assert volumes.min() == pytest.approx(gap, rel=1e-6)
-
-
-@pytest.mark.parametrize("tip", ["inside", "through"])
-def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
-    mesh = box_mesh((3, 3, 3))
-    beyond = Plane((9.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    rng = np.random.default_rng(11)
-    cuts = [Plane(rng.random(3), rng.standard_normal(3)) for _ in range(6)]
-    cuts.append(Plane((1 / 3, 0.0, 0.0), (1.0, 0.0, 0.0)))  # along faces
-    cuts.append(Plane((0.0, 0.0, 0.0), (1.0, -1.0, 0.0)))  # through nodes
-    for cut in cuts:
-        alone, among = split_cells(mesh, [cut], tip), split_cells(mesh, [cut, beyond], tip)
-        np.testing.assert_array_equal(alone.parent, among.parent)
-        np.testing.assert_array_equal(alone.label, among.label[:, :1])
-        for name, mine in vars(alone.simplices).items():
-            np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
-        np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
-        np.testing.assert_array_equal(alone.points.ends, among.points.ends)
+    for size in (1.0, 1e-3, 1e-6, 1e-9, 1e-12):
+        phantom = cut_mesh(mesh, [Plane([0.5 * size] * 2 + [0.0] * (dim - 2), -np.ones(dim))])
+        if size == 1.0 or size**dim < ROUND_OFF_SHARE:
+            assert phantom.fraction == pytest.approx([1.0], rel=1e-15)
+        else:
+            # φ itself carries a round-off of some 1e-17 from subtracting coordinates near 1e-12
+            assert phantom.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
 
 
 def _short_cuts(dim, count, rng):
     """Cuts in boxes of three elements' length, none within two of them of another, as one mesh."""
-    mesh = _shaken(rectangle_mesh if dim == 2 else box_mesh, (6 * count,) + (6,) * (dim - 1), rng)
+    size = (6 * count,) + (6,) * (dim - 1)
+    mesh = shaken((rectangle_mesh if dim == 2 else box_mesh)(size, (0,) * dim, size), 1, 0.15)
     cuts = []
     for k in range(count):
         middle = np.full(dim, 3.0) + 6.0 * k * np.eye(dim)[0] + 0.2 * rng.random(dim)
@@ -194,18 +131,10 @@ def _short_cuts(dim, count, rng):
     return mesh, cuts
 
 
-def _shaken(make, divisions, rng):
-    mesh = make(divisions, np.zeros(len(divisions)), divisions)
-    inner = ((mesh.points > 0.5) & (mesh.points < np.array(divisions) - 0.5)).all(axis=1)
-    move = 0.15 * rng.uniform(-1.0, 1.0, mesh.points.shape) * inner[:, None]
-    return SimplexMesh(mesh.points + move, mesh.cells)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", range(3))
-def test_cuts_apart_from_one_another_divide_together_what_each_does_alone(dim, seed):
+def test_cuts_apart_from_one_another_divide_together_what_each_does_alone(dim):
     """Also what is decided at once, of cuts whose extensions cross, is what they do in turn."""
-    mesh, cuts = _short_cuts(dim, 5, np.random.default_rng(seed))
+    mesh, cuts = _short_cuts(dim, 3, np.random.default_rng(1))
     together = cut_mesh(mesh, cuts)
     added = 0
     for k, cut in enumerate(cuts):
@@ -219,45 +148,6 @@ def test_cuts_apart_from_one_another_divide_together_what_each_does_alone(dim, s
     assert added > 0
     assert together.node_count == len(mesh.points) + added
     assert together.split.sum() == (together.label != 0).sum()
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_parts_share_dof_nodes_where_points_of_a_common_face_lie_in_both(dim) -> None:
-    rng = np.random.default_rng(dim)
-    mesh = rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2))
-    for _ in range(6):
-        cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(5 - dim)]
-        partition = split_cells(mesh, cuts)
-        joined = join_parts(mesh, partition, partition.fraction > 0.0)
-        cell = joined.cells[joined.piece_cell]
-        label = np.zeros((len(cell), len(cuts)), dtype=int)
-        label[: len(partition.label)] = partition.label
-        slots = np.arange(joined.group.size).reshape(joined.group.shape)
-        pairs = []
-        for here, opposite in np.argwhere(mesh.neighbours > np.arange(len(mesh.cells))[:, None]):
-            there = mesh.neighbours[here, opposite]
-            nodes = np.delete(mesh.cells[here], opposite)
-            # many of them near corners and edges, where contacts may be small
-            weights = rng.dirichlet(np.full(dim, 0.3), 4000)
-            at = weights @ partition.points.values[nodes]
-            for side in np.unique(np.sign(at), axis=0):
-                fits = ((label == 0) | (label == side)).all(axis=1)
-                touching = [slots[fits & (cell == one)] for one in (here, there)]
-                assert all(len(found) <= 1 for found in touching)
-                if all(len(found) for found in touching):  # both are cells of the patch
-                    pairs += [
-                        [
-                            found[0, mesh.cells[one] == node].item()
-                            for found, one in zip(touching, (here, there), strict=True)
-                        ]
-                        for node in nodes
-                    ]
-        row, column = np.transpose(pairs)
-        graph = coo_array((np.ones(len(row)), (row, column)), shape=(slots.size, slots.size))
-        count, part = connected_components(graph, directed=False)
-        # each sampled contact is one of the joins, and there are no others
-        assert count == joined.group.max() + 1
-        assert len(np.unique(np.stack([part, joined.group.ravel()]), axis=1).T) == count
 
 
 def _coarse_mesh(dim, rng):
@@ -299,9 +189,8 @@ def _structured_mesh(dim, rng):
     return (rectangle_mesh if dim == 2 else box_mesh)(shape)
 
 
-@pytest.mark.parametrize("make", [_coarse_mesh, _structured_mesh])
-@pytest.mark.parametrize("of_nodes", [0, 1, 2])
-@pytest.mark.parametrize(("dim", "bodies"), [(2, 12), (3, 6)])
+@pytest.mark.parametrize(("make", "of_nodes"), [(_coarse_mesh, 1), (_structured_mesh, 2)])
+@pytest.mark.parametrize(("dim", "bodies"), [(2, 12), (3, 5)])
 def test_every_unknown_lies_on_the_sides_of_its_pieces_in_any_order_of_the_cuts(
     dim, bodies, of_nodes, make
 ):
@@ -331,7 +220,7 @@ def test_every_unknown_lies_on_the_sides_of_its_pieces_in_any_order_of_the_cuts(
             stands[phantom.cells[own & home]] = True
             np.testing.assert_array_equal(stands, meets)
             places += truth.size * corners
-    assert places >= 500
+    assert places >= 300
 
 
 def test_parts_between_planes_that_move_rigidly_are_held_where_they_are():

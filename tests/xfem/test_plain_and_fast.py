@@ -1,31 +1,21 @@
 """Plain and fast kernels give one answer, to round-off: plates, blocks, membranes, slivers."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_membrane, isotropic
-from turned_bodies import random_mesh, turn, turned_body, turned_sheet
+from turned_bodies import random_mesh
 
+import verify.xfem as xfem
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
 from verify.methods.generalised_alpha import GeneralisedAlpha
-from verify.xfem.body import DynamicBody, RayleighDamping
-from verify.xfem.cuts import Plane
-from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.equilibrium import static_equilibrium
+from verify.xfem.body import RayleighDamping
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
-from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import PLAIN
-from verify.xfem.loads_and_supports import Supports, body_force
-from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import box_mesh, rectangle_mesh
-from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.slivers import treat_slivers
-from verify.xfem.statics import solve_static
 
 # the plain one otherwise, of bodies as small as these
 KERNELS = {"plain": PLAIN, "fast": replace(FAST, direct=Cholesky)}
@@ -43,16 +33,17 @@ def _cut(mesh, fraction=0.43):
     normal = np.array([1.0, 0.37, -0.21])[: mesh.space]
     if fraction < 0.1:
         normal[1:] = 0.0
-    return cut_mesh(mesh, [Plane(low + (0.4 + fraction) * (high - low), normal)])
+    return xfem.cut_mesh(mesh, [xfem.Plane(low + (0.4 + fraction) * (high - low), normal)])
 
 
 BODIES = {
-    "plate": lambda: _cut(random_mesh(3, 2, 7)),
-    "block": lambda: _cut(random_mesh(4, 3, 4)),
+    "plate": lambda: _cut(random_mesh(3, 2, 5)),
     "membrane": cut_membrane,
-    "plate with slivers": lambda: _cut(rectangle_mesh((10, 10)), 1e-9),
-    "block with slivers": lambda: _cut(box_mesh((5, 5, 5)), 1e-6),
-    "block with aggregated slivers": lambda: treat_slivers(_cut(box_mesh((5, 5, 5)), 1e-3))[0],
+    "block": lambda: _cut(random_mesh(4, 3, 3)),
+    "block with slivers": lambda: _cut(xfem.box_mesh((3, 3, 3)), 1e-6),
+    "block with aggregated slivers": lambda: xfem.treat_slivers(
+        _cut(xfem.box_mesh((3, 3, 3)), 1e-3)
+    )[0],
 }
 
 
@@ -60,7 +51,7 @@ def _held(phantom):
     points = phantom.mesh.points
     low, high = points[:, 0].min(), points[:, 0].max()
     ends = (points[:, 0] == low) | (points[:, 0] == high)
-    held = Supports.none(phantom).prescribe(phantom, ends)
+    held = xfem.Supports.none(phantom).prescribe(phantom, ends)
     if phantom.mesh.dim < phantom.mesh.space:  # resists in its plane alone
         whole = np.ones(len(points), dtype=bool)
         held = held.prescribe(phantom, whole, components=(2,))
@@ -68,7 +59,7 @@ def _held(phantom):
 
 
 def _load(phantom):
-    return body_force(phantom, [30.0, -20.0, 10.0][: phantom.mesh.space])
+    return xfem.body_force(phantom, [30.0, -20.0, 10.0][: phantom.mesh.space])
 
 
 def test_linear_statics_with_a_ghost_penalty():
@@ -76,52 +67,33 @@ def test_linear_statics_with_a_ghost_penalty():
     stuff, held, load = _stuff(phantom), _held(phantom), _load(phantom)
     ghost = GhostPenalty(phantom, stuff)
     plain, fast = (
-        solve_static(phantom, stuff, held, load, ghost=ghost, kernels=kernels)
+        xfem.solve_static(phantom, stuff, held, load, ghost=ghost, kernels=kernels)
         for kernels in KERNELS.values()
     )
     assert plain.strain_energy == pytest.approx(fast.strain_energy, rel=1e-11)
 
 
 @pytest.mark.parametrize(
-    ("make", "degrees"),
+    ("scheme", "name"),
     [
-        (partial(turned_body, 1, 2, 6), 70.0),
-        (partial(turned_body, 1, 3, 3), 70.0),
-        (partial(turned_sheet, 1, 5), 30.0),
+        *((RealTimeEuler, name) for name in BODIES),
+        *((xfem.EnergyMomentum, name) for name in BODIES),
+        *((scheme, "block") for scheme in (ImplicitEuler, Trapezoidal, GeneralisedAlpha)),
     ],
-    ids=["plate", "block", "membrane"],
-)
-def test_equilibria_after_large_turns(make, degrees):
-    body = make()
-    path = turn(body, degrees)
-    stuff = _stuff(body.phantom)
-    plain, fast = (
-        static_equilibrium(
-            InternalForce(body.phantom, stuff, kernels=kernels), body.fixed, path, load_steps=2
-        )
-        for kernels in KERNELS.values()
-    )
-    assert plain.energy == pytest.approx(fast.energy, rel=1e-9)
-    assert plain.iterations == fast.iterations
-
-
-@pytest.mark.parametrize("name", BODIES)
-@pytest.mark.parametrize(
-    "scheme", [RealTimeEuler, ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum]
 )
 def test_motion(scheme, name):
     phantom = BODIES[name]()
     moved = []
     for kernels in KERNELS.values():
-        mass = side_wise_mass(phantom, DENSITY)
-        body = DynamicBody(
-            InternalForce(phantom, _stuff(phantom), kernels=kernels),
+        mass = xfem.side_wise_mass(phantom, DENSITY)
+        body = xfem.DynamicBody(
+            xfem.InternalForce(phantom, _stuff(phantom), kernels=kernels),
             mass,
             weight=mass.weight([3.0, -2.0, 1.0][: phantom.mesh.space]),
             supports=_held(phantom),
         )
         integrator, state = scheme(body, 0.02), body.rest()
-        for _ in range(6):
+        for _ in range(3):
             integrator.step(state)
         moved.append(state)
     plain, fast = moved
@@ -131,20 +103,22 @@ def test_motion(scheme, name):
 
 
 @pytest.mark.parametrize("kernels", KERNELS.values(), ids=KERNELS)
-@pytest.mark.parametrize("scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum])
+@pytest.mark.parametrize(
+    "scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, xfem.EnergyMomentum]
+)
 def test_bodies_that_share_their_elements_do_not_see_one_another_move(scheme, kernels):
     """Damping of the stiffness and tangents take the rotations of their own body."""
     phantom = BODIES["block"]()
-    mass, damping = side_wise_mass(phantom, DENSITY), RayleighDamping(0.0, 0.01)
+    mass, damping = xfem.side_wise_mass(phantom, DENSITY), RayleighDamping(0.0, 0.01)
 
     def motion(with_another):
-        force = InternalForce(phantom, _stuff(phantom), kernels=kernels)
-        body = DynamicBody(force, mass, mass.weight([3.0, -2.0, 1.0]), damping=damping)
-        one, other = body.held_by(_held(phantom)), body.held_by(Supports.none(phantom))
+        force = xfem.InternalForce(phantom, _stuff(phantom), kernels=kernels)
+        body = xfem.DynamicBody(force, mass, mass.weight([3.0, -2.0, 1.0]), damping=damping)
+        one, other = body.held_by(_held(phantom)), body.held_by(xfem.Supports.none(phantom))
         state, turning = one.rest(), other.rest()
         turning.velocity[:] = np.cross([20.0, 0.0, 0.0], phantom.node_points)
         schemes = scheme(one, 0.02), scheme(other, 0.02)
-        for _ in range(3):
+        for _ in range(2):
             schemes[0].step(state)
             if with_another:
                 schemes[1].step(turning)
@@ -153,19 +127,3 @@ def test_bodies_that_share_their_elements_do_not_see_one_another_move(scheme, ke
     alone, beside = motion(False), motion(True)
     # rotations start from others, and end within round-off; a step amplifies it by the tolerance
     assert np.abs(beside - alone).max() < 1e-9 * np.abs(alone).max()
-
-
-@pytest.mark.parametrize("scheme", [ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum])
-def test_damping_that_sets_in_between_two_steps(scheme):
-    """The next step begins with the force of the last one, and needs its rotations too."""
-    phantom = BODIES["block"]()
-    mass, moved = side_wise_mass(phantom, DENSITY), []
-    for kernels in KERNELS.values():
-        force = InternalForce(phantom, _stuff(phantom), kernels=kernels)
-        body = DynamicBody(force, mass, mass.weight([3.0, -2.0, 1.0]), supports=_held(phantom))
-        integrator, state = scheme(body, 0.02), body.rest()
-        for stiffness in (0.0, 0.0, 0.01, 0.01):
-            body.damping = RayleighDamping(0.0, stiffness)
-            integrator.step(state)
-        moved.append(state.velocity)
-    assert np.abs(moved[0] - moved[1]).max() < 1e-7 * np.abs(moved[0]).max()

@@ -16,57 +16,41 @@ from verify.xfem.loads_and_supports import Supports
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.real_time import RealTimeEuler
 
-
-def _replace_load(body, scheme):
-    body.load = lambda t: np.full(body.shape, 5.0)
-
-
-def _replace_weight(body, scheme):
-    body.weight = np.full(body.shape, 2.0)
-
-
-def _rewrite_weight(body, scheme):
-    body.weight[:] = 2.0
+CHANGES = {
+    "load replaced": lambda body, _: setattr(body, "load", lambda t: np.full(body.shape, 5.0)),
+    "weight replaced": lambda body, _: setattr(body, "weight", np.full(body.shape, 2.0)),
+    "weight written to": lambda body, _: body.weight.fill(2.0),
+    "damped": lambda body, _: setattr(body, "damping", RayleighDamping(2.0, 1e-3)),
+    "shorter": lambda _, scheme: setattr(scheme, "step_size", 0.5 * scheme.step_size),
+}
 
 
-def _damp(body, scheme):
-    body.damping = RayleighDamping(2.0, 1e-3)
-
-
-def _shorten(body, scheme):
-    scheme.step_size *= 0.5
-
-
-CHANGES = [_replace_load, _replace_weight, _rewrite_weight, _damp, _shorten]
-
-
-@pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("kind", SCHEMES)
-def test_a_change_during_the_motion_counts_from_the_next_step_on(kind, change):
+def test_a_change_during_the_motion_counts_from_the_next_step_on(kind):
     """Central differences went on with the force of the load that was there before."""
     v = cut_body(2)
-    ends = []
-    for begins_anew in (False, True):
-        body = DynamicBody(InternalForce(v, material(2)), side_wise_mass(v, DENSITY))
-        state, scheme = body.rest(), kind(body, 0.003)
-        state.velocity[:, 0] = v.node_points[:, 1] ** 2
-        for _ in range(3):
-            scheme.step(state)
-        before = state.displacement.copy()
-        change(body, scheme)
-        if begins_anew:
-            scheme = kind(body, scheme.step_size)
-        for _ in range(3):
-            scheme.step(state)
-        ends.append(state.displacement - before)
-    # Newton's methods end within a tolerance of 1e-10 of the forces
-    assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9 * np.abs(ends[1]).max())
+    for name, change in CHANGES.items():
+        ends = []
+        for begins_anew in (False, True):
+            body = DynamicBody(InternalForce(v, material(2)), side_wise_mass(v, DENSITY))
+            state, scheme = body.rest(), kind(body, 0.003)
+            state.velocity[:, 0] = v.node_points[:, 1] ** 2
+            for _ in range(2):
+                scheme.step(state)
+            before = state.displacement.copy()
+            change(body, scheme)
+            if begins_anew:
+                scheme = kind(body, scheme.step_size)
+            for _ in range(2):
+                scheme.step(state)
+            ends.append(state.displacement - before)
+        # Newton's methods end within a tolerance of 1e-10 of the forces
+        assert np.abs(ends[0] - ends[1]).max() <= 1e-9 * np.abs(ends[1]).max(), name
 
 
 @pytest.mark.parametrize(
     ("kind", "mass_of"),
-    [(kind, side_wise_mass) for kind in SCHEMES]
-    + [(kind, consistent_mass) for kind in SCHEMES[3:]],
+    [*((kind, side_wise_mass) for kind in SCHEMES), (GeneralisedAlpha, consistent_mass)],
 )
 def test_nodes_that_are_held_in_flight_come_to_rest_and_start_from_rest_when_let_go(kind, mass_of):
     """With centred schemes their velocity went on changing its sign, and took them along again."""
@@ -98,13 +82,13 @@ def test_nodes_that_are_held_in_flight_come_to_rest_and_start_from_rest_when_let
     assert np.abs(state.velocity[clamp]).max() < 1e-3
 
 
-@pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])
 @pytest.mark.parametrize("kind", SCHEMES)
+@pytest.mark.parametrize("v", [cut_body(3), cut_membrane()], ids=["3D", "sheet"])
 def test_an_observer_who_moves_along_sees_the_same_deformation(kind, v):
     """Galilei: 60 m/s added to the velocity change nothing but the place."""
     dim = v.mesh.space
     body = DynamicBody(InternalForce(v, material(v.mesh.dim)), side_wise_mass(v, DENSITY))
-    drift, step, steps = np.array([50.0, -30.0, 20.0])[:dim], 0.002, 20
+    drift, step, steps = np.array([50.0, -30.0, 20.0])[:dim], 0.002, 8
     ends = []
     for speed in (0.0 * drift, drift):
         state, scheme = body.rest(), kind(body, step)
@@ -117,7 +101,7 @@ def test_an_observer_who_moves_along_sees_the_same_deformation(kind, v):
     assert np.abs(ends[1] - ends[0]).max() < 1e-10
 
 
-@pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])
+@pytest.mark.parametrize("v", [cut_body(3), cut_membrane()], ids=["3D", "sheet"])
 @pytest.mark.parametrize("kind", [CentralDifferences, Trapezoidal, EnergyMomentum])
 def test_schemes_that_look_the_same_backwards_return_to_their_start(kind, v):
     """Velocities reversed, a symmetric scheme retraces its steps to round-off."""
@@ -127,7 +111,7 @@ def test_schemes_that_look_the_same_backwards_return_to_their_start(kind, v):
     state.velocity[:] = 0.3 * np.cos(3.0 * v.node_points)
     start = state.copy()
     for _ in range(2):
-        for _ in range(30):
+        for _ in range(15):
             scheme.step(state)
         state.velocity *= -1.0
     assert np.abs(state.displacement - start.displacement).max() < 1e-12

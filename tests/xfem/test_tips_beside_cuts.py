@@ -1,13 +1,14 @@
 """Ends of cuts beside other cuts, in any order: the sub-division is conforming, nothing hangs."""
 
 from itertools import permutations
+from math import factorial
 
 import numpy as np
 import pytest
-from test_sliver_policies import shaken
+from cut_bodies import shaken
 
-from verify.xfem.cuts import PolygonPatch
-from verify.xfem.mesh import box_mesh
+from verify.xfem.cuts import Plane, PolygonPatch
+from verify.xfem.mesh import box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.subdivision import subdivide
 
@@ -31,15 +32,27 @@ def exterior(divided):
 
 
 def assert_conforming(mesh, cuts):
-    """Outside are the boundary of the body and both faces of the cut: no other facet."""
+    """The body is filled; outside are its boundary and both faces of the cut, no other facet."""
     divided = subdivide(cut_mesh(mesh, cuts))
+    corners = divided.points[divided.cells]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(mesh.dim)
+    assert (volumes > 0.0).all()
+    assert volumes.sum() == pytest.approx(1.0, rel=1e-13)
     torn = facet_measures(divided.cut_facets).sum()
     assert torn > 0.0
-    boundary = 4.0 if mesh.dim == 2 else 6.0
-    assert exterior(divided) == pytest.approx(boundary + 2.0 * torn, abs=1e-9)
+    assert exterior(divided) == pytest.approx(2.0 * mesh.dim + 2.0 * torn, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_subdivision_by_crossing_planes_fills_the_body_and_leaves_no_hanging_nodes(dim):
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        mesh = shaken(rectangle_mesh((3, 3)) if dim == 2 else box_mesh((2, 2, 2)), seed)
+        cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(2)]
+        assert_conforming(mesh, cuts)
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_a_front_beside_other_cuts_leaves_no_hanging_nodes_in_space(seed):
     random = np.random.default_rng(seed)
     mesh = shaken(box_mesh((3, 3, 3)), seed)

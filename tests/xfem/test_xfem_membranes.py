@@ -21,49 +21,22 @@ from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.statics import NotInEquilibriumError, solve_static
 
 MATERIAL = isotropic(1e4, 0.3, "plane stress")
-TURN = rotation(3, 0.8)
-
-
-def plate(turn=None):
-    """The same cut plate in the plane, or in space and turned."""
-    flat = rectangle_mesh((6, 5))
-    point, normal = np.array([0.5, 0.53]), np.array([-0.3, 1.0])
-    if turn is None:
-        return cut_mesh(flat, [Plane(point, normal)])
-    points = np.pad(flat.points, ((0, 0), (0, 1))) @ turn.T
-    cut = Plane(turn @ np.append(point, 0.0), turn @ np.append(normal, 0.0))
-    return cut_mesh(SimplexMesh(points, flat.cells), [cut])
-
-
-def dense(phantom):
-    pattern = block_pattern(phantom.cells, phantom.node_count)
-    return pattern.matrix(InternalForce(phantom, MATERIAL, "linear").stiffness(pattern)).toarray()
-
-
-def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across():
-    flat, membrane = plate(), plate(TURN)
-    nodes = flat.node_count
-    plane = dense(flat).reshape(nodes, 2, nodes, 2)
-    space = np.einsum("ki,aibj,lj->akbl", TURN[:, :2], plane, TURN[:, :2])
-    got = dense(membrane).reshape(nodes, 3, nodes, 3)
-    assert got == pytest.approx(space, abs=1e-11 * np.abs(plane).max())
 
 
 def test_each_half_of_a_cut_membrane_passes_the_patch_test_in_its_plane():
     """Constant strain along the cut, another one per half, free contraction across."""
-    membrane = plate(np.eye(3))
-    along = np.array([1.0, 0.3, 0.0]) / np.hypot(1.0, 0.3)
-    across = np.array([-0.3, 1.0, 0.0]) / np.hypot(1.0, 0.3)
+    flat, place = rectangle_mesh((6, 5)), np.array([0.5, 0.53, 0.0])
+    along, across = (np.array(way) / np.hypot(1.0, 0.3) for way in ([1.0, 0.3, 0], [-0.3, 1.0, 0]))
+    points = np.pad(flat.points, ((0, 0), (0, 1)))
+    membrane = cut_mesh(SimplexMesh(points, flat.cells), [Plane(place, across)])
 
     def stretched(x, side):
-        local = x - np.array([0.5, 0.53, 0.0])
         strain = np.where(side[:, 0] > 0, 0.1, -0.05)
-        return (strain * (local @ along))[:, None] * along - (0.3 * strain * (local @ across))[
-            :, None
-        ] * across
+        u, v = strain * ((x - place) @ along), -0.3 * strain * ((x - place) @ across)
+        return u[:, None] * along + v[:, None] * across
 
     supports = Supports.none(membrane).prescribe(membrane, boundary_nodes(membrane.mesh), stretched)
-    everywhere = np.ones(len(membrane.mesh.points), dtype=bool)
+    everywhere = np.ones(len(points), dtype=bool)
     supports = supports.prescribe(membrane, everywhere, components=(2,))
     solution = solve_static(membrane, MATERIAL, supports)
     want = stretched(membrane.node_points, membrane.node_side)
@@ -92,10 +65,9 @@ def hang(phantom, poisson, held, load_steps=1, weight=WEIGHT):
     return static_equilibrium(force, np.repeat(held[:, None], 3, axis=1), None, load, load_steps)
 
 
-@pytest.mark.parametrize("n", [6, 24])
-def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
+def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step():
     """Parts of it are slack on their way: halving the residual ended at 7 % of the forces."""
-    bowl, held = cut_bowl(n)
+    bowl, held = cut_bowl(12)
     found = hang(bowl, 0.3, held)
     # the exact stiffness ends it: a corner of held nodes, across which it is round-off below
     # zero, had it refused, and 31 corrections were needed, under three times the weight 504
@@ -111,8 +83,7 @@ def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
 def test_under_ten_times_its_weight_a_piece_of_the_bowl_is_named_that_has_narrowed_to_nothing():
     """It is stretched by more than 1 + 1/ν = 4.33; with a smaller ν the bowl finds its place."""
     bowl, held = cut_bowl(24)
-    for poisson in (0.0, 0.1, 0.2):
-        assert hang(bowl, poisson, held, weight=10.0 * WEIGHT).iterations[0] < 16
+    assert hang(bowl, 0.2, held, weight=10.0 * WEIGHT).iterations[0] < 16
     with pytest.raises(NotInEquilibriumError, match="1 of 1199 pieces have collapsed"):
         hang(bowl, 0.3, held, weight=10.0 * WEIGHT)
 
@@ -139,10 +110,9 @@ def _turned(v, stretches, angle):
     return X @ np.diag([*stretches, 1.0]) @ Q.T - X, Q[:, 2]
 
 
-@pytest.mark.parametrize("angle", [0.0, 1.1])
-def test_across_the_plane_of_a_stretched_membrane_the_stiffness_is_the_exact_one(angle):
+def test_across_the_plane_of_a_stretched_membrane_the_stiffness_is_the_exact_one():
     v = _membrane()
-    u, normal = _turned(v, (1.2, 1.05), angle)
+    u, normal = _turned(v, (1.2, 1.05), 1.1)
     exact, tensioned, frozen = _matrices(v, u, ("consistent", "geometric", "rotation-fixed"))
     across = np.kron(np.random.default_rng(0).normal(size=v.node_count), normal)
     size = np.abs(exact @ across).max()
@@ -165,25 +135,19 @@ def test_only_the_pulled_direction_of_a_membrane_that_is_pushed_in_the_other_get
     assert abs(stiffness[1]) < 1e-10 * stiffness[0]
 
 
-@pytest.mark.parametrize("stretches", [(0.7, 0.8), (0.3, 1.0), (1e-7, 1e-7)])
-def test_a_membrane_without_tension_gets_nothing(stretches):
-    v = _membrane()
-    u, _ = _turned(v, stretches, 0.4)
-    tensioned, frozen = _matrices(v, u, ("geometric", "rotation-fixed"))
-    assert np.abs(tensioned - frozen).max() < 1e-13 * np.abs(frozen).max()
-
-
-def test_no_mode_is_negative_whatever_the_deformation():
-    v = _membrane(3)
-    rng = np.random.default_rng(1)
+def test_a_membrane_without_tension_gets_nothing_and_no_mode_is_ever_negative():
+    v, rng = _membrane(3), np.random.default_rng(1)
+    for stretches in ((0.7, 0.8), (0.3, 1.0), (1e-7, 1e-7)):
+        u, _ = _turned(v, stretches, 0.4)
+        tensioned, frozen = _matrices(v, u, ("geometric", "rotation-fixed"))
+        assert np.abs(tensioned - frozen).max() < 1e-13 * np.abs(frozen).max()
     for size in (0.05, 0.5, 3.0):
-        u = size * rng.normal(size=v.node_points.shape) / 3.0
-        (tensioned,) = _matrices(v, u, ("geometric",))
+        (tensioned,) = _matrices(v, size * rng.normal(size=u.shape) / 3.0, ("geometric",))
         values = np.linalg.eigvalsh(tensioned)
         assert values[0] > -1e-12 * values[-1]
 
 
-@pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1])
+@pytest.mark.parametrize("step", [1e-2, 0.1])
 def test_a_stretched_membrane_that_is_plucked_comes_to_rest_in_steps_of_any_size(step):
     """Without tension in the matrix the amplitude at the longest step grows ten-thousandfold."""
     v = _membrane()
@@ -198,7 +162,7 @@ def test_a_stretched_membrane_that_is_plucked_comes_to_rest_in_steps_of_any_size
     state.velocity[:, 2] = np.where(body.fixed[:, 2], 0.0, pluck)
     before = body.mass.diagonal @ state.velocity[:, 2] ** 2
     most = 0.0
-    for count in range(300):
+    for count in range(150):
         if count == 3:
             forces = scheme.step(state)
             assert np.isfinite(forces.internal).all()
@@ -212,12 +176,10 @@ def test_a_stretched_membrane_that_is_plucked_comes_to_rest_in_steps_of_any_size
 
 BLADE = [0.0, 0.0, 3.0]
 INSIDE = ToolPath.of_tip([[0.15, 0.43, -1.0], [0.85, 0.55, -1.0]], [0.0, 1.0], BLADE)
-THROUGH = ToolPath.of_tip([[-0.2, 0.43, -1.0], [1.2, 0.55, -1.0]], [0.0, 1.0], BLADE)
-ACROSS = ToolPath.of_tip([[0.52, -0.2, -1.0], [0.47, 1.2, -1.0]], [2.0, 3.0], BLADE)
 
 
-def curved(count=6, diagonal="alternating"):
-    flat = rectangle_mesh((count, count), diagonal=diagonal)
+def curved():
+    flat = rectangle_mesh((6, 6), diagonal="alternating")
     x, y = flat.points.T
     return SimplexMesh(np.stack([x, y, 0.3 * np.sin(2.0 * x) * np.cos(y)], axis=1), flat.cells)
 
@@ -254,32 +216,16 @@ def rims_of(skin):
     return once[~on_border.any(axis=1)]
 
 
-def loops(edges):
-    """Number of closed loops that directed edges make; each vertex must be left once."""
-    follow = dict(edges.tolist())
-    assert len(follow) == len(edges) == len(set(follow.values()))
-    count = 0
-    while follow:
-        start, _ = next(iter(follow.items()))
-        at = start
-        while True:
-            at = follow.pop(at)
-            if at == start:
-                break
-        count += 1
-    return count
-
-
-@pytest.mark.parametrize("diagonal", ["right", "alternating", "crossed"])
-def test_a_cut_gives_a_membrane_two_rims_of_its_length_and_no_inner_surface(diagonal) -> None:
-    cutter, skin = stroked(curved(7, diagonal), INSIDE)
+def test_a_cut_gives_a_membrane_two_rims_of_its_length_and_no_inner_surface() -> None:
+    cutter, skin = stroked(curved(), INSIDE)
     area, normals = area_and_normals(skin)
     assert area == pytest.approx(cutter.mesh.measures.sum(), rel=1e-14)
     assert (normals[:, 2] > 0.0).all()  # every part keeps the direction of the membrane
     assert not skin.surface.inner.rows[skin.surface.used].any()
     rims = rims_of(skin)
-    # one slit: both rims together are one closed loop around it
-    assert loops(rims) == 1
+    # one slit: both rims together are closed around it, each vertex left once and reached once
+    assert set(rims[:, 0]) == set(rims[:, 1])
+    assert len(set(rims[:, 0])) == len(rims)
     along = skin.surface.material.rows[rims]
     steps = along[:, 1] - along[:, 0]
     assert np.abs(steps.sum(axis=0)).max() < 1e-13
@@ -291,29 +237,3 @@ def test_a_cut_gives_a_membrane_two_rims_of_its_length_and_no_inner_surface(diag
     once = used_once(skin)
     outer = once - {tuple(edge) for edge in rims.tolist()}
     assert len(outer) == len(cutter.mesh.boundary_facets)
-
-
-def test_two_strokes_through_a_membrane_leave_four_parts_with_rims_of_their_own() -> None:
-    _, skin = stroked(curved(), THROUGH, ACROSS)
-    once = used_once(skin)
-    assert loops(np.array(sorted(once))) == 4
-    assert len(rims_of(skin)) > 0
-
-
-def test_the_rims_open_with_the_material_and_forces_on_them_do_the_same_work() -> None:
-    cutter, skin = stroked(curved(), THROUGH)
-    phantom = cutter.phantom_mesh()
-    apart = np.where(phantom.node_side[:, :1] > 0, 1.0, -1.0) * [0.0, 0.1, 0.02]
-    x = skin.surface.positions(apart)
-    rims = rims_of(skin)
-    moved = (x - skin.surface.material.rows)[rims.ravel()]
-    assert np.allclose(np.abs(moved), [0.0, 0.1, 0.02], atol=1e-14)
-    assert 0 < (moved[:, 1] > 0.0).sum() < len(moved)
-    random = np.random.default_rng(3)
-    rows = skin.surface.used
-    at, force = random.dirichlet(np.ones(3), len(rows)), random.normal(size=(len(rows), 3))
-    nodal, u = np.zeros_like(apart), random.normal(size=apart.shape)
-    skin.surface.add_forces(rows, at, force, nodal)
-    steps = (skin.surface.positions(u) - skin.surface.material.rows)[skin.surface.facets.rows[rows]]
-    work = np.sum(force * np.einsum("qk,qks->qs", at, steps))
-    assert np.sum(nodal * u) == pytest.approx(work, rel=1e-12)

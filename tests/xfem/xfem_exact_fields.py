@@ -18,22 +18,11 @@ NORMAL = np.array([-1.0, -2.0, 3.0]) / np.sqrt(14.0)
 FIRST = np.array([2.0, -1.0, 0.0]) / np.sqrt(5.0)
 SECOND = np.cross(NORMAL, FIRST)
 
-ENERGY_F1 = 3.434065934e-3
-ENERGY_F1_3D = 3.131868132e-3
 ENERGY_F3 = 2.7789417971
 
 
 def _above(sides):
     return sides[:, 0] > 0
-
-
-def f1(points, sides):
-    """Uniform stretch along the cut, another one on each side."""
-    local = points - 0.5
-    s, t = local @ ALONG, local @ ACROSS
-    strain = np.where(_above(sides), 0.1, -0.05)
-    shift = np.where(_above(sides), 0.0, -0.02)
-    return (strain * s)[:, None] * ALONG + (shift - ETA * strain * t)[:, None] * ACROSS
 
 
 def f1_3d(points, sides):
