@@ -27,7 +27,7 @@ def test_a_support_moves_by_its_formula_times_the_factor_of_its_history():
     ],
 )  # fmt: skip
 def test_the_rate_of_a_formula_is_its_derivative_by_the_time(text):
-    """And its value that of the arithmetic of Python."""
+    """Python computes the same value."""
     expression, step = parse_expression(text, 2, timed=True), 1e-6
     points = POINTS[:, :2]
     expected = (expression(points, 0.7 + step) - expression(points, 0.7 - step)) / (2 * step)

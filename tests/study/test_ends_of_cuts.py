@@ -112,7 +112,7 @@ MESHES = {"structured": {"cells": [[16, 16]]}, "unstructured": {"sizes": [0.25]}
      *(pytest.param(n, p, marks=pytest.mark.heavy) for n in range(2, 24) for p in MESHES)],
 )  # fmt: skip
 def test_cracks_in_general_position_are_within_the_limit(seed, pattern):
-    """Nodes at the ends: errors in L2 and in energy over those of the conforming mesh."""
+    """Nodes at the ends: errors in L2 and in energy over the errors of the conforming mesh."""
     random = np.random.default_rng(seed)
     angle, centre = random.uniform(-80.0, 80.0), random.uniform(-0.12, 0.12, 2)
     turn = np.deg2rad(angle)
