@@ -10,7 +10,7 @@ from case_texts import body_text, cut_text, support_text
 
 from verify.errors import InputError
 from verify.files import read_json, write_json
-from verify.runner import engines, ranks
+from verify.runner import ranks, work
 from verify.runner.child import POLL_SECONDS, Child
 from verify.scene import load_scene, scene_content
 from verify.solution import read_solution
@@ -59,13 +59,13 @@ def ended(child):
 def test_two_ranks_give_the_answer_of_one_and_say_so(verify, monkeypatch):
     """A run wants two ranks for each level; one level gets them, and this process solves it too."""
     (verify.folder / "box.toml").write_text(BOX)
-    asked, solving = [], engines.solving
+    asked, solving = [], work.solving
 
     def of_one_level(job, *rest):
         asked.append(job["ranks"])
         return solving({**job, "ranks": 2 if job["level"] == 1 else 1}, *rest)
 
-    monkeypatch.setattr(engines, "solving", of_one_level)
+    monkeypatch.setattr(work, "solving", of_one_level)
     done = verify("run", "box.toml", "--solver=reference", "--no-cache", "--ranks", "2",
                   "--out", "out")  # fmt: skip
     assert done.returncode == 0, done.stderr

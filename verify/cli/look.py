@@ -131,8 +131,9 @@ def _description(scene: "Scene") -> str:
     lines = [scene.name, scene.title, "", textwrap.fill(scene.requirement, 92), ""]
     for name, entries in parts:
         for head, entry in zip([name, *[""] * len(entries)], entries, strict=False):
-            indents = {"initial_indent": f"{head:<12}", "subsequent_indent": " " * 14}
-            lines.append(textwrap.fill(entry, 92, **indents))
+            lines.append(
+                textwrap.fill(entry, 92, initial_indent=f"{head:<12}", subsequent_indent=" " * 14)
+            )
     return "\n".join(lines)
 
 

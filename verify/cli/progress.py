@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import TextIO
+from typing import Any, TextIO
 
 from verify.cli.streams import unfiltered
 from verify.printable import one_line
@@ -159,7 +159,7 @@ class Lines:
     def _say_solve(self, text: str, record: SolveRecord) -> None:
         self.say(f"[{self.done}/{self.total}] {text}")
 
-    def _show(self, **change: int) -> None:
+    def _show(self, **change: Any) -> None:
         """Draw what has changed: nothing, but for bars."""
 
 
@@ -205,7 +205,7 @@ class _Bars(Lines):
         if record.status is not Status.SOLVED or "not end within" in record.notes.get(FORECAST, ""):
             self.say(text)
 
-    def _show(self, **change: int) -> None:
+    def _show(self, **change: Any) -> None:
         oldest = min(self.running, key=lambda label: self.running[label], default="")
         more = f" (+{len(self.running) - 1})" if len(self.running) > 1 else ""
         self.bars.update(self.task, description=f"{oldest}{more}", **change)

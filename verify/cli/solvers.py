@@ -15,6 +15,7 @@ fails; nothing of it is left then.
 from typing import Annotated, Any
 
 from verify.cli.signatures import Actions, Arg, AsJson
+from verify.cli.streams import said
 
 Name = Annotated[str, Arg("NAME", help="name of the solver")]
 
@@ -27,8 +28,8 @@ def list_(*, as_json: AsJson = False) -> int:
     rows: list[dict[str, Any]] = []
     for name, solver in foreign_solvers().items():
         state = state_of(solver)
-        said = {"title": solver.title, "licence": solver.licence, "source": solver.source}
-        rows.append({"name": name, **said, "parameters": solver.parameters, **vars(state)})
+        about = {"title": solver.title, "licence": solver.licence, "source": solver.source}
+        rows.append({"name": name, **about, "parameters": solver.parameters, **vars(state)})
     others = [name for name in solver_names() if name not in {row["name"] for row in rows}]
     lines = [f"of the project, and plugged in: {', '.join(others)}"]
     for row in rows:

@@ -153,7 +153,7 @@ class OpeningBody(Protocol):
     """
 
     openings: Openings
-    removal = False
+    removal: bool = False
     rule: str
     mass: str
     phase: str
