@@ -41,7 +41,7 @@ def test_errors_of_a_damped_mode_fall_with_the_square_of_the_step(rho):
         ]
     )
     errors = []
-    for steps in (60, 120):
+    for steps in (60, 120, 240):
         state = body.rest()
         state.displacement[:] = 1e-3 * shape
         run(GeneralisedAlpha(body, end / steps, spectral_radius=rho), body, state, steps)
@@ -49,7 +49,7 @@ def test_errors_of_a_damped_mode_fall_with_the_square_of_the_step(rho):
         errors.append(np.linalg.norm((np.array(of_mode) / 1e-3 - exact) / [1.0, omega]))
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert orders == pytest.approx(2.0, abs=0.1)
-    assert errors[-1] < 1.2e-2  # (ωΔt)²/12 of a phase of 6, times 5 at ρ = 0
+    assert errors[-1] < 3e-3  # (ωΔt)²/12 of a phase of 6, times 5 at ρ = 0
 
 
 @pytest.mark.parametrize("rho", RADII)
@@ -80,8 +80,8 @@ def test_a_load_that_jumps_between_two_steps_costs_no_order(scheme):
     end = 4.0 / omega
     body.load = lambda t: push * (0.0 if t < 0.25 * end else 1.0)
     errors = []
-    for steps in (32, 64):
+    for steps in (32, 64, 128):
         state = body.rest()
         run(scheme(body, end / steps), body, state, steps)
         errors.append(abs(np.sum(body.mass.apply(shape) * state.displacement) - 1.0 + np.cos(3.0)))
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.15)
