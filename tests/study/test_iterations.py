@@ -44,12 +44,12 @@ def found(tmp_path_factory):
     folder, said = tmp_path_factory.mktemp("halving"), io.StringIO()
     (folder / "halving.py").write_text(textwrap.dedent(SOLVER))
     words = ["study", "iterations", *CASES, "--solver", "halving:Halving"]
-    words += ["--substeps", "1", "2", "--most", "14", "--tolerance", "0.02", "--out", "studies"]
+    words += ["--substeps", "1", "2", "--most", "9", "--tolerance", "0.02", "--out", "studies"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(folder)
         with redirect_stdout(said):
-            assert main([*words, "--iterations", "4", "7", "8"]) == 0
+            assert main([*words, "--iterations", "4", "7", "--work", "8"]) == 0
     sys.modules.pop("halving")
     with open(folder / "studies" / "iterations.csv", newline="") as file:
         return list(csv.DictReader(file)), said.getvalue(), folder / "studies"
@@ -59,14 +59,17 @@ def test_both_errors_are_those_of_the_solver(found):
     rows = {(row["case"], row["iterations"], row["substeps"]): row for row in found[0]}
     assert len(rows) == 14
     assert "quantities" not in found[0][0]  # each is a column
-    assert not any(key[1:] == ("8", "2") for key in rows)  # sixteen in a step
+    counts = {
+        key[1:] for key in rows if key[1]
+    }  # eight in a step: 8 once, 4 twice; 7 twice is more
+    assert counts == {("4", "1"), ("7", "1"), ("8", "1"), ("4", "2")}
     for (case, count, parts), row in rows.items():
         if count == "7":
             assert "seven" in row["reason"]
             continue
         late = 0.5 ** int(count) if count else 0.0
-        assert float(row["iteration_error"]) == pytest.approx(late / 1.005, abs=1e-12)
-        whole = abs(late + 0.01 / int(parts) - 0.005) / 1.005
+        assert float(row["iteration_error"]) == pytest.approx(late / 1.00125, abs=1e-12)
+        whole = abs(late + 0.01 / int(parts) - 0.00125) / 1.00125
         assert float(row["whole_error"]) == pytest.approx(whole, abs=1e-12)
         step = load_scene(case).analysis.time_step
         assert float(row["time_step"]) == pytest.approx(step / int(parts))
@@ -76,23 +79,34 @@ def test_the_findings_say_from_which_setting_on(found):
     out = found[1]
     assert "From 8 iterations on" in out
     assert "No number of iterations up to 4" in out
-    assert out.count("Without an answer: 7.") == 4
+    assert out.count("Without an answer: 7.") == 2
     assert out.count("is 8 iterations in a step of the case: 8 in each of 1") == 2
 
 
+def test_the_error_over_substeps_is_told_by_equal_work_and_by_equal_iterations(found):
+    """2⁻⁸ + 0.00875, 2⁻⁴ + 0.00375 at a work of 8; 2⁻⁴ + the same at 4 in each; over 1.00125."""
+    out = " ".join(found[1].split())
+    said = "Over substeps the whole error is"
+    assert out.count(f"{said} 1.26 % with 1, 6.62 % with 2: least with 1.") == 2
+    assert out.count(f"{said} 7.12 % with 1, 6.62 % with 2: least with 2.") == 2
+    page = (found[2] / "iterations.html").read_text()
+    assert "8 in a step: 0.0126 at 1, 0.0662 at 2." in page
+    assert "4 in each: 0.0712 at 1, 0.0662 at 2." in page
+
+
 def test_the_page_answers_in_work_and_not_in_time(found):
-    """At 8 iterations in a step: 2⁻⁸ + 0.005 without substeps, 2⁻⁴ with two, over 1.005."""
+    """At 8 iterations in a step: 2⁻⁸ + 0.00875 without substeps, 2⁻⁴ + 0.00375 with two."""
     text = " ".join((found[2] / "iterations.html").read_text().split())
     met = ", ".join(f"8 ({case})" for case in CASES)
     assert f"takes so many iterations in a step: {met}." in text
     assert "Substeps do not pay at equal work on any of 2 cases" in text
-    assert f"{CASES[0]}, 8 iterations: 0.062 with 2 substeps, 0.0089 with 1" in text
+    assert f"{CASES[0]}, 8 iterations: 0.066 with 2 substeps, 0.013 with 1" in text
 
 
 def test_every_setting_is_a_solve_that_is_kept_until_another_question_is_asked(found):
     (run,) = found[2].glob("iterations-*/run.json")
     solves = [path.parent.name for path in run.parent.glob("cases/*/*/record.json")]
-    assert len(solves) == 14  # of each case 4, 7, 8 with one substep, 4, 7, and both solved
+    assert len(solves) == 14  # of each case 4, 7, 8 with one substep, 4 with two; 1, 2, 8 solved
     place = Making(found[2]).place_of("iterations", "another question")
     assert not run.exists()
     assert place.startswith("iterations-")

@@ -239,6 +239,7 @@ def iterations(
     iterations: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (10, 40, 160),
     substeps: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (1, 4),
     most: Annotated[int | None, Arg("N", read=count)] = None,
+    work: Annotated[Sequence[int], Arg("N", read=count, nargs="+")] = (),
     names: Annotated[Sequence[str], Arg("PARAMETER", nargs=2)] = ("iterations", "substeps"),
     tolerance: Tolerance = 0.01,
     answer: Answer,
@@ -259,6 +260,8 @@ def iterations(
         values of the parameter 'substeps'
     most
         leave out settings with more iterations than this in a step of the case
+    work
+        iterations in a step of the case to share out evenly over the substeps, beside --iterations
     names
         what the solver calls them
     """
@@ -269,7 +272,7 @@ def iterations(
     def study(making: "Making") -> "Study":
         scenes, own = select_cases(cases, None, "heavy"), variant_of(solver)
         steps = variant_of(truth or f"{solver} step=solved")
-        grid = Grid(iterations, substeps, (names[0], names[1]), most)
+        grid = Grid(iterations, substeps, (names[0], names[1]), most, work)
         return iterations_study(scenes, own, steps, grid, tolerance, making)
 
     return _written("iterations", answer, study)

@@ -263,6 +263,20 @@ def iterations_panels(settings: Settings, error: str) -> list[Drawing | None]:
     return panels
 
 
+def substeps_panels(settings: Settings) -> list[Drawing | None]:
+    """Return a panel per case: the whole error over substeps, at equal work or equal counts."""
+    palette, panels = Palette(), []
+    for case, own in _by_case(settings):
+        curves: dict[str, list[tuple[Any, Any]]] = {}
+        for one in sorted(own, key=lambda one: one["substeps"]):
+            if count := one["iterations"]:
+                for name in (f"{count * one['substeps']} in a step", f"{count} in each"):
+                    curves.setdefault(name, []).append((one["substeps"], one["whole_error"]))
+        series = [Series(name, curve) for name, curve in curves.items() if len(curve) > 1]
+        panels.append(loglog(f"{case}: whole error, relative", "substeps", series, palette))
+    return panels
+
+
 def _by_case(settings: Settings) -> Iterator[tuple[str, Settings]]:
     for case in dict.fromkeys(one["case"] for one in settings):
         yield case, listed(settings, case=case)
@@ -330,7 +344,10 @@ _VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     "thesis": thesis_view,
     "calibration": lambda r: {"scatters": _scatters(r["trials"])},
     "iterations": lambda r: {
-        "lead": iterations_lead(r), "panels": iterations_panels(r["settings"], "iteration_error"),
+        "lead": iterations_lead(r),
+        "panels": [
+            *iterations_panels(r["settings"], "iteration_error"), *substeps_panels(r["settings"]),
+        ],
     },
     "positions": _positions,
     "claims": lambda r: {},

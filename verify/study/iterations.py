@@ -1,8 +1,9 @@
 """Iterations against error: solvers in steps that stop by a count, over iterations and substeps.
 
 Two errors are told apart. The iteration error is the distance from the same steps, solved; the
-whole error is the distance from the smallest steps, solved. A solver solves them too, by default
-the same one with ``step=solved``. Both answer on one mesh, and nodes are compared. The work of a
+whole error is the distance from the smallest steps, solved. The smallest are a quarter of those of
+any setting, which else would have no error of its steps. A solver solves them too, by default the
+same one with ``step=solved``. Both answer on one mesh, and nodes are compared. The work of a
 setting is the number of iterations in a step of the case: it does not depend on the machine.
 """
 
@@ -24,6 +25,7 @@ from verify.study.measured_scenes import Variant
 from verify.study.study import Finding, Making, Solved, Study
 
 Array = NDArray[np.float64]
+_FINER = 4  # a rule of first order then has a quarter of the error that it judges
 
 
 @dataclass(frozen=True)
@@ -37,17 +39,22 @@ class Grid:
         Parameters of the solver that they are.
     most : int, optional
         Iterations in a step of the case beyond which a setting is left out.
+    works : sequence of int
+        Iterations in a step of the case that are shared out over each number of substeps which
+        divides them, beside `iterations`.
     """
 
     iterations: Sequence[int]
     substeps: Sequence[int]
     names: tuple[str, str] = ("iterations", "substeps")
     most: int | None = None
+    works: Sequence[int] = ()
 
     def counts(self, substeps: int) -> list[int]:
         """Return the numbers of iterations of a number of substeps."""
         most = np.inf if self.most is None else self.most
-        return [count for count in sorted(self.iterations) if count * substeps <= most]
+        shared = {work // substeps for work in self.works if work % substeps == 0}
+        return [count for count in sorted({*self.iterations} | shared) if count * substeps <= most]
 
     def set(self, variant: Variant, iterations: int | None, substeps: int) -> str:
         """Return the name of the variant with a setting; without iterations those that it has."""
@@ -137,10 +144,11 @@ def iterations_study(
     InputError
         If the truth has no answer, or not on the nodes of the solver.
     """
-    truths = {count: grid.set(truth, None, count) for count in sorted(grid.substeps)}
+    asked = sorted(grid.substeps)
+    truths = {count: grid.set(truth, None, count) for count in (*asked, _FINER * asked[-1])}
     counted = {
         (count, iterations): grid.set(variant, iterations, count)
-        for count in truths
+        for count in asked
         for iterations in grid.counts(count)
     }
     names = tuple(dict.fromkeys([*truths.values(), *counted.values()]))
@@ -219,6 +227,8 @@ def _findings(
             series = [one for one in mine if one.substeps == substeps]
             if text := _said(series, tolerance, names[0]):
                 found.append(Finding(f"{case}, {label}, {names[1]} {substeps}", text, limit, None))
+        for kind, text in _over_substeps(mine, names):
+            found.append(Finding(f"{case}, {label}, {kind}", text, limit, None))
         good = [one for one in mine if _inside(one.whole_error, tolerance)]
         text = f"No setting is within {tolerance:.2g} of the smallest steps, solved."
         if good:
@@ -250,6 +260,23 @@ def _said(series: Sequence[Setting], tolerance: float, name: str) -> str:
     text += "."
     missing = [str(one.iterations) for one in series if one.reason]
     return text + (f" Without an answer: {', '.join(missing)}." if missing else "")
+
+
+def _over_substeps(
+    settings: Sequence[Setting], names: tuple[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Tell the whole error over substeps: by the same work, and by as many iterations in each."""
+    found: dict[tuple[str, int], list[tuple[int, float]]] = {}
+    for one in settings:
+        if one.iterations is not None and one.whole_error is not None:
+            for key in (("a step of the case", one.work), ("each", one.iterations)):
+                found.setdefault(key, []).append((one.substeps, one.whole_error))
+    for (where, count), series in found.items():
+        if len(series) > 1:
+            shares = ", ".join(f"{_share(error)} with {parts}" for parts, error in series)
+            best = min(series, key=lambda place: place[1])[0]
+            text = f"Over {names[1]} the whole error is {shares}: least with {best}."
+            yield f"{count} {names[0]} in {where}", text
 
 
 def _inside(error: float | None, tolerance: float) -> bool:
