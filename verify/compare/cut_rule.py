@@ -210,11 +210,8 @@ def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutR
 def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:
     """Take the point of a cut that is nearest to `point` (3,), as a rule of weight 1."""
     _, foot, which = distance_to_cut(body.cuts[cut], point[None])
-    patch, step = body.cuts[cut][which[0]], 1e-3 * body.size
-    # the level's slope is the normal, also on a cylinder
-    ends = [patch.level(foot + s * step * np.eye(3)) for s in (1.0, -1.0)]
-    normal = (ends[0] - ends[1])[None]
-    return CutRule.beside(foot, np.ones(1), normal / np.linalg.norm(normal), AWAY * body.size)
+    normal = body.cuts[cut][which[0]].facing(foot)
+    return CutRule.beside(foot, np.ones(1), normal, AWAY * body.size)
 
 
 def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple[Array, Array]:
