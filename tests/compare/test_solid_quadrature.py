@@ -4,6 +4,7 @@ from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.body_rule import body_rule
+from verify.compare.cut_profile import cut_place
 from verify.compare.cut_rule import surface_rule
 from verify.scene import load_scene
 
@@ -84,6 +85,21 @@ def test_normals_point_to_the_positive_side_as_the_scene_says():
     first = bent.points[:, 0] < 0.4
     normal = np.cross([0.5, 0.3, 0], [0, 0, 1.0])
     assert np.allclose(bent.normals[first], normal / np.linalg.norm(normal))
+
+
+def test_normals_at_places_of_curved_cuts_are_exact():
+    """So that what slides along them does not open."""
+    places = np.random.default_rng(3).uniform(0.2, 0.8, (20, 3))
+    centre, along = np.array([0.46, 0.52, 0.55]), np.array([0.6, -0.48, 0.64])
+    sphere = {"kind": "sphere", "centre": centre.tolist(), "radius": 0.23}
+    tube = {"kind": "cylinder", "base": (centre - along).tolist(), "axis": along.tolist(),
+            "radius": 0.23, "height": 2.0}  # fmt: skip
+    for cut, across in ((sphere, np.eye(3)), (tube, np.eye(3) - np.outer(along, along))):
+        body = body_of(solid_scene([{**cut, "name": "cut"}]))
+        for place in places:
+            inward = across @ (centre - place)
+            normal = cut_place(body, "cut", place).normals[0]
+            np.testing.assert_allclose(normal, inward / np.linalg.norm(inward), atol=1e-14)
 
 
 def test_an_inverse_square_root_at_a_front_is_integrated():
