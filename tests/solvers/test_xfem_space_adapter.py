@@ -41,16 +41,21 @@ def deviation(solution, level_set):
     return np.abs(level_set(solution.cut_facets.reshape(-1, 3))).max()
 
 
-def test_a_disc_is_cut_in_its_plane_and_ends_at_its_rim(tmp_path):
-    """Elements in which the rim ends stay whole: its area is between π (r − 2h)² and π r²."""
-    found = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + disc(0.3, "0.1, 0.0, 1.0")), 1)
+@pytest.mark.parametrize("tip, inside, outside", [("inside", 2.0, 0.0), ("extended", 0.0, 2.0)])
+def test_a_disc_is_cut_in_its_plane_and_ends_within_elements_of_its_rim(
+    tmp_path, tip, inside, outside
+):
+    """Elements in which the rim ends are whole, or divided: the rim moves by up to √2 h."""
+    content = CUBE + PULLED + disc(0.3, "0.1, 0.0, 1.0")
+    found = XfemSolver().solve(scene(tmp_path, content), 1, tip=tip)
     normal = np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
     assert deviation(found, lambda x: (x - [0.5, 0.5, 0.53]) @ normal) <= 1e-12
     reach = np.linalg.norm(found.cut_facets.reshape(-1, 3) - [0.5, 0.5, 0.53], axis=1).max()
-    assert reach <= 0.3 + 1e-12
-    assert (
-        np.pi * (0.3 - 2 * 0.125 * np.sqrt(2)) ** 2 < areas(found.cut_facets).sum() < np.pi * 0.09
-    )
+    edge = 0.125 * np.sqrt(2)
+    assert reach <= 0.3 + outside * edge + 1e-12
+    area = areas(found.cut_facets).sum()
+    assert np.pi * (0.3 - inside * edge) ** 2 < area < np.pi * (0.3 + outside * edge) ** 2
+    assert (area > np.pi * 0.09) == (tip == "extended")
     assert volume(found) == pytest.approx(1.0, rel=1e-12)
 
 

@@ -36,7 +36,12 @@ def solve(scenes, place, solvers, parameters=None, timed=False):
     return found
 
 
-def budget_of(scene, level=None, tolerance=0.05, metric=None):
+def solve_with_whole_ends(scenes, place, solvers, parameters=None, timed=False):
+    """Solve with elements left whole in which a cut ends: the realised cut is smaller."""
+    return solve(scenes, place, solvers, {"xfem": {"tip": "inside"}} | (parameters or {}), timed)
+
+
+def budget_of(scene, level=None, tolerance=0.05, metric=None, solve=solve):
     exact = None
     if scene.judged_by_exact:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
@@ -87,7 +92,7 @@ BURIED = {
 def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_method():
     """The elements of the front are not split: the crack that XFEM makes is much smaller, which
     conforming elements with the same crack show as well."""
-    study = budget_of(scenes.scene(d=3, **BURIED))
+    study = budget_of(scenes.scene(d=3, **BURIED), solve=solve_with_whole_ends)
     assert study.missing == []
     found = parts(study, "displacement_l2")
     assert found.keys() == {CUT, MESH, METHOD, "total"}

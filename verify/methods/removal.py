@@ -126,7 +126,7 @@ def removal(
     ----------
     mesh : SimplexMesh
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         "through" removes the cells in which the cut ends.
     opened : callable, optional
         Without it all cells go through which the cut goes; else those that a cut has opened.
@@ -155,7 +155,7 @@ def removal_refined(
     ----------
     mesh : SimplexMesh
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
     levels : int
         Touched cells have their longest edge halved so many times.
     opened : callable, optional

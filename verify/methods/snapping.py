@@ -386,7 +386,7 @@ def subdivision(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside")
     mesh : SimplexMesh
         A solid or a membrane.
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         Treatment of cells in which a cut ends. An end of an open polyline in the plane needs
         none: it becomes a node, and the split ends there.
 
@@ -417,7 +417,7 @@ def snapping_subdivision(
     mesh : SimplexMesh
         Triangles in the plane or tetrahedra.
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         As in `subdivision`.
     threshold : float
         Share of a crossed edge, in (0, ½]: nodes nearer to the crossing are snapped.

@@ -46,7 +46,7 @@ def virtual_node(
     ----------
     mesh : SimplexMesh
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         See `verify.xfem.pieces.split_cells`.
     weights : {"share", "raised", "whole"}
         Copies resist by their share of the volume; by a thousandth at least, as MOOSE has it

@@ -44,7 +44,7 @@ from verify.xfem.slivers import join_fragments
 _Floats = NDArray[np.float64]
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _CHOICES: Mapping[str, Collection[str]] = {
-    "tip": ("inside", "through", "nearest", "partial"),
+    "tip": ("inside", "extended", "through", "nearest", "partial"),
     "slivers": ("keep", "merge", "drop", "penalise"),
     "scheme": SCHEMES,
     "mass": MASSES,
@@ -83,7 +83,7 @@ class _Parameters:
         """Return them with the default tip rule of a scene and its mesh, unless one was asked."""
         # a last facet that bends to its node would bear a load that is not in balance with others
         loaded = any(load.kind == "cut_faces" for load in scene.loads)
-        default = "inside" if mesh.dim == 3 or loaded else "partial"
+        default = "extended" if mesh.dim == 3 or loaded else "partial"
         return self if self.tip else replace(self, tip=default)
 
     def integration(self) -> Integration:
@@ -177,11 +177,11 @@ class XfemSolver:
 
     Parameters of `solve`
     ---------------------
-    tip : {"inside", "through", "nearest", "partial"}
+    tip : {"inside", "extended", "through", "nearest", "partial"}
         What happens to an element in which a cut ends: see `verify.xfem.pieces.split_cells`; the
         last, for triangles and their default, divides it so that the end is a node
         (`verify.methods.tip_nodes`). The default of tetrahedra, and where faces of a cut bear a
-        load, is "inside".
+        load, is "extended".
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
         `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind

@@ -21,7 +21,7 @@ from verify.xfem.cuts import Cut
 from verify.xfem.mesh import connected
 from verify.xfem.zero_points import ZeroPoints
 
-TipRule = Literal["inside", "through", "nearest"]
+TipRule = Literal["inside", "extended", "through", "nearest"]
 Reached = Callable[[Ints, Ints, Floats], Bools]
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
@@ -91,11 +91,13 @@ def crossed_through(
     crossing: Crossing,
     tip: TipRule,
     reached: Reached | None = None,
+    extensible: Callable[[Bools], Bools] | None = None,
 ) -> tuple[Bools, Bools]:
-    """Tell which pieces (p,) their cuts go through, and in which (p,) they end by rule `inside`.
+    """Tell which pieces (p,) their cuts go through, and in which (p,) they end.
 
-    By the other rules they end in none. A cut goes through a piece by its zero points. By `inside`
-    all must be inside the extent, by `through` one, by `nearest` their mean.
+    A cut goes through a piece by its zero points. By `inside` all must be inside the extent, by
+    `through` one, by `nearest` their mean: by the last two it ends in none. By `extended` one is
+    enough in a piece that may be divided past the end.
 
     Parameters
     ----------
@@ -103,10 +105,13 @@ def crossed_through(
     positions : (n, d) float array
         All numbered points, in metres.
     crossing : Crossing
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
     reached : callable, optional
         Given cuts, numbers of points past their ends and sizes of the elements, tells which points
         belong to the cut all the same.
+    extensible : callable, optional
+        Given which of the crossings (q,) are inside the extent, tells in which pieces (p,) a cut
+        that ends there may be extended; for the rule `extended`.
     """
     cut, zero, piece, size, pieces = crossing
     if tip == "nearest":
@@ -114,21 +119,24 @@ def crossed_through(
     wanted, at = np.unique(zero * len(cuts) + cut, return_inverse=True)
     point, of = np.divmod(wanted, len(cuts))
     level, depth = levels_and_depths(cuts, of, positions[point])
-    # an end on an edge is inside by the rule `inside`: it has gone through the element before it;
-    # by `through` it is not: it has not gone into the one behind it
-    margin = 1.0 if tip == "through" else -1.0
-    inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
+    near, depth = np.abs(level[at]) <= REACH * size, depth[at]
+    # an end on an edge has gone through the element before it, and not into the one behind it
+    inside = near & (depth >= -AT_END * size)
+    entered = near & (depth >= AT_END * size)
     if reached is not None:
-        near = (np.abs(level[at]) <= REACH * size) & (depth[at] > -size)
-        past = np.flatnonzero(near & ~inside)
+        past = np.flatnonzero(near & (depth > -size) & ~inside)
         if len(past):
-            inside[past] = reached(cut[past], zero[past], size[past])
+            inside[past] = entered[past] = reached(cut[past], zero[past], size[past])
     some, every = np.zeros(pieces, dtype=bool), np.zeros(pieces, dtype=bool)
-    some[piece[inside]] = True
     if tip == "through":
+        some[piece[entered]] = True
         return some, every
     every[piece] = True
     every[piece[~inside]] = False
+    if extensible is not None:
+        some[piece[entered]] = True
+        every |= some & extensible(inside)
+    some[piece[inside]] = True
     return every, some & ~every
 
 

@@ -297,7 +297,7 @@ def cut_mesh(
         The uncut mesh, in the material frame.
     cuts : sequence of Cut
         In any order; they may cross, branch, touch and run through nodes or along faces.
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         Treatment of elements in which a cut ends; see `verify.xfem.pieces.split_cells`.
     opened : (m, cuts) bool array, optional
         Cells that each cut has opened; the others are as whole as if it did not meet them.

@@ -48,14 +48,66 @@ from verify.xfem.crossing import (
     reached,
 )
 from verify.xfem.cuts import Cut, boxes_of
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, neighbours_across
 from verify.xfem.zero_points import ZeroPoints
 
 # cells (q,) and labels (q, cuts) of pieces, and the number of a cut, to whether it splits them
 Separated = Callable[[Ints, Sides, int], Bools]
 
 _NONE = np.empty(0, dtype=np.int64)
+MEETING = ("inside", "extended")  # tip rules by which cuts may end on one another in a cell
 ROUND_OFF = 8.0 * np.finfo(float).eps  # of the extent of the mesh: a level set that is zero
+
+
+class _Outline(NamedTuple):
+    """Where a cut may be extended past its end, to the far side of the cell in which it ends.
+
+    It may not where another cut meets the cell, nor where it would meet the outline of the body
+    at a facet that it does not meet itself: a body that hangs on the last cell would be parted.
+
+    Attributes
+    ----------
+    cells : (m, d + 1) int array
+    alone : (m,) bool array
+        Cells that one cut meets.
+    facets : (m, d + 1) bool array
+        Facets, opposite to each node, on the outline; of cells that cuts meet.
+    """
+
+    cells: Ints
+    alone: Bools
+    facets: Bools
+
+    @classmethod
+    def of(cls, cells: Ints, meets: Bools) -> "_Outline":
+        """Find it for the cells that each cut meets (m, cuts)."""
+        met = np.flatnonzero(meets.any(axis=1))
+        facets = np.zeros(cells.shape, dtype=bool)
+        facets[met] = neighbours_across(cells[met]) < 0
+        return cls(cells, meets.sum(axis=1) == 1, facets)
+
+    def extensible(self, parent: Ints, edges: Ints, piece: Ints, inside: Bools) -> Bools:
+        """Tell in which pieces (p,) of cells `parent` the cut that crosses edges may be extended.
+
+        Parameters
+        ----------
+        parent : (p,) int array
+        edges : (q, 2) int array
+        piece : (q,) int array
+        inside : (q,) bool array
+            Whether the cut itself crosses an edge.
+        """
+        allowed = self.alone[parent]
+        rows = np.flatnonzero(allowed[piece])
+        cell = parent[piece[rows]]
+        nodes, ends = self.cells[cell], edges[rows]
+        on_edge = (nodes == ends[:, :1]) | (nodes == ends[:, 1:])
+        row, facet = np.nonzero(self.facets[cell] & ~on_edge)
+        met = np.zeros((2, len(parent), self.cells.shape[1]), dtype=bool)
+        at = rows[row]
+        met[0, piece[at], facet] = True
+        met[1, piece[at[inside[at]]], facet[inside[at]]] = True
+        return allowed & ~(met[0] & ~met[1]).any(axis=1)
 
 
 class _Rules(NamedTuple):
@@ -71,6 +123,7 @@ class _Rules(NamedTuple):
     tip: TipRule
     separated: Separated | None
     opened: Bools | None
+    outline: _Outline | None
     forced: Bools | None = None  # (m, cuts) cells in which a cut has no end
 
 
@@ -100,11 +153,12 @@ def split_cells(
     mesh : SimplexMesh
     cuts : sequence of Cut
         A branch may come before or after the cut from which it leaves.
-    tip : {"inside", "through", "nearest"}
+    tip : {"inside", "extended", "through", "nearest"}
         What to do where a cut ends inside an element: leave the element whole (the rule of the
-        thesis, 3.2.1), split it, or whichever of the two moves the tip less. With the last two
-        the order of the cuts matters where one ends in an element that another divides: it splits
-        what it finds, the element or a piece.
+        thesis, 3.2.1); split it unless another cut meets it, or the outline of the body would be
+        opened where the cut does not reach it; split it; or whichever of whole and split moves
+        the tip less. With the last two the order of the cuts matters where one ends in an element
+        that another divides: it splits what it finds, the element or a piece.
     separated : callable, optional
         For a cut that grows. Its arguments are cells and labels of pieces that a cut meets but does
         not go through, and the number of the cut. It tells which of them the cut split before, and
@@ -136,10 +190,11 @@ def split_cells(
         points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
         return _split_by_all(Partition.whole(mesh.cells, cells, points, snapped), rules)
 
-    rules = _Rules(cuts, boxes, sizes, _rounds(meets), tip, separated, opened)
+    outline = _Outline.of(mesh.cells, meets) if tip == "extended" else None
+    rules = _Rules(cuts, boxes, sizes, _rounds(meets), tip, separated, opened, outline)
     partition, ends = divide(crossed, rules)
     at_junctions = np.zeros(len(mesh.cells), dtype=bool)
-    if tip == "inside" and len(cuts) > 1:
+    if tip in MEETING and len(cuts) > 1:
         # a junction is one of all cuts, also when some of them are not open yet
         free = rules._replace(separated=None, opened=None)
         junctions = junction_cuts(
@@ -256,10 +311,14 @@ def _split_by(
         size=rules.sizes[parent[piece]],
         pieces=len(parent),
     )
-    on_others = None
-    if rules.tip == "inside" and len(rules.cuts) > 1:
+    on_others = extensible = None
+    if rules.tip in MEETING and len(rules.cuts) > 1:
         on_others = partial(reached, rules.cuts, rules.boxes, points)
-    active, ending = crossed_through(rules.cuts, points.positions, crossing, rules.tip, on_others)
+    if rules.outline is not None:
+        extensible = partial(rules.outline.extensible, parent, edges, piece)
+    active, ending = crossed_through(
+        rules.cuts, points.positions, crossing, rules.tip, on_others, extensible
+    )
     meets = np.bincount(piece, minlength=len(active)) > 0
     if rules.forced is not None:
         active |= meets & rules.forced[parent, cut]
