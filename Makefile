@@ -4,10 +4,11 @@
 #   DOLFINX=system        use the DOLFINx of that Python instead of the wheel
 #   JOBS=n                processes that tests and the demo run side by side (else all cores)
 
+CHECKS := types layers lint format words
 SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test heavy bench check docs results size clean lock
+.PHONY: help setup demo test heavy bench check docs results size clean lock $(CHECKS)
 
 BIN := $(or $(VERIFY_VENV),.venv)/bin
 JOBS ?= $(shell nproc)
@@ -43,8 +44,10 @@ demo: setup ## solve the demo cases and write build/demo/report.html
 	    if [ -f $(DEMO)/report.html ]; then echo "Report: $(CURDIR)/$(DEMO)/report.html"; fi; \
 	    exit $$code
 
-# No claim about time: what passes here does so however busy the machine is.
+# No claim about time: what passes here does so however busy the machine is. Kernels are compiled
+# before, or both workers and all that they start compile the same ones at once.
 test: setup ## run the tests, without claims about time and heavy studies
+	@$(BIN)/python -m verify doctor --compile >/dev/null
 	@$(PYTEST) -n $(JOBS) --dist loadfile --no-loadscope-reorder -m "not timing and not heavy"
 
 heavy: setup ## run the heavy studies (minutes to hours)
@@ -55,11 +58,19 @@ heavy: setup ## run the heavy studies (minutes to hours)
 bench: setup ## run the claims about time, print medians with their spread, write docs/results/speed.md
 	@VERIFY_SPEED=1 $(PYTEST) -m "timing and not heavy" -p no:xdist -rs --benchmark-columns=median,iqr,rounds
 
+# Side by side, the longest first; each says its words at its end.
 check: setup ## ruff, format, types, layers, words
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	@$(MAKE) --jobs=$(JOBS) --keep-going --output-sync=target $(CHECKS)
+
+types:
 	$(BIN)/mypy
+lint:
+	$(BIN)/ruff check .
+format:
+	$(BIN)/ruff format --check .
+layers:
 	$(BIN)/lint-imports
+words:
 	$(BIN)/python .ci/words
 
 lock: ## resolve the lock files again from pyproject.toml (needs uv; UPGRADE=1 takes new versions)

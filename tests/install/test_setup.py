@@ -122,9 +122,10 @@ def test_older_python3_and_refusing_shims_are_passed_over(root, tmp_path):
     assert version.strip() == b"True"
 
 
-# Stands for pytest: an exit code for the claims about time, another for the rest.
+# Stands for pytest: an exit code for the claims about time, another for the rest; kernels compile.
 PYTEST = """#!/bin/bash
 case "$*" in
+    *'verify doctor --compile') exit 0 ;;
     *'-m timing and not heavy'*) exit {timed} ;;
     *'-m not timing and not heavy'*) exit {rest} ;;
 esac

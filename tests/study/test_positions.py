@@ -6,6 +6,7 @@ import textwrap
 
 import numpy as np
 import pytest
+from command_line import forking
 
 from verify.cli import main
 from verify.judge.models import coarsest
@@ -122,7 +123,8 @@ def test_errors_on_each_mesh_are_those_of_the_solver(tmp_path, monkeypatch, caps
     names = ["scaled:Scaled power=0", "scaled:Scaled power=1 breaks=true"]
     words = ["study", "positions", "statics/f1_patch", "--positions", "4", "--out", "studies"]
     words += [word for name in names for word in ("--solver", name)]
-    assert main(words) == 0
+    with forking("scaled:Scaled".__eq__):
+        assert main(words) == 0
     said, kept = capsys.readouterr(), tmp_path / "studies"
     with open(kept / "positions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
