@@ -14,6 +14,7 @@ from verify.exchange import read_answers
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
 from verify.solvers import find_solver, solver_names
+from verify.solvers.interface import refusal_of
 
 TALKS = """
 from exchange_files import RefusedError, run
@@ -55,6 +56,16 @@ def test_a_refusal_and_a_failure_of_the_program_come_through(talks):
         talks.solve(load_scene(CASE), 0, weight=-1.0)
     with pytest.raises(RuntimeError, match=r"ValueError: the weight is zero \(.*program.py:9 in"):
         talks.solve(load_scene(CASE), 0, weight=0.0)
+
+
+def test_contact_is_what_a_program_refuses_that_takes_the_same_crack_without(add_example):
+    """Kratos, Akantu and all others: their records cannot declare contact."""
+    add_example("linear")
+    scene = load_scene("contact/closed_crack")
+    why = refusal_of(find_solver("linear"), scene)
+    assert why == "contact of the faces of a cut ('static') is not offered by linear"
+    apart = scene.model_copy(update={"contact": type(scene.contact)()})
+    assert refusal_of(find_solver("linear"), apart) is None
 
 
 @pytest.mark.parametrize(
