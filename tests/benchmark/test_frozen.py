@@ -30,6 +30,22 @@ FROZEN = {
         "c6_block": "6899b0a0b7412f12",
         "c7_spinning": "423b45aad475cfd9",
     },
+    "1.1": {
+        "c1_slit": "1903205a6b76ff93",
+        "c2_meeting": "2b431200dc1c8e1b",
+        "c4_disc": "63e0260eaa1aaa5c",
+        "c8_slivers[epsilon=0.5]": "b73941cf325b8e1d",
+        "c8_slivers[epsilon=0]": "8985e2890fd6aba2",
+        "c8_slivers_space[epsilon=0.5]": "736287b738c0aab9",
+        "c8_slivers_space[epsilon=0]": "899393247c611cf6",
+        "c8_slivers_corner[epsilon=0.5]": "593505e9cef76b71",
+        "c3_strip": "0a9165b4bd97d77c",
+        "c5_blade_01": "8a602cdc74439e84",
+        "c5_blade_03": "51dbf38021b944ef",
+        "c5_blade_06": "244f66bbe562bd65",
+        "c6_block": "f216e34c88548e9d",
+        "c7_spinning": "309841d4862cfc9a",
+    },
 }
 
 
