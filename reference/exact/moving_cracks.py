@@ -300,6 +300,8 @@ def wave(distance: ArrayLike, length: ArrayLike, run: float) -> tuple[Array, Arr
         Way that a wave has run since, c t, m.
     """
     distance, length = np.broadcast_arrays(np.asarray(distance, float), np.asarray(length, float))
+    if run == 0.0:  # no wave has begun: nor beyond the end, where cut cells have unknowns
+        distance = np.abs(distance)
     found, slope, rate = np.zeros((3, *distance.shape))
     just = -1e-12 * length  # behind the front, in spite of round-off
     sign, way = 1.0, np.zeros(distance.shape)
