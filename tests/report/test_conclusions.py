@@ -258,6 +258,16 @@ def test_groups_share_a_row_and_refusals_and_failures_are_told_apart():
     assert "kratos" not in of
 
 
+def test_who_answers_no_scene_is_named_with_the_reasons(tmp_path):
+    results = deepcopy(made().results)
+    for result in results[:2]:
+        result.solves.append(SolveRecord(result.case, "vbd", 0, Status.REFUSED, "springs only"))
+    write_benchmark(made(results), tmp_path)
+    page = (tmp_path / "index.md").read_text("utf-8")
+    assert "No row: vbd (springs only)." in page
+    assert page.count("No row") == 1
+
+
 def test_one_interval_over_the_best_is_no_loss():
     bare = deepcopy(made().results)
     for result in bare:  # all of them are known to ± 0.5 of the error
