@@ -139,7 +139,7 @@ class Body:
         return csr_array((np.ones(count), (np.arange(count), column)), shape=(count, len(own)))
 
     def _opens_at(self, cut):
-        """When each node (n,) is let go: -inf away from the cut, or if it is there from the start."""
+        """When each node (n,) is let go: -inf away from the cut, and if no blade makes it."""
         opens = np.full(len(self.problem.points), -np.inf)
         if not cut.on_the_way:
             return opens
