@@ -298,14 +298,14 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("remeshed", "remeshing, on several positions of the mesh", partial(
             _weighed, kind="rest", metric="displacement_l2", solver=_REMESHED, rival=MEASURE,
             factor=QUARTER, words=tuple(
-                f"{lead} {{}} times the error of one whose cut cells are split." for lead in (
-                    "For accuracy: a new mesh for each cut has",
-                    "Not for accuracy: a new mesh for each cut has",
-                    "Not for accuracy: a new mesh for each cut has even")))),
+                f"{lead}: with a new mesh for each cut the error is {{}} times that of a mesh "
+                "whose cut cells are split." for lead in (
+                    "Remesh for accuracy", "Remeshing gains no clear accuracy",
+                    "Remeshing loses accuracy")))),
         Sentence("remeshing time", "times of remeshing", partial(
             _weighed, kind="rest", metric="time", solver=_REMESHED, rival="xfem", factor=TWICE,
             words=("At equal error remeshing takes only {} times XFEM's time.",
-             "At equal error remeshing takes {} times XFEM's time, which decides nothing.",
+             "At equal error remeshing takes {} times XFEM's time, too close to call.",
              "At equal error remeshing takes {} times XFEM's time."))),
     ),
     "What it costs": (
