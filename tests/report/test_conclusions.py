@@ -184,9 +184,9 @@ def shifted(factor):
     ("motion", {"xfem": (0.7, 1.0)}, 1.0, "XFEM: in motion its error is 0.70"),
     ("motion", {"xfem": (1.1, 1.0)}, 1.0, "XFEM, which needs no new mesh"),
     ("motion", {"xfem": (2.6, 1.0)}, 1.0, "but in motion its error is 2.6 times"),
-    ("remeshed", {REMESHED: (0.7, 5.0)}, 1.0, "For accuracy: "),
+    ("remeshed", {REMESHED: (0.7, 5.0)}, 1.0, "Remesh for accuracy: "),
     ("remeshed", {REMESHED: (0.9, 5.0)}, 1.0, "Remeshing gains no clear accuracy: "),
-    ("remeshed", {REMESHED: (1.4, 5.0)}, 1.5, "has even 1.4 times"),
+    ("remeshed", {REMESHED: (1.4, 5.0)}, 1.5, "Remeshing loses accuracy"),
     ("remeshing time", {REMESHED: (1.0, 1.0)}, 1.0, "too close to call"),
     ("remeshing time", {REMESHED: (1.0, 0.2)}, 1.0, "takes only 0.18 times"),
 ])  # fmt: skip
