@@ -241,4 +241,5 @@ def test_solvers_without_a_word_are_listed(capsys):
     listed = capsys.readouterr().out
     assert main(["solvers", "list"]) == 0
     assert capsys.readouterr().out == listed
+    assert listed.startswith("of the project, and plugged in: ")
     assert "xfem" in listed
