@@ -25,7 +25,7 @@ from verify.scene import Scene, load_scene, load_scenes, scene_content
 from verify.simulator.thesis import FaceCount, count_face, count_strips, delays
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.measured_scenes import compared, measured_scene, variant_of
+from verify.study.measured_scenes import measured_scene, measured_solve, variant_of
 from verify.system import critical_step, lowest_frequency, with_uncut_twin
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def _solved(case: str, method: str, level: int) -> tuple[Solution, dict[str, Met
     """Solve one level of a case by a method and compare with its exact solution."""
     scene, variant = load_scene(case), variant_of(method)
     solution = variant.found().solve(scene, level, repetitions=1, **variant.parameters)
-    measured = compared(scene, variant.solver, level, solution, exact_of(scene))
+    measured = measured_solve(scene, variant.solver, level, solution, exact_of(scene))
     return solution, {metric.name: metric for metric in measured.metrics}
 
 

@@ -19,7 +19,7 @@ from verify.judge.models import coarsest
 from verify.scene import Scene, scene_content
 from verify.solution import Solution
 from verify.solvers.interface import name_with
-from verify.study.measured_scenes import Variant, compared
+from verify.study.measured_scenes import Variant, measured_solve
 from verify.study.study import Finding, Making, Solved, Study
 
 Array = NDArray[np.float64]
@@ -199,7 +199,7 @@ def _distance(answer: Solution, other: Solution) -> float:
 
 
 def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
-    measured = compared(scene, "solver", 0, answer, None)
+    measured = measured_solve(scene, "solver", 0, answer, None)
     asked = [measured.metric(quantity.name) for quantity in scene.quantities]
     found = {
         m.name if m.unit == "1" else f"{m.name}, {m.unit}": m.value for m in asked if m is not None

@@ -176,7 +176,9 @@ def measured_families(
     return rows
 
 
-def compared(scene: Scene, name: str, level: int, solution: Solution, exact: Any) -> SolveRecord:
+def measured_solve(
+    scene: Scene, name: str, level: int, solution: Solution, exact: Any
+) -> SolveRecord:
     """Measure the solution of one level of a scene, held against an exact field if there is one."""
     record = SolveRecord(scene.name, name, level, Status.SOLVED, size=solution.size)
     (measured,) = assess_accuracy(scene, [record], {name: {level: solution}}, exact).solves
@@ -187,7 +189,7 @@ def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Itera
     from reference.exact import exact_of
 
     solution = checked_solution(solver.solve(scene, level, repetitions=1, **variant.parameters))
-    measured = compared(scene, variant.solver, level, solution, exact_of(scene))
+    measured = measured_solve(scene, variant.solver, level, solution, exact_of(scene))
     if measured.status is not Status.SOLVED:
         raise NotMeasuredError(measured.reason)
     for metric in measured.metrics:
