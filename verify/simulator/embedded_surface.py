@@ -30,16 +30,6 @@ _INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is
 _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
 
 
-class _Fragments(NamedTuple):
-    """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts, if whole."""
-
-    ids: Ints
-    source: Ints
-    at: Floats
-    label: Sides
-    whole: Bools
-
-
 class _Corners(NamedTuple):
     """Find the cell (q, k) of each corner of facets; coordinates of it and a place inside."""
 
@@ -170,24 +160,31 @@ class EmbeddedSurface:
     def _replace(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> None:
         """Put the parts of some facets in the place of what there is of these.
 
-        They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is
-        found with which pieces the parts move.
+        They are divided by the cuts with these `numbers`, whose level sets at the `nodes` are
+        `values` (q, cuts), and bisected where others are. Then it is found with which pieces they
+        move.
         """
-        parts = self._fragments(facets, nodes, numbers, values)
-        material = parts.at @ self.points[self.facets[parts.source]]
+        ids, source, at, side = self._divided(facets, nodes, numbers, values)
+        self._edges.add(ids.ravel())
+        ids, at, origin = self._edges.bisect(ids, at)
+        source = source[origin]
+        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
+        label[:, numbers] = side[origin]
+        alone = np.bincount(source, minlength=len(facets)) == 1
         # where the corners of a whole facet are is known; only which piece that is may be new
-        divided = np.flatnonzero(~parts.whole)
-        found = self._place_corners(parts.source[divided], material[divided])
-        source, known = parts.source, self._corners
+        divided = np.flatnonzero(~alone[source] | label.any(axis=1))
+        source, known = facets[source], self._corners
+        material = at @ self.points[self.facets[source]]
+        found = self._place_corners(source[divided], material[divided])
         corners = _Corners(known.cell[source], known.weights[source], known.inside[source])
         corners.cell[divided], corners.weights[divided] = found.cell, found.weights
         corners.inside[divided] = found.inside
         self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
-            parts.ids, material, corners.weights,
+            ids, material, corners.weights,
             lambda rows: corners.weights.reshape(-1, corners.weights.shape[2])[rows] != 0.0,
-            self._pieces(corners, parts.label), np.zeros(len(parts.ids), dtype=bool),
-            self._cutter.body.piece_cells.rows, parts.source, self._facet_range,
+            self._pieces(corners, label), np.zeros(len(ids), dtype=bool),
+            self._cutter.body.piece_cells.rows, source, self._facet_range,
         )  # fmt: skip
 
     def _pieces(self, corners: _Corners, label: Sides) -> Ints:
@@ -211,21 +208,6 @@ class EmbeddedSurface:
             better = total > agree[rows]
             found[rows[better]], agree[rows[better]] = pieces[better], total[better]
         return found.reshape(corners.cell.shape)
-
-    def _fragments(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> _Fragments:
-        """Divide facets, bisect them where others are, and say on which sides they lie.
-
-        `values` (q, cuts) are the level sets of the cuts with these `numbers` at the `nodes`.
-        """
-        ids, source, at, side = self._divided(facets, nodes, numbers, values)
-        self._edges.add(ids.ravel())
-        ids, at, origin = self._edges.bisect(ids, at)
-        source = source[origin]
-        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
-        label[:, numbers] = side[origin]
-        alone = np.bincount(source, minlength=len(facets)) == 1
-        is_whole = alone[source] & ~label.any(axis=1)
-        return _Fragments(ids, facets[source], at, label, is_whole)
 
     def _divided(
         self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats
