@@ -138,6 +138,16 @@ def test_made_numbers_support_every_sentence_and_stand_in_it():
     assert found["remeshing time"].text.startswith("At equal error remeshing takes 4.1 times")
 
 
+def test_the_step_kept_is_told_for_unstructured_meshes_too():
+    moved = {"claim": "uncut_step", "number": "bodies with moved nodes: least step", "value": "0.8"}
+    other = {"claim": "uncut_step", "number": "one cut element", "value": "1e-16"}
+    (found,) = [
+        own.found["step kept"] for own in answer(replace(made(), claims=[other, moved]))
+        if "step kept" in own.found
+    ]  # fmt: skip
+    assert found.text.endswith("; at least 0.80 on unstructured meshes.")
+
+
 def slower(evidence):
     rows = [{**row, "value": "0.5"} if row["solver"] == "xfem" and row["quantity"].endswith("step")
             else row for row in evidence.slivers]  # fmt: skip
