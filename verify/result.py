@@ -9,7 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
-from math import inf
+from itertools import pairwise
+from math import inf, log
 from pathlib import Path
 from statistics import median
 from typing import Any, Literal
@@ -371,6 +372,43 @@ def repeated_totals(phases: Mapping[str, Sequence[float]]) -> list[float]:
         sum(times[i] if len(times) == count else median(times) for times in phases.values())
         for i in range(count)
     ]
+
+
+type Times = tuple[float, float, float]  # median, least and most of repetitions, s
+type TimedErrors = Sequence[tuple[float, Times]]  # of levels, coarse to fine
+_REACHED = 1.0 + 1e-9  # times an error: round-off of the same one
+
+
+def time_at(levels: TimedErrors, error: float) -> Times | None:
+    """Return the time that an error takes, interpolated between levels, log against log.
+
+    None if the levels do not reach it; where they all stay below it, the time of the coarsest.
+    """
+    if levels and levels[0][0] <= error:
+        return levels[0][1]
+    for (coarse, before), (fine, after) in pairwise(levels):
+        if fine <= error * _REACHED:
+            share = min(log(coarse / error) / log(coarse / fine), 1.0)
+            one, two, three = (
+                a ** (1 - share) * b**share for a, b in zip(before, after, strict=True)
+            )
+            return one, two, three
+    return None
+
+
+def times_at_equal_error(one: TimedErrors, other: TimedErrors) -> tuple[Times, Times] | None:
+    """Return the times of two solvers at the smallest error that both reach.
+
+    None where that error lies below the coarsest level of either: its time would be that of a mesh
+    nobody would choose.
+    """
+    if not one or not other:
+        return None
+    error = max(min(level[0] for level in levels) for levels in (one, other))
+    if any(max(level[0] for level in levels) * _REACHED < error for levels in (one, other)):
+        return None
+    first, second = time_at(one, error), time_at(other, error)
+    return (first, second) if first and second else None
 
 
 @_closed

@@ -224,7 +224,7 @@ def checked_solution(answer: Any) -> Solution:
     return Solution(**{entry.name: getattr(answer, entry.name) for entry in fields(Solution)})
 
 
-def write_solution(solution: Solution, path: Path) -> None:
+def write_solution(solution: Solution, path: Path, compression: str | None = "zlib") -> None:
     """Write `solution` as ``path.vtu`` (or one VTU per output time) and ``path.json``.
 
     Each in one step, the JSON file last, so that its presence means that the solution is whole.
@@ -234,6 +234,8 @@ def write_solution(solution: Solution, path: Path) -> None:
     solution : Solution
     path : Path
         Path without ending, e.g. ``out/solution``.
+    compression : str, optional
+        Of the arrays of the VTU; None for files that are compressed as a whole.
     """
     import meshio
 
@@ -255,7 +257,7 @@ def write_solution(solution: Solution, path: Path) -> None:
             cell_data={} if sides is None else {"side": [sides.astype(np.int32)]},
         )
         with whole_file(path.parent / name) as partial:
-            mesh.write(partial, file_format="vtu")
+            mesh.write(partial, file_format="vtu", compression=compression)
     record = {
         "schema": SCHEMA_VERSION,
         "files": names,

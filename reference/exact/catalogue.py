@@ -110,7 +110,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
     "impact": (
         Impact,
-        "contact, moving: halves of a bar along x that meet: half_length, at, speed of each, gap",
+        "contact, moving: halves of a bar that meet: half_length, at, axis (default x), speed of "
+        "each, gap",
     ),
     "released_bar": (
         ReleasedBar,

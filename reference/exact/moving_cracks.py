@@ -214,8 +214,9 @@ class Impact(ExactSolution):
     −(v/c) min(y, m) towards it, m = L − |cτ − L|. They are together for 2L/c, under the pressure
     ρcv, then apart with velocities exchanged. c = √((λ+2μ)/ρ), as of `ReleasedBar`.
 
-    Parameters: ``half_length`` L (m); ``at``, where they meet along x (m); ``speed`` v of each
-    (m/s); the ``gap`` between them at the time 0 (m, default 0). The material needs a density.
+    Parameters: ``half_length`` L (m); ``at``, where they meet along the ``axis`` (m, default x);
+    ``speed`` v of each (m/s); the ``gap`` between them at the time 0 (m, default 0). The material
+    needs a density.
     """
 
     moves = True
@@ -223,6 +224,10 @@ class Impact(ExactSolution):
     def __init__(self, law: Hooke, parameters: Parameters) -> None:
         super().__init__(law)
         self._length = parameters.positive("half_length")
+        along = parameters.take("axis", (self.dimension,), default=np.eye(self.dimension)[0])
+        if not along.any():
+            raise InputError("parameters.axis is zero; expected a direction")
+        self._axis = along / np.linalg.norm(along)
         self._at = float(parameters.take("at", ()))
         self._v = parameters.positive("speed")
         self._gap = float(parameters.take("gap", (), default=0.0))
@@ -233,8 +238,7 @@ class Impact(ExactSolution):
     @property
     def cut_plane(self) -> Plane:
         """Where the halves meet."""
-        axis = np.eye(self.dimension)[0]
-        return self._at * axis, axis
+        return self._at * self._axis, self._axis
 
     def smooth(self, points: Array, reach: Array | float) -> NDArray[np.bool_]:
         """Tell whether no front of a wave is within a distance of points; see `ExactField`."""
@@ -248,32 +252,35 @@ class Impact(ExactSolution):
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement (n, d), m; see `ExactSolution`."""
         side, far = self._local(points, near)
-        way = -self._v / self._speed * np.minimum(far, self._front()[0])
-        return (side * way)[:, None] * np.eye(self.dimension)[0]
+        way = -self._v / self._speed * np.where(self._ahead(far), self._front()[0], far)
+        return (side * way)[:, None] * self._axis
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Compute displacement gradient (n, d, d), which jumps at fronts. See `ExactSolution`."""
-        along = np.eye(self.dimension)[0]
-        pressed = self._local(points, near)[1] < self._front()[0]
-        strain = -self._v / self._speed * pressed
-        return np.asarray(strain[:, None, None] * np.outer(along, along))
+        strain = -self._v / self._speed * ~self._ahead(self._local(points, near)[1])
+        return np.asarray(strain[:, None, None] * np.outer(self._axis, self._axis))
 
     def velocity(self, points: Array, near: Array | None = None) -> Array:
         """Compute the velocity (n, d), m/s; see `ExactSolution`."""
         side, far = self._local(points, near)
-        front, direction = self._front()
-        rate = -self._v * direction * (far > front)
-        return (side * rate)[:, None] * np.eye(self.dimension)[0]
+        rate = -self._v * self._front()[1] * self._ahead(far)
+        return (side * rate)[:, None] * self._axis
 
     def _front(self) -> tuple[float, float]:
         """Distance m of the front of the wave from the meeting place, m, and its direction."""
         run = self._speed * (self.time - 0.5 * self._gap / self._v)
         return self._length - abs(run - self._length), 1.0 if run < self._length else -1.0
 
+    def _ahead(self, far: Array) -> NDArray[np.bool_]:
+        """Tell which points (n,) no wave has reached: all of halves that are apart."""
+        front = self._front()[0]
+        return np.asarray((far > front) | (front <= 0.0))
+
     def _local(self, points: Array, near: Array | None) -> tuple[Array, Array]:
         """Compute the side (n,) of the meeting place, 1 or −1, and distance from it, m."""
-        x = np.asarray(points, dtype=float)[:, 0]
-        side = np.where((x if near is None else np.asarray(near)[:, 0]) >= self._at, 1.0, -1.0)
+        x = np.asarray(points, dtype=float) @ self._axis
+        decides = x if near is None else np.asarray(near) @ self._axis
+        side = np.where(decides >= self._at, 1.0, -1.0)
         return side, side * (x - self._at)
 
 
@@ -293,6 +300,8 @@ def wave(distance: ArrayLike, length: ArrayLike, run: float) -> tuple[Array, Arr
         Way that a wave has run since, c t, m.
     """
     distance, length = np.broadcast_arrays(np.asarray(distance, float), np.asarray(length, float))
+    if run == 0.0:  # no wave has begun: nor beyond the end, where cut cells have unknowns
+        distance = np.abs(distance)
     found, slope, rate = np.zeros((3, *distance.shape))
     just = -1e-12 * length  # behind the front, in spite of round-off
     sign, way = 1.0, np.zeros(distance.shape)

@@ -41,6 +41,8 @@ def test_help_teaches_by_examples_that_parse(command, capsys):
 
 def test_list_names_every_case_with_its_title_and_wraps_at_the_width(capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)  # what runs tests side by side sets it
+    rows = {path: catalogue()[name] for name, path in list_cases().items()}
+    monkeypatch.setattr("verify.scene.load_scenes", rows.__getitem__)  # as read for `SCENES`
     assert main(["list"]) == 0
     whole = capsys.readouterr().out
     assert [line.split()[0] for line in whole.splitlines()] == list(SCENES)
@@ -239,4 +241,5 @@ def test_solvers_without_a_word_are_listed(capsys):
     listed = capsys.readouterr().out
     assert main(["solvers", "list"]) == 0
     assert capsys.readouterr().out == listed
+    assert listed.startswith("of the project, and plugged in: ")
     assert "xfem" in listed

@@ -4,6 +4,7 @@ from dataclasses import replace
 from importlib import import_module
 
 import pytest
+from command_line import forking
 
 from verify.conformance import State, conform, exit_code_of, scenes, trials
 from verify.conformance.check import evaluate
@@ -40,6 +41,13 @@ class Solved:
 def solved_here(monkeypatch):
     """Let a solver that neither crashes nor hangs solve in this process."""
     monkeypatch.setattr(trials, "_start", Solved)
+
+
+@pytest.fixture
+def forked():
+    """Fork the processes of a solver that does no harm to the server that they are forked from."""
+    with forking(lambda _: True):
+        yield
 
 
 AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it can fail
@@ -153,6 +161,7 @@ def test_a_method_that_takes_energy_and_says_so_passes_like_one_that_does_not(gi
     assert energy_in_motion().judge({"swinging": replace(solution, mass=None)}).limit is None
 
 
+@pytest.mark.usefixtures("forked")
 def test_noise_far_below_the_errors_breaks_repeatability_only():
     found = state("Noisy", "uncut-2d", "cut-patch", "repeatability")
     assert found["uncut-2d"].state is found["cut-patch"].state is State.PASS
@@ -170,6 +179,7 @@ def test_a_crash_is_a_finding_and_the_checks_after_it_still_run():
     assert exit_code_of(list(found.values())) == 3
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_solver_that_hangs_is_stopped_and_the_checks_after_it_still_run():
     found = state("Hangs", "uncut-2d", "uncut-3d", timeout=4.0)
     assert found["uncut-2d"].state is State.ERROR

@@ -15,6 +15,7 @@ from reference.exact import exact_solution
 from verify.cli import main
 from verify.errors import InputError
 from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
+from verify.exchange.comparison import _judged_scenes
 from verify.result import Status, Verdict, read_result
 from verify.scene import load_scene
 from verify.solution import write_solution
@@ -165,6 +166,21 @@ def test_an_answer_that_is_missing_refused_or_damaged_is_a_record_of_its_own(tmp
     assert "not a JSON file" in answers.missing[1][1]
     assert "no answer for level 2" in answers.missing[2][1]
     assert not answers.solutions
+
+
+def test_checks_that_name_a_solver_are_made_of_each_program_instead():
+    scene = load_scene("curved/arc_from_a_corner")
+    mouth, middle, factor = scene.acceptance
+    named = middle.model_copy(update={"solver": "xfem"})
+    scene = scene.model_copy(update={"acceptance": [mouth, named, factor]})
+    (judged,) = _judged_scenes([scene], "xfem", ["mine", "theirs"])
+    made = [(check.metric, check.solver) for check in judged.acceptance]
+    assert made == [("mouth", None), ("middle", "mine"), ("middle", "theirs"), ("K_I", None)]
+    assert (judged.name, judged.file, judged.row) == (scene.name, scene.file, scene.row)
+    known = [[one.metric for one in own.known_findings] for own in (scene, judged)]
+    assert known == [["middle", "K_I"] * 2, ["K_I"] * 2]
+    with pytest.raises(InputError, match="no check of 'conforming'; it does of xfem"):
+        _judged_scenes([scene], "conforming", ["mine"])
 
 
 def test_answers_to_another_case_are_refused(tmp_path):

@@ -81,13 +81,15 @@ class Body:
         return {"displacement": u.reshape(1, -1, 2), "ledger": {"strain": np.array([energy])}}
 
     def motion(self, scene):
-        """Move from rest with all cuts closed; gravity and supports do not change."""
+        """Move from rest; gravity and supports do not change."""
         mass = self.problem.density() * self.node_volume.repeat(2)
         step = scene.analysis.time_step
         opens = self._opens_at(scene.cuts[0])
         tied = opens > 0.0
-        u = self.rest(self._ties(tied))["displacement"].ravel()
-        v, kept, solver = np.zeros_like(u), [], None
+        v, kept, solver = np.zeros(len(mass)), [], None
+        u = v
+        if scene.initial.kind == "equilibrium":
+            u = self.rest(self._ties(tied))["displacement"].ravel()
         outputs = np.asarray(scene.analysis.output_times)
         for k in range(round(outputs[-1] / scene.analysis.time_step) + 1):
             time = k * scene.analysis.time_step
@@ -137,13 +139,15 @@ class Body:
         return csr_array((np.ones(count), (np.arange(count), column)), shape=(count, len(own)))
 
     def _opens_at(self, cut):
-        """When each node (n,) is let go: -inf away from the cut."""
+        """When each node (n,) is let go: -inf away from the cut, and if no blade makes it."""
+        opens = np.full(len(self.problem.points), -np.inf)
+        if not cut.on_the_way:
+            return opens
         points = np.asarray(cut.points)
         along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
         when = cut.starts_at + (self.problem.points - points[0]) @ along / cut.speed
         facets = self.problem.cut_facets
         ends = cut.starts_at + (facets - points[0]) @ along / cut.speed
-        opens = np.full(len(when), -np.inf)
         for node in self._twins().ravel():
             around = np.abs(ends - when[node]).min(axis=1) < 1e-9
             opens[node] = ends[around].max()

@@ -1,5 +1,6 @@
 """Running what a test writes down on two MPI ranks, and on the one that this process is."""
 
+import os
 import pickle
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from verify.errors import InputError
-from verify.runner.ranks import mpiexec
+from verify.runner.ranks import AT_HOME, mpiexec
 
 _ONE = """
 from reference.installation import import_dolfinx
@@ -50,6 +51,7 @@ def _on_two(code, folder):
         capture_output=True,
         text=True,
         cwd=Path(__file__).parents[2],
+        env={**os.environ, **AT_HOME},
         check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

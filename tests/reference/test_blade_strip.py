@@ -175,6 +175,14 @@ def test_a_bar_that_is_let_go_moves_by_waves(at, dimension):
     points = np.random.default_rng(2).uniform(-0.2, 1.1, (300, dimension))
     step, shift = 1e-4, 1e-4 * np.eye(dimension)[0]
     assert bar.at(-1.0).displacement(points)[:, 0] == pytest.approx(0.02 * (points[:, 0] - 0.4))
+    for side in (-1.0, 1.0):  # unknowns of a part beyond its face move with it: no wave has begun
+        near = np.full((1, dimension), at) + 1e3 * side * shift
+        if -0.2 < near[0, 0] < 1.1:
+            start, beyond = bar.at(0.0), near - 2e3 * side * shift
+            assert (start.velocity(beyond, near) == 0.0).all()
+            expected = pytest.approx(0.02 * (beyond[0, 0] - 0.4), rel=1e-14)
+            assert start.displacement(beyond, near)[0, 0] == expected
+            assert start.gradient(beyond, near)[0, 0, 0] == pytest.approx(0.02, rel=1e-14)
     for end in (-0.2, 1.1):  # the ends themselves, and round-off beyond them
         beyond = np.full((1, dimension), np.nextafter(end, np.sign(end) * np.inf))
         assert np.isfinite(bar.at(0.11).displacement(beyond)).all()

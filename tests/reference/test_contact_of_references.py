@@ -107,6 +107,30 @@ def test_halves_that_meet_are_together_for_two_lengths_and_leave_with_velocities
     np.testing.assert_allclose(slope, moment.gradient(points), atol=1e-9)
 
 
+def test_an_inclined_impact_is_the_same_turned_and_halves_that_touch_move_beyond_their_faces():
+    turn = np.array([[0.6, 0.8], [-0.8, 0.6]])  # rows: along the bar, across
+    bar, inclined = (
+        exact_solution("impact", {**IMPACT, **more}, BAR).at(0.3)
+        for more in ({}, {"axis": (3.0 * turn[0]).tolist()})
+    )
+    points = np.random.default_rng(5).uniform(-0.3, 0.7, (40, 2))
+    for name in ("displacement", "velocity"):
+        expected = getattr(bar, name)(points) @ turn
+        np.testing.assert_allclose(getattr(inclined, name)(points @ turn), expected, atol=1e-15)
+    expected = turn.T @ bar.gradient(points) @ turn
+    np.testing.assert_allclose(inclined.gradient(points @ turn), expected, atol=1e-15)
+    np.testing.assert_allclose(inclined.cut_plane[1], turn[0], atol=1e-15)
+    with pytest.raises(InputError, match="axis is zero"):
+        exact_solution("impact", {**IMPACT, "axis": [0.0, 0.0]}, BAR)
+    # unknowns of the lower half on the other side, where a mesh has them: no wave has begun
+    for gap in (0.0, 0.01):
+        start = exact_solution("impact", {**IMPACT, "gap": gap}, BAR).at(0.0)
+        beyond, near = np.array([[0.31, 0.0]]), np.array([[0.19, 0.0]])
+        for name in ("displacement", "velocity", "gradient"):
+            field = getattr(start, name)
+            np.testing.assert_allclose(field(beyond, near), field(near, near), atol=1e-15)
+
+
 LINES = [
     {"kind": "polyline", "name": "one", "points": [[-0.1, 0.31], [1.1, 0.74]]},
     {"kind": "polyline", "name": "other", "points": [[0.37, -0.1], [0.62, 1.1]]},

@@ -138,6 +138,16 @@ def test_made_numbers_support_every_sentence_and_stand_in_it():
     assert found["remeshing time"].text.startswith("At equal error remeshing takes 4.1 times")
 
 
+def test_the_step_kept_is_told_for_unstructured_meshes_too():
+    moved = {"claim": "uncut_step", "number": "bodies with moved nodes: least step", "value": "0.8"}
+    other = {"claim": "uncut_step", "number": "one cut element", "value": "1e-16"}
+    (found,) = [
+        own.found["step kept"] for own in answer(replace(made(), claims=[other, moved]))
+        if "step kept" in own.found
+    ]  # fmt: skip
+    assert found.text.endswith("; at least 0.80 on unstructured meshes.")
+
+
 def slower(evidence):
     rows = [{**row, "value": "0.5"} if row["solver"] == "xfem" and row["quantity"].endswith("step")
             else row for row in evidence.slivers]  # fmt: skip
@@ -184,10 +194,10 @@ def shifted(factor):
     ("motion", {"xfem": (0.7, 1.0)}, 1.0, "XFEM: in motion its error is 0.70"),
     ("motion", {"xfem": (1.1, 1.0)}, 1.0, "XFEM, which needs no new mesh"),
     ("motion", {"xfem": (2.6, 1.0)}, 1.0, "but in motion its error is 2.6 times"),
-    ("remeshed", {REMESHED: (0.7, 5.0)}, 1.0, "For accuracy: "),
-    ("remeshed", {REMESHED: (0.9, 5.0)}, 1.0, "Not for accuracy: "),
-    ("remeshed", {REMESHED: (1.4, 5.0)}, 1.5, "has even 1.4 times"),
-    ("remeshing time", {REMESHED: (1.0, 1.0)}, 1.0, "which decides nothing"),
+    ("remeshed", {REMESHED: (0.7, 5.0)}, 1.0, "Remesh for accuracy: "),
+    ("remeshed", {REMESHED: (0.9, 5.0)}, 1.0, "Remeshing gains no clear accuracy: "),
+    ("remeshed", {REMESHED: (1.4, 5.0)}, 1.5, "Remeshing loses accuracy"),
+    ("remeshing time", {REMESHED: (1.0, 1.0)}, 1.0, "too close to call"),
     ("remeshing time", {REMESHED: (1.0, 0.2)}, 1.0, "takes only 0.18 times"),
 ])  # fmt: skip
 def test_a_weighed_sentence_says_which_is_better(name, cases, positions, words):
@@ -203,7 +213,7 @@ def test_a_difference_that_positions_of_the_mesh_do_not_show_is_none():
     wide = [{**row, "value": str(float(row["value"]) * (2.0 if int(row["position"]) < 8 else 1.0))}
             if row["solver"] == REMESHED else row for row in made().positions]  # fmt: skip
     cases = changed({REMESHED: (0.7, 5.0)})
-    assert sentence.of(made(cases, positions=wide)).text.startswith("Not for accuracy: ")
+    assert sentence.of(made(cases, positions=wide)).text.startswith("Remeshing gains no clear")
     assert sentence.of(made(cases, positions=[])) is None
     # the protocol: the 90 % range excludes 1; without the study there is no claim
     lacking = {own.question: own.lacking for own in answer(made(positions=[]))}
@@ -256,6 +266,16 @@ def test_groups_share_a_row_and_refusals_and_failures_are_told_apart():
     assert of["XFEM"][0] == "2.2 [2.2, 2.2]"  # this scene's positions, and the next has none
     assert of["XFEM"][1] == "2.2"
     assert "kratos" not in of
+
+
+def test_who_answers_no_scene_is_named_with_the_reasons(tmp_path):
+    results = deepcopy(made().results)
+    for result in results[:2]:
+        result.solves.append(SolveRecord(result.case, "vbd", 0, Status.REFUSED, "springs only"))
+    write_benchmark(made(results), tmp_path)
+    page = (tmp_path / "index.md").read_text("utf-8")
+    assert "No row: vbd (springs only)." in page
+    assert page.count("No row") == 1
 
 
 def test_one_interval_over_the_best_is_no_loss():

@@ -7,7 +7,10 @@ import random
 import re
 import subprocess
 import sys
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -15,6 +18,7 @@ from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
 from verify.cli.run_text import verdict_lines
+from verify.report import rendering
 from verify.report.rendering import render
 from verify.report.run_directory import COLUMNS, load_run
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
@@ -271,3 +275,23 @@ def test_a_damaged_result_is_a_row_with_its_reason(root, content, reason):
     entry = load_run(root).entries[0]
     assert entry.result is None
     assert reason in entry.defect
+
+
+def test_cases_that_processes_draw_side_by_side_make_the_same_page(plain_run, monkeypatch):
+    alone = render(plain_run).read_bytes()
+    monkeypatch.setattr(rendering, "_FEWEST", 1)
+
+    def not_here(*arguments):
+        raise AssertionError("a case that another process draws was drawn here")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rendering, "case_view", not_here)
+        assert render(plain_run, jobs=2).read_bytes() == alone
+
+    def dying(draw, *rows):
+        yield draw(*next(zip(*rows, strict=True)))
+        raise BrokenProcessPool
+
+    pool = nullcontext(SimpleNamespace(map=dying))
+    monkeypatch.setattr(rendering, "ProcessPoolExecutor", lambda *_: pool)
+    assert render(plain_run, jobs=2).read_bytes() == alone

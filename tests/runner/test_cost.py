@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from verify.runner.cost import (
 from verify.runner.directory import RunDirectory
 from verify.runner.plan import late_levels, plan_case
 from verify.runner.selection import Options
+from verify.runner.work import Work
 from verify.scene import ToolPathCut
 from verify.solvers.body_of_scene import background_mesh
 
@@ -187,8 +189,10 @@ def test_levels_that_end_too_late_are_left_out_by_what_the_others_took(tmp_path)
         assert "--within asks for 20 s" in record.reason
     quick = [replace(one, wall=0.1 * one.wall) for one in records]
     assert not late_levels(plan, levels[1], quick, levels[2:])
+    assert not late_levels(plan, levels[0], [], levels)
     unasked = plan_case(SCENES[case], replace(asked, within=None), {}, RunDirectory(tmp_path))
-    assert not late_levels(unasked, levels[0], records[:1], levels[1:])
+    own = [unasked.job_of("reference", level) for level in range(3)]
+    assert not late_levels(unasked, own[0], records[:1], own[1:])
     stored = plan_case(SCENES[case], replace(asked, cache=tmp_path), {}, RunDirectory(tmp_path))
     assert stored.bundle is not None
     assert stored.within is None
@@ -219,3 +223,19 @@ def test_check_says_the_cost_and_warns_in_one_line_of_a_mesh_that_no_machine_hol
     assert main(["check", str(file)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert "warning: level 1 of xfem would take about 1.25e+04 GB" in line
+
+
+def test_a_reference_with_larger_elements_than_asked_says_so_and_no_other_solve_does(tmp_path):
+    case = "dynamics/block_falls_apart"
+    told = {}
+    for within in (1.0, 1e6):
+        options = Options(solvers=("uncut",), within=within)
+        plan = plan_case(SCENES[case], options, {}, RunDirectory(tmp_path))
+        work = SimpleNamespace(plans={case: plan}, options=options, memory=1e12)
+        for solver in ("uncut", "reference"):
+            record = solved(case, 0, *RECORDED[case][0])
+            Work._note_forecast(work, plan.job_of(solver, 0), record)
+            told[solver, within] = record.notes.get("within", "")
+        assert (plan.coarser > 1) == (within == 1.0)
+    assert "as large as the case asks: --within 1" in told.pop(("reference", 1.0))
+    assert not any(told.values())

@@ -140,6 +140,11 @@ def test_straight_blade_in_space_passes_by_the_tip_not_by_the_depth() -> None:
     second = tips[1] + share[:, None] * (tips[2] - tips[1]) + along[:, None] * blade
     np.testing.assert_allclose(path.passed_at(first), share, atol=1e-9)
     np.testing.assert_allclose(path.passed_at(second), 1 + 2 * share, atol=1e-9)
+    # past its end the blade would go on; before its start it is not
+    past = tips[1] + (1 + 0.3 * share[:, None]) * (tips[2] - tips[1]) + along[:, None] * blade
+    np.testing.assert_allclose(path.passed_at(past), 3 + 0.6 * share, atol=1e-9)
+    ahead = tips[0] - 0.3 * share[:, None] * (tips[1] - tips[0]) + along[:, None] * blade
+    np.testing.assert_allclose(path.passed_at(ahead), 0.0, atol=1e-9)
     assert path.whole().kind == "swept"
     np.testing.assert_allclose(path.whole().along, blade)
 

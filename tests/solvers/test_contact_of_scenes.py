@@ -1,9 +1,11 @@
 """Faces of cuts that touch, in every solver that offers contact."""
 
+import meshio
 import numpy as np
 import pytest
 import scenes
 
+import verify.xfem as xfem
 from verify.errors import UnsupportedSceneError
 from verify.solvers import find_solver
 
@@ -67,3 +69,57 @@ def test_slivers_that_follow_others_are_refused_by_name(slivers):
     scene, _ = pressed(2)
     with pytest.raises(UnsupportedSceneError, match="slivers = 'keep'"):
         find_solver("xfem").solve(scene, 0, slivers=slivers)
+
+
+AXES = np.array([[0.64, -0.48, 0.6], [0.6, 0.8, 0.0], [-0.48, 0.36, 0.8]])  # along, and two across
+PLACE, SPEED = np.array([0.3, 0.2, -0.1]), 1e-3
+
+
+def colliding(folder, n):
+    """Halves of a bar at an angle, of length and wave speed 1, that touch and fly at each other.
+
+    n is odd: the cut is in the middle of elements. Without lateral contraction nothing else moves.
+    """
+    mesh = xfem.box_mesh((n, 2, 2), (-1.0, 0.0, 0.0), (1.0, 0.3, 0.3))
+    meshio.Mesh(mesh.points @ AXES + PLACE, [("tetra", mesh.cells)]).write(folder / f"{n}.vtu")
+    ring = np.array([[0.0, y, z] for y, z in [(-1, -1), (2, -1), (2, 2), (-1, 2)]]) @ AXES + PLACE
+    impact = {"half_length": 1.0, "at": AXES[0] @ PLACE, "axis": AXES[0].tolist(), "speed": SPEED}
+    return scenes.scene(
+        [{"kind": "polygon", "points": ring.tolist()}], 3,
+        geometry={"kind": "file", "file": folder / f"{n}.vtu", "dimension": 3},
+        mesh={"pattern": "given"}, material=scenes.soft(3, poisson=0.0, density=1.0), supports=[],
+        analysis={"kind": "dynamic", "duration": 2.4, "outputs": 9, "time_step": 2.0 / n},
+        initial={"kind": "field", "displacement": "exact", "velocity": "exact"},
+        exact={"solution": "impact", "parameters": impact}, contact={"expected": "closed"},
+    )  # fmt: skip
+
+
+def momenta(found, kept):
+    """Linear and angular momentum (t, 3) of cells `kept` about `PLACE`; fields are linear."""
+    x, v = found.points[found.cells[kept]] - PLACE, found.velocity[:, found.cells[kept]]
+    sizes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6.0
+    moments = np.cross(x.sum(axis=1), v.sum(axis=2)) + np.cross(x, v).sum(axis=2)
+    return np.einsum("c,tcid->td", sizes / 4.0, v), np.einsum("c,tcd->td", sizes / 20.0, moments)
+
+
+@pytest.mark.parametrize("name, given", [("xfem", {"mass": "consistent"}), ("conforming", {})])
+def test_halves_of_an_inclined_bar_in_space_collide_as_d_alembert_has_it(name, given, tmp_path):
+    lost, unit = [], 0.09 * SPEED  # momentum of a half
+    for n in (15, 31):
+        found = find_solver(name).solve(colliding(tmp_path, n), 0, 0, **given)
+        energy = found.ledger["kinetic"] + found.ledger["strain"]
+        assert energy[0] == pytest.approx(unit * SPEED, rel=1e-12)
+        assert energy.max() <= energy[0] * (1.0 + 1e-10)
+        lost.append(1.0 - energy[-1] / energy[0])
+        upper = (found.points[found.cells].mean(axis=1) - PLACE) @ AXES[0] > 0.0
+        ours, theirs = momenta(found, upper), momenta(found, ~upper)
+        for own, other in zip(ours, theirs, strict=True):
+            assert np.abs(own + other).max() < 1e-9 * unit
+        along = ours[0] @ AXES[0] / unit
+        assert np.abs(ours[0] / unit - np.outer(along, AXES[0])).max() < 1e-9
+        # together for 2L/c under ρ c v; the force sets in and ends over an element
+        assert np.abs(along - np.clip(found.times - 1.0, -1.0, 1.0))[:-2].max() < 2.0 / n
+        # a front is as wide as (h/L)^(2/3), and half of it is behind
+        assert 0.0 <= 1.0 - along[-1] < 0.5 * (2.0 / n) ** (2.0 / 3.0)
+    assert lost[1] < 0.02  # as of contact/impact
+    assert lost[0] > 1.5 * lost[1] or lost[0] < 1e-12

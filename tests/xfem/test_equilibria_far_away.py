@@ -7,8 +7,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import verify.xfem as xfem
+from verify.xfem.arrays import SingularStiffnessError
 from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.statics import collapsed_cells
+from verify.xfem.statics import Newton, NotInEquilibriumError, collapsed_cells
 
 YOUNG = 1e4
 
@@ -134,3 +135,23 @@ def test_a_ghost_penalty_is_part_of_the_equilibrium() -> None:
     internal, _ = force.evaluate(far)
     assert np.abs(far).max() > 0.1
     assert np.abs(internal - 0.05 * load)[~fixed].max() < 1e-9 * np.abs(internal).max()
+
+
+def test_a_place_from_which_no_correction_leads_is_left_at_once(monkeypatch) -> None:
+    """It was solved for 60 times over, five tangents each."""
+    phantom = xfem.cut_mesh(xfem.rectangle_mesh((2, 2)), [])
+    fixed = phantom.node_points[:, :1] == [0.0, 0.0]
+    newton, tried = Newton(xfem.InternalForce(phantom, material(2)), fixed), []
+
+    def solve(place, change, rotational, least=0.0):
+        tried.append(rotational)
+        if change is None and rotational == 1.0:
+            raise SingularStiffnessError(None)
+        return np.zeros_like(place.displacement)
+
+    monkeypatch.setattr(newton, "_solve", solve)
+    monkeypatch.setattr(newton, "_share_downhill", lambda *_: 0.0)
+    still = np.zeros_like(phantom.node_points)
+    with pytest.raises(NotInEquilibriumError, match="where no correction lowers the potential"):
+        newton.solve(still, still, np.ones_like(still))
+    assert len(tried) <= 6

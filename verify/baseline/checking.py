@@ -168,9 +168,9 @@ def _speed_row(case: str, key: str, stored: Speed, result: CaseResult, cpu: str)
     solve = solve_at(result, key)
     if solve is None:
         return Row(case, key, "speed", Verdict.ERROR, None, stored.ratio, "was not run")
-    now = speed_of(solve)
-    if now.reason:
-        return Row(case, key, "speed", Verdict.UNDECIDED, None, stored.ratio, now.reason)
+    now = speed_of(solve, cpu, {})
+    if isinstance(now, str):
+        return Row(case, key, "speed", Verdict.UNDECIDED, None, stored.ratio, now)
     if stored.kernel != KERNEL:
         text = (
             f"stored in units of kernel {stored.kernel}, now kernel {KERNEL}: `update` it by name"

@@ -127,15 +127,6 @@ def write_baseline(baseline: Baseline, path: Path) -> None:
 _ROUND_OFF = 1e-10
 
 
-@dataclass(frozen=True)
-class MeasuredSpeed:
-    """Ratio to the calibration kernel with its relative half-width; or why there is none."""
-
-    ratio: float = 0.0
-    spread: float = 0.0
-    reason: str = ""
-
-
 def finest(result: CaseResult) -> list[SolveRecord]:
     """Return the finest level of each solver, solved or not."""
     return list(finest_of(result.solves).values())
@@ -209,35 +200,33 @@ def _independent(
     )
 
 
-def speed_of(solve: SolveRecord) -> MeasuredSpeed:
-    """Return the time of one solve, over all its phases, in units of the calibration kernel."""
+def speed_of(solve: SolveRecord, cpu: str, origin: dict[str, Any]) -> Speed | str:
+    """Return the time of one solve, over all its phases, in units of the calibration kernel.
+
+    Or why there is none.
+    """
     kernel = seconds_of_note(solve.notes.get("calibration", ""))
     if solve.status is not Status.SOLVED:
-        return MeasuredSpeed(reason=f"{solve.status}: {solve.reason}")
+        return f"{solve.status}: {solve.reason}"
     if kernel is None:
-        return MeasuredSpeed(reason="the calibration kernel was not timed beside it")
+        return "the calibration kernel was not timed beside it"
     own = {name: times for name, times in solve.timings.items() if name != HANDED_OVER}
     totals = repeated_totals(own)
     if not totals:
-        return MeasuredSpeed(reason="the solver gives no timings")
+        return "the solver gives no timings"
     if solve.notes.get("timing", "").startswith("contended"):
-        return MeasuredSpeed(reason=solve.notes["timing"])
+        return solve.notes["timing"]
     if len(totals) < 3:
-        return MeasuredSpeed(reason=f"{len(totals)} repetitions; a spread needs 3")
+        return f"{len(totals)} repetitions; a spread needs 3"
     if not median(totals) > 0.0:
-        return MeasuredSpeed(reason="its times are zero")
-    spread = _half_width(totals) + _half_width(kernel)
-    return MeasuredSpeed(median(totals) / median(kernel), spread)
+        return "its times are zero"
+    spread, ratio = _half_width(totals) + _half_width(kernel), median(totals) / median(kernel)
+    return Speed(ratio=ratio, spread=spread, kernel=KERNEL, cpu=cpu, **origin)
 
 
 def _half_width(seconds: list[float]) -> float:
     """Half the range over the median; a range, because the few values are no normal sample."""
     return 0.5 * (max(seconds) - min(seconds)) / median(seconds)
-
-
-def speed_entry(measured: MeasuredSpeed, cpu: str, origin: dict[str, Any]) -> Speed:
-    """Make the entry of a baseline."""
-    return Speed(ratio=measured.ratio, spread=measured.spread, kernel=KERNEL, cpu=cpu, **origin)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from verify.baseline.record import (
     physics_of,
     quantities_of,
     solve_at,
-    speed_entry,
     speed_of,
 )
 from verify.errors import InputError
@@ -141,11 +140,10 @@ def _speed_move(
     solve = solve_at(result, key)
     if solve is None:
         return entry, Move(case, name, entry.ratio, None, "refused", "was not run")
-    now = speed_of(solve)
-    if now.reason:
-        return entry, Move(case, name, entry.ratio, None, "refused", now.reason)
-    moved = speed_entry(now, cpu, run.origin)
-    moved = moved.model_copy(update={"slower_at_most": entry.slower_at_most})
+    now = speed_of(solve, cpu, run.origin)
+    if isinstance(now, str):
+        return entry, Move(case, name, entry.ratio, None, "refused", now)
+    moved = now.model_copy(update={"slower_at_most": entry.slower_at_most})
     return moved, Move(case, name, entry.ratio, now.ratio, "moved")
 
 
@@ -189,11 +187,11 @@ def save_run(baseline: Baseline, run: FinishedRun) -> tuple[Baseline, list[str]]
             if solve.status is not Status.SOLVED:
                 notes.append(f"{name}:{key}: left out, {solve.status}: {solve.reason}")
                 continue
-            measured = speed_of(solve)
-            if measured.reason:
-                notes.append(f"{name}:{key}: no speed, {measured.reason}")
+            speed = speed_of(solve, cpu, run.origin)
+            if isinstance(speed, str):
+                notes.append(f"{name}:{key}: no speed, {speed}")
             else:
-                speeds[key] = speed_entry(measured, cpu, run.origin)
+                speeds[key] = speed
         cases[name] = CaseBaseline(
             physics=physics,
             quantities={**quantities_of(result, run.origin), **known.quantities},

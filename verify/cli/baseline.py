@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from verify.cli.signatures import Actions, Arg, AsJson, Run
-from verify.cli.streams import said
+from verify.cli.streams import print_answer
 
 if TYPE_CHECKING:
     from verify.baseline import Baseline, Row
@@ -57,7 +57,7 @@ def save(run: Run, *, file: File = FILE, as_json: AsJson = False) -> int:
     answer = {"exit": code, "file": str(file), "added": added, "notes": notes}
     lines = [*notes, *_lines(bad)]
     lines.append(f"{file}: {added} values added, {_size(before)} kept as they were")
-    return said(as_json, {**answer, "rows": [asdict(row) for row in bad]}, lines, code)
+    return print_answer(as_json, {**answer, "rows": [asdict(row) for row in bad]}, lines, code)
 
 
 def check(
@@ -100,7 +100,7 @@ def check(
             "held against the last own value only"
         )
     answer = {"exit": code, "rows": [asdict(row) for row in rows]}
-    return said(as_json, answer, lines, code)
+    return print_answer(as_json, answer, lines, code)
 
 
 def update(
@@ -133,7 +133,7 @@ def update(
     rest = "" if only else "; name what shall move with --only CASE:METRIC"
     lines.append(f"{file}: {len(moved)} own values moved, no independent one{rest}")
     answer = {"exit": code, "file": str(file), "moved": len(moved)}
-    return said(as_json, {**answer, "moves": [asdict(move) for move in moves]}, lines, code)
+    return print_answer(as_json, {**answer, "moves": [asdict(move) for move in moves]}, lines, code)
 
 
 def _apart(*values: float | None) -> str:
@@ -179,7 +179,7 @@ def diff(
     found = ", ".join(f"{count} {direction}" for direction, count in counts.items())
     answer = {"exit": code, "old": old.origin, "new": new.origin, "meaning": meaning}
     answer["changes"] = [asdict(change) for change in changes]
-    return said(as_json, answer, [*lines, found or "no verdict changed"], code)
+    return print_answer(as_json, answer, [*lines, found or "no verdict changed"], code)
 
 
 def _size(baseline: "Baseline") -> int:

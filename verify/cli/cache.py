@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from verify.cli.signatures import Actions, Arg, AsJson
-from verify.cli.streams import said
+from verify.cli.streams import print_answer
 from verify.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def list_(*, as_json: AsJson = False) -> int:
     ]
     total = sum(row["bytes"] for row in rows) / 1e6
     lines.append(f"{len(rows)} references, {total:.1f} MB in {cache.root}")
-    return said(as_json, {"folder": str(cache.root), "entries": rows}, lines)
+    return print_answer(as_json, {"folder": str(cache.root), "entries": rows}, lines)
 
 
 def clear(cases: Annotated[Sequence[str], Arg("CASE")] = (), *, outdated: bool = False) -> int:

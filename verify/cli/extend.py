@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from verify.cli.signatures import Arg, Cases, Jobs, Out, Repetitions, Strict, Timeout
-from verify.cli.streams import command_line, said
+from verify.cli.streams import command_line, print_answer
 
 if TYPE_CHECKING:
     from verify.conformance import CheckResult
@@ -61,7 +61,7 @@ def export(
         f"answer in {folders}/level-<k>/solution.json and .vtu, then: "
         f"verify import {case} {out} --solver NAME --out RUN"
     )
-    return said(as_json, {"case": case, "files": names}, [*names, then])
+    return print_answer(as_json, {"case": case, "files": names}, [*names, then])
 
 
 def import_(
@@ -180,7 +180,7 @@ def conform(
         lines.append(f"{one.name:<{width}}  {one.state:<8} {_number(one):<19} {one.claim}")
         lines += [f"{'':<{width}}  {one.reason}"] if one.reason else []
     answer = {"solver": name, "parameters": given, "exit": code}
-    return said(as_json, {**answer, "checks": list(map(asdict, results))}, lines, code)
+    return print_answer(as_json, {**answer, "checks": list(map(asdict, results))}, lines, code)
 
 
 def _number(result: "CheckResult") -> str:

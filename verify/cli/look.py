@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from verify.cli.signatures import Arg, AsJson, Case, Matching, Run
-from verify.cli.streams import print_json, said
+from verify.cli.streams import print_answer, print_json
 from verify.errors import InputError
 from verify.printable import one_line
 
@@ -105,7 +105,8 @@ def describe(case: Case, *, as_json: Annotated[bool, Arg(flags=("--json",))] = F
     from verify.scene import load_scene
 
     scene = load_scene(case)
-    return said(as_json, scene.model_dump(mode="json", by_alias=True), [_description(scene)])
+    answer = scene.model_dump(mode="json", by_alias=True)
+    return print_answer(as_json, answer, [_description(scene)])
 
 
 def _description(scene: "Scene") -> str:
@@ -365,7 +366,7 @@ def paraview(
 
     files = export_fields(run, out or run / "paraview", solvers, level, reference)
     names = [str(file) for file in files]
-    return said(as_json, {"files": names}, names)
+    return print_answer(as_json, {"files": names}, names)
 
 
 def doctor(
@@ -398,7 +399,7 @@ def doctor(
         lines.append(f"{mark}  {finding.name:<{width}}  {finding.found}")
         if finding.cure and not finding.works:
             lines.append(f"         {'':<{width}}  → {finding.cure}")
-    return said(as_json, [finding.as_json() for finding in findings], lines, code)
+    return print_answer(as_json, [finding.as_json() for finding in findings], lines, code)
 
 
 def _compile(as_json: bool) -> int:
@@ -418,4 +419,4 @@ def _compile(as_json: bool) -> int:
     lines += [
         f"{seconds:7.1f}  {name}" for name, seconds in by_module.most_common() if seconds >= 0.05
     ]
-    return said(as_json, asdict(use), lines)
+    return print_answer(as_json, asdict(use), lines)

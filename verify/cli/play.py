@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from verify.cli.signatures import Arg, Case, positive
-from verify.cli.streams import said
+from verify.cli.streams import print_answer
 from verify.errors import InputError, UnsupportedSceneError
 
 _QUALITY = (
@@ -92,9 +92,9 @@ def play(
         file = str(stroke) if strokes else None
         made = f"strokes of the mouse: {strokes}, in {file}" if file else "no stroke was made"
         answer = {"case": scene.name, "time": time, "strokes": strokes, "stroke": file}
-        return said(as_json, answer, [f"{scene.name}: closed at t = {time:.2f} s; {made}"])
+        return print_answer(as_json, answer, [f"{scene.name}: closed at t = {time:.2f} s; {made}"])
     summary = _played(stage, scene, out, frames, zoom, records)
-    return said(as_json, summary, _words(summary))
+    return print_answer(as_json, summary, _words(summary))
 
 
 def _check_outputs(

@@ -3,9 +3,8 @@
 import contextlib
 import shlex
 import sys
-import tempfile
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -221,8 +220,7 @@ def _solved(
     from verify.cli.ranking import rank_run
     from verify.runner.run import run_cases
 
-    beside = not asked.no_report and options.jobs > 1 and len(scenes) > 1
-    with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:
+    with progress_on(sys.stderr, expected) as progress:
 
         def announce(text: str) -> None:
             progress.say(text)
@@ -230,7 +228,7 @@ def _solved(
 
         progress.doing("checking cases and solvers")
         try:
-            summary = run_cases(scenes, asked.out, options, progress, command_line(), drawings)
+            summary = run_cases(scenes, asked.out, options, progress, command_line())
         except RunStoppedError as stop:
             progress.close()
             print(
@@ -246,7 +244,7 @@ def _solved(
             return summary, None
         from verify.report.rendering import render
 
-        return summary, str(render(asked.out, drawings=drawings))
+        return summary, str(render(asked.out, jobs=options.jobs))
 
 
 def _answer(result: "CaseResult") -> dict[str, Any]:
@@ -260,16 +258,6 @@ def _answer(result: "CaseResult") -> dict[str, Any]:
             for s in result.solves
         ],
     }
-
-
-@contextlib.contextmanager
-def _drawings(beside: bool) -> Iterator[Path | None]:
-    """Give a folder for the cases that are drawn beside solves; None if none is."""
-    if not beside:
-        yield None
-        return
-    with tempfile.TemporaryDirectory(prefix="verify-") as folder:
-        yield Path(folder)
 
 
 def _load_report() -> None:

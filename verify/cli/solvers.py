@@ -15,7 +15,7 @@ fails; nothing of it is left then.
 from typing import Annotated, Any
 
 from verify.cli.signatures import Actions, Arg, AsJson
-from verify.cli.streams import said
+from verify.cli.streams import print_answer
 
 Name = Annotated[str, Arg("NAME", help="name of the solver")]
 
@@ -39,7 +39,7 @@ def list_(*, as_json: AsJson = False) -> int:
         if row["parameters"]:
             given = ", ".join(f"{key}={value}" for key, value in row["parameters"].items())
             lines.append(f"  --set {row['name']}.NAME=VALUE: {given}")
-    return said(as_json, rows, lines, ensure_ascii=False)
+    return print_answer(as_json, rows, lines, ensure_ascii=False)
 
 
 def install(name: Name, *, python: Annotated[str | None, Arg("PYTHON")] = None) -> int:

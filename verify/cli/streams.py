@@ -72,7 +72,7 @@ def print_json(content: Any, ensure_ascii: bool = True) -> None:
     print(json.dumps(content, indent=2, ensure_ascii=ensure_ascii))
 
 
-def said(
+def print_answer(
     as_json: bool, answer: Any, lines: Iterable[str], code: int = 0, ensure_ascii: bool = True
 ) -> int:
     """Print an answer as JSON, or as lines; return the exit code."""

@@ -25,7 +25,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from verify.cli.signatures import Actions, Arg, Case, Out, Repetitions, count, positive, seed
-from verify.cli.streams import command_line, said
+from verify.cli.streams import command_line, print_answer
 from verify.errors import InputError
 
 if TYPE_CHECKING:
@@ -370,7 +370,7 @@ def _written(kind: str, answer: Answer, study: "Callable[[Making], Study]") -> i
     ]
     findings = [asdict(one) for one in found.findings]
     content = {"record": str(written), "report": str(page), "findings": findings}
-    return said(answer.as_json, content, [*lines, f"report: {page}"])
+    return print_answer(answer.as_json, content, [*lines, f"report: {page}"])
 
 
 ACTIONS = Actions(

@@ -8,7 +8,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from verify.errors import InputError
 from verify.exchange.export import Answers
@@ -95,27 +94,18 @@ def _judged_scenes(
         own = ", ".join(sorted(filter(None, made))) or "none by its name"
         where = ", ".join(scene.name for scene in scenes)
         raise InputError(f"{where} makes no check of '{judged_as}'; it does of {own}")
-    return [_with_acceptance(scene, _renamed(scene, judged_as, names)) for scene in scenes]
+    return [_judged(scene, judged_as, names) for scene in scenes]
 
 
-def _renamed(scene: Scene, judged_as: str, names: Sequence[str]) -> list[Any]:
-    return [
-        one
+def _judged(scene: Scene, judged_as: str, names: Sequence[str]) -> Scene:
+    checks = [
+        check.model_copy(update={"solver": name})
         for check in scene.acceptance
-        for one in (
-            [check.model_copy(update={"solver": name}) for name in names]
-            if check.solver == judged_as
-            else [check]
-        )
+        for name in (names if check.solver == judged_as else [check.solver])
     ]
-
-
-def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
     changed = scene.model_copy(update={"acceptance": checks})
     known = [one for one in scene.known_findings if any(map(one.concerns, changed.checks))]
-    changed = changed.model_copy(update={"known_findings": known})
-    changed._name, changed._file, changed._row = scene.name, scene.file, scene.row
-    return changed
+    return changed.model_copy(update={"known_findings": known})
 
 
 def _store(scene: Scene, answers: Answers, name: str, directory: RunDirectory) -> None:

@@ -1,16 +1,13 @@
 """Cost: work against precision, and time at equal error."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from statistics import median
 
-import numpy as np
-
+from verify import result
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import Interval, error_interval
-from verify.result import CaseResult, SolveRecord, Status, repeated_totals
+from verify.result import CaseResult, SolveRecord, Status, Times, repeated_totals
 
 _SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
 
@@ -50,6 +47,11 @@ class WorkPoint:
     phases: dict[str, float]
     memory: float
 
+    @property
+    def times(self) -> Times:
+        """Median, least and most, s."""
+        return self.seconds, self.fastest, self.slowest
+
 
 def work_points(records: Sequence[SolveRecord], metric: str) -> list[WorkPoint]:
     """Take the work and the precision of every solve that has both; coarse to fine."""
@@ -86,25 +88,10 @@ def paid_times(record: SolveRecord) -> list[float]:
     return repeated_totals(record.paid)
 
 
-def time_at(points: Sequence[WorkPoint], error: float) -> tuple[float, float, float] | None:
-    """Return the time that `error` takes: median, least, most (s).
-
-    Interpolated between the levels, log against log; None if the levels of `points` (of one
-    solver) do not reach the error, and where they all stay below it, the time of the coarsest.
-    """
-    ordered = [p for p in sorted(points, key=lambda p: p.level) if p.error > 0]
-    if not ordered or min(p.error for p in ordered) > error * (1 + 1e-9):
-        return None
-    if ordered[0].error <= error:
-        first = ordered[0]
-        return first.seconds, first.fastest, first.slowest
-    for a, b in pairwise(ordered):
-        if b.error <= error * (1 + 1e-9):
-            share = math.log(a.error / error) / math.log(a.error / b.error)
-            times = np.log([[p.seconds, p.fastest, p.slowest] for p in (a, b)])
-            one, two, three = np.exp([1 - min(share, 1.0), min(share, 1.0)] @ times).tolist()
-            return one, two, three
-    return None
+def time_at(points: Sequence[WorkPoint], error: float) -> Times | None:
+    """Return the time that `error` takes: median, least, most (s); see `verify.result`."""
+    ordered = sorted(points, key=lambda p: p.level)
+    return result.time_at([(p.error, p.times) for p in ordered if p.error > 0], error)
 
 
 def pareto_front(points: Sequence[WorkPoint]) -> list[WorkPoint]:
@@ -134,23 +121,15 @@ def times_at_equal_error(
 ) -> tuple[Interval, Interval] | None:
     """Return the times of two solvers at the smallest error that both reach, s.
 
-    None where that error lies below the coarsest level of either: its time would be that of a mesh
-    nobody would choose. An error that cannot be told from none, by the reference or by round-off,
-    buys nothing.
+    An error that cannot be told from none, by the reference or by round-off, buys nothing.
     """
     both = [
-        [p for p in points if p.low > 0.0 and p.error > ROUND_OFF and p.seconds > 0.0]
+        [(p.error, p.times) for p in points
+         if p.low > 0.0 and p.error > ROUND_OFF and p.seconds > 0.0]
         for points in (one, other)
-    ]
-    if not all(both):
+    ]  # fmt: skip
+    if (found := result.times_at_equal_error(*both)) is None:
         return None
-    error = max(min(p.error for p in points) for points in both)
-    if any(max(p.error for p in points) * (1 + 1e-9) < error for points in both):
-        return None
-    found = []
-    for points in both:
-        if (times := time_at(points, error)) is None:
-            return None
-        # time_at interpolates each of the three by itself: they may cross by round-off
-        found.append(Interval(times[0], min(times), max(times)))
-    return found[0], found[1]
+    # each of the three is interpolated by itself: they may cross by round-off
+    first, second = (Interval(times[0], min(times), max(times)) for times in found)
+    return first, second

@@ -15,7 +15,15 @@ from typing import Any, NamedTuple
 
 from verify.report.curves import Curve, Point, error_curves
 from verify.report.notation import ROUND_OFF, number, solver_title
-from verify.result import CRITICAL_STEP, REFERENCE, CaseResult, SolveRecord, Status, finest_of
+from verify.result import (
+    CRITICAL_STEP,
+    REFERENCE,
+    CaseResult,
+    SolveRecord,
+    Status,
+    finest_of,
+    times_at_equal_error,
+)
 
 BASELINE = "conforming"
 _ERROR = "displacement_l2"
@@ -275,38 +283,15 @@ def _error_ratio(own: Curve, other: Curve) -> Ratio | None:
 
 
 def _time_ratio(own: Curve, other: Curve) -> Ratio | None:
-    """Time over time at the smallest error that both reach, between levels by a power law."""
-    reached = [[p for p in c.points if _resolved(p) and _seconds(p)] for c in (own, other)]
-    if not all(reached):
+    """Time over time at the smallest error that both reach."""
+    times = times_at_equal_error(*(
+        [(p.value, (d.median, d.low, d.high)) for p in c.points
+         if (d := p.duration) and _resolved(p) and _seconds(p)] for c in (own, other)
+    ))  # fmt: skip
+    if times is None:
         return None
-    target = max(min(p.value for p in points) for points in reached)
-    a, b = (_time_at(points, target) for points in reached)
-    if a is None or b is None:
-        return None
-    return Ratio(a.value / b.value, a.low / b.high, a.high / b.low)
-
-
-def _time_at(points: Sequence[Point], target: float) -> Ratio | None:
-    """Seconds to an error with their spread; None where even the coarsest level is below it."""
-    after = next((k for k, p in enumerate(points) if p.value <= target * (1 + 1e-12)), None)
-    if after is None or (after == 0 and points[0].value < target * (1 - 1e-12)):
-        return None
-    fine, coarse = points[after], points[max(after - 1, 0)]
-    share = 1.0
-    if coarse.value > fine.value:
-        share = math.log(coarse.value / target) / math.log(coarse.value / fine.value)
-
-    def between(which: int) -> float:
-        a, b = _span(coarse)[which], _span(fine)[which]
-        return a ** (1.0 - share) * b**share
-
-    return Ratio(between(0), between(1), between(2))
-
-
-def _span(point: Point) -> Ratio:
-    time = point.duration
-    assert time is not None
-    return Ratio(time.median, time.low, time.high)
+    (value, low, high), (beside, least, most) = times
+    return Ratio(value / beside, low / most, high / least)
 
 
 def _seconds(point: Point) -> float:

@@ -48,7 +48,7 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     lines = [
         "# Benchmark: the table of the whole", "",
         "[Scenes, to set up from one page each](../../benchmark/index.md)", "",
-        *whole_table(evidence), "", _LEGEND, "",
+        *whole_table(evidence), "", " ".join([_LEGEND, *_without_row(evidence)]), "",
         "## Time against error", "",
         "Wall time of what each cut costs anew, from the coarsest level to the finest; lower left "
         "is better. C5 and C8 show the middle of their members. Grey: the other discretisations.",
@@ -67,6 +67,17 @@ def discretisations(evidence: Evidence) -> list[list[str]]:
     answered = {s.solver for r in evidence.results for s in r.solves if s.metrics}
     rows = [groups.get(name, [name]) for name in evidence.solvers if name not in confirming]
     return [row for row in rows if answered.intersection(row)]
+
+
+def _without_row(evidence: Evidence) -> list[str]:
+    """Name the solvers that were asked and have no answer, with their reasons."""
+    answered = {name for row in discretisations(evidence) for name in row}
+    reasons: dict[str, dict[str, None]] = {}
+    for result in evidence.results:
+        for solve in result.solves:
+            if solve.solver not in {*answered, REFERENCE}:
+                reasons.setdefault(solve.solver, {})[solve.reason] = None
+    return [f"No row: {solver_title(name)} ({' · '.join(own)})." for name, own in reasons.items()]
 
 
 def title_of(group: Sequence[str]) -> str:

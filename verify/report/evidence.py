@@ -38,7 +38,7 @@ class Evidence:
         Programs that are one discretisation.
     coverage : dict of str to dict
         As in `verify.result.Ranking`.
-    positions, slivers, speed : list of dict
+    positions, slivers, claims, speed : list of dict
         Rows of their tables; empty if there are none.
     hand : dict
         Steps of the real-time engine in the thesis study; empty if there are none.
@@ -54,6 +54,7 @@ class Evidence:
     coverage: Mapping[str, Mapping[str, Sequence[int]]] = field(default_factory=dict)
     positions: list[Row] = field(default_factory=list)
     slivers: list[Row] = field(default_factory=list)
+    claims: list[Row] = field(default_factory=list)
     speed: list[Row] = field(default_factory=list)
     hand: dict[str, Any] = field(default_factory=dict)
     commands: dict[str, str] = field(default_factory=dict)
@@ -106,7 +107,8 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
     positions = table("positions", "positions.csv")
     return Evidence(
         results=list(results.values()), positions=positions,
-        slivers=table("slivers", "slivers.csv"), speed=_rows(published / "speed.csv"),
+        slivers=table("slivers", "slivers.csv"), claims=table("claims", "claims.csv"),
+        speed=_rows(published / "speed.csv"),
         hand=dict(thesis.get("hand") or {}),
         commands=commands, tips=_with_tips({row["scene"] for row in positions}),
     )  # fmt: skip

@@ -1,9 +1,5 @@
 """Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``.
 
-Cases may have been drawn before, beside the solves of other cases: `main` does so. Each question in
-its folder names a run directory, the folder of a case in it, and the file to write. Only the
-process that asked reads the file.
-
 The page has three forms: HTML, escaped by Jinja2, Markdown, escaped by `in_markdown`, and PDF,
 which a browser without a window prints. All read the same view data and the same page; only the
 macros of ``blocks`` differ.
@@ -11,28 +7,28 @@ macros of ``blocks`` differ.
 
 import base64
 import io
-import pickle
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
+from multiprocessing import get_context
 from pathlib import Path
-from time import sleep
-from typing import Any, NoReturn
+from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
 from verify.errors import InputError
-from verify.files import read_json, whole_file, write_json, write_whole
+from verify.files import whole_file, write_json, write_whole
 from verify.printable import words_of
-from verify.processes import die_with_parent
 from verify.report import notation
 from verify.report import run_directory as directories
 from verify.report.bodies import draw
@@ -219,7 +215,7 @@ def load() -> None:
     load_templates("html", "report.j2")
 
 
-def render(directory: Path, form: str = "html", drawings: Path | None = None) -> Path:
+def render(directory: Path, form: str = "html", jobs: int = 1) -> Path:
     """Write the report of the run in `directory`, finished or not, into it.
 
     Each file is replaced in one step. The same directory gives the same bytes again, pictures
@@ -232,9 +228,8 @@ def render(directory: Path, form: str = "html", drawings: Path | None = None) ->
         Markdown has its pictures beside it. The page and the files for programs are written with
         it and with PDF. A summary is Markdown without the cases: the verdicts, the rankings, where
         they come from; with it comes the CSV file alone.
-    drawings : Path, optional
-        Folder in which `verify.report.rendering` has left cases of this run. Its files are
-        trusted: the caller made the folder.
+    jobs : int
+        Processes that draw cases side by side.
 
     Returns
     -------
@@ -251,19 +246,17 @@ def render(directory: Path, form: str = "html", drawings: Path | None = None) ->
     run = load_run(directory)
     if form == "summary":
         return _summary(run, directory)
-    page, view = _written(run, directory, drawings)
+    page, view = _written(run, directory, jobs)
     if form == "markdown":
         page = directory / "report.md"
         write_whole(page, as_markdown("report.j2", directory, **view))
     return print_page(page) if form == "pdf" else page
 
 
-def _written(run: Run, directory: Path, drawings: Path | None) -> tuple[Path, dict[str, Any]]:
+def _written(run: Run, directory: Path, jobs: int) -> tuple[Path, dict[str, Any]]:
     """Write the page and the exports; return the page and what it shows."""
-    palette, cases = run_palette(run.record), []
-    for index, entry in enumerate(run.entries):
-        made = drawn_before(drawings / f"{entry.folder.name}.pickle", palette) if drawings else None
-        cases.append((made or drawn_case(run.root, index, entry, palette))[0])
+    palette = run_palette(run.record)
+    cases = _drawn_cases(run, palette, jobs)
     pictures = [case.pictures for case in cases]
     notes: list[str] = []
 
@@ -317,27 +310,23 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
     return f"{', '.join(said)} to keep the page below {_PAGE_BYTES / 1e6:.3g} MB."
 
 
-_LOOK_SECONDS = 0.02
+_FEWEST = 4  # cases for each process: loading what draws takes as long as drawing two or three
 
 
-# a case as the page shows it, and the styles that its figures give labels
-Drawn = tuple[CaseView, dict[str, Style]]
-
-
-def main(folder: Path) -> NoReturn:
-    """Draw each case that a question in `folder` names, and remove the question."""
-    die_with_parent()
-    while True:
-        for question in sorted(folder.glob("*.json")):
-            asked = read_json(question)
-            root = Path(asked["root"])
-            palette = run_palette(directories.load_record(root)[0])
-            drawn = drawn_case(
-                root, asked["index"], directories.load_entry(root / asked["folder"]), palette
-            )
-            write_whole(Path(asked["target"]), pickle.dumps(drawn))
-            question.unlink()
-        sleep(_LOOK_SECONDS)
+def _drawn_cases(run: Run, palette: Palette, jobs: int) -> list[CaseView]:
+    """Draw the cases of a run, side by side where they are many."""
+    asked = [(run.root, index, entry, palette) for index, entry in enumerate(run.entries)]
+    made: list[CaseView] = []
+    if (jobs := min(jobs, len(asked) // _FEWEST)) > 1:
+        with (
+            suppress(BrokenProcessPool),  # the rest is drawn here
+            ProcessPoolExecutor(jobs, get_context("spawn")) as pool,
+        ):
+            for view, styles in pool.map(drawn_case, *zip(*asked, strict=True)):
+                if any(palette[label] != style for label, style in styles.items()):
+                    break  # it named a curve as another process named another
+                made.append(view)
+    return made + [drawn_case(*one)[0] for one in asked[len(made) :]]
 
 
 def run_palette(record: Mapping[str, Any]) -> Palette:
@@ -347,8 +336,13 @@ def run_palette(record: Mapping[str, Any]) -> Palette:
     return Palette.of(solver_title(name) for name in names)
 
 
-def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Drawn:
-    """Draw case number `index` of a run; if its pictures fail, nothing else of it does."""
+def drawn_case(
+    root: Path, index: int, entry: CaseEntry, palette: Palette
+) -> tuple[CaseView, dict[str, Style]]:
+    """Draw case number `index` of a run; return it with the styles that its figures give labels.
+
+    If its pictures fail, nothing else of it does.
+    """
     try:
         pictures = case_pictures(root, entry)
         for picture in pictures.all:
@@ -356,17 +350,3 @@ def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Dr
     except Exception as error:
         pictures = CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
     return case_view(index, entry, pictures, palette), dict(palette)
-
-
-def drawn_before(file: Path, palette: Palette) -> Drawn | None:
-    """Return what `main` wrote into `file`, if the figures would have the same styles now."""
-    try:
-        drawn: Drawn = pickle.loads(file.read_bytes())  # our own, in a folder of this process
-    except (OSError, EOFError, pickle.UnpicklingError):
-        return None
-    same = all(palette[label] == style for label, style in drawn[1].items())
-    return drawn if same else None
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))

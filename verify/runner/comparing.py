@@ -1,13 +1,10 @@
-"""Comparison and drawings of a finished case.
+"""Comparison of a finished case.
 
-A comparison runs in a process of its own and says which solve it is at. If it dies there, that
-solve is taken out, with the reason, and the others are compared again: a fault of the comparison
-costs one solve its verdicts, and no other. One process draws all judged cases, one after the other:
-what draws takes longer to import than most cases to be drawn.
+It runs in a process of its own and says which solve it is at. If it dies there, that solve is taken
+out, with the reason, and the others are compared again: a fault of the comparison costs one solve
+its verdicts, and no other.
 """
 
-import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +13,7 @@ from verify.files import read_json, write_json
 from verify.judge.checks import result_without_verdicts
 from verify.result import COMPARISON_FAILED, CaseResult, read_result
 from verify.runner.child import Child, Ending, death
-from verify.runner.directory import JUDGING, RunDirectory, load_record
+from verify.runner.directory import JUDGING, load_record
 from verify.scene import Scene
 
 LEAST_SECONDS = 60.0
@@ -98,72 +95,3 @@ def stored_result(folder: Path, key: str) -> CaseResult | None:
 def comparison_label(case: str) -> str:
     """Return what `Progress` is told of the comparison of a case."""
     return f"{case} · comparison"
-
-
-class Drawings:
-    """Cases that wait to be drawn, and the one that is being drawn.
-
-    The report draws cases that failed here, or says why they cannot be drawn.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        Where the drawings go; without it nothing is drawn.
-    cases : sequence of str
-        All of the run, in the order of the report.
-    directory : RunDirectory
-    timeout, memory : float
-        Limits of one drawing, s and bytes.
-    """
-
-    def __init__(
-        self, folder: Path | None, cases: Sequence[str], directory: RunDirectory, *limits: float
-    ) -> None:
-        self._folder, self._cases, self._directory = folder, list(cases), directory
-        self._timeout, self._memory = max(limits[0], LEAST_SECONDS), limits[1]
-        self.waiting: list[str] = []
-        self.running: list[Path] = []  # the question that is being answered
-        self._child: Child | None = None
-
-    def prepare(self) -> None:
-        """Have the process that draws load what it needs."""
-        if self._folder is not None and self._child is None:
-            places = self._folder, self._folder / "log.txt", self._timeout, self._memory
-            self._child = Child("verify.report.rendering", *places, own=True)
-
-    def ask(self, case: str) -> None:
-        """Have a judged case drawn when there is room."""
-        if self._folder is not None:
-            self.waiting.append(case)
-
-    def start(self) -> None:
-        """Begin the one that waits longest."""
-        self.prepare()
-        assert self._folder is not None
-        assert self._child is not None
-        case = self.waiting.pop(0)
-        folder = self._directory.case_folder(case)
-        question = {
-            "root": str(self._directory.root.resolve()),
-            "index": self._cases.index(case),
-            "folder": str(folder.relative_to(self._directory.root)),
-            "target": str(self._folder / f"{folder.name}.pickle"),
-        }
-        self.running = [self._folder / f"{folder.name}.json"]
-        self._child.timeout = time.monotonic() - self._child.start + self._timeout
-        write_json(question, self.running[0])
-
-    def poll(self) -> None:
-        """Forget a case that is drawn, or that has ended the process that draws."""
-        if self._child is not None and self._child.poll() is not None:
-            self._child = None
-            for question in self.running:
-                question.unlink(missing_ok=True)
-        self.running = [question for question in self.running if question.exists()]
-        if self._child is not None and not self.running:
-            self._child.timeout = float("inf")  # it waits for us
-
-    def kill(self) -> None:
-        """End it."""
-        if self._child is not None:
-            self._child.kill()

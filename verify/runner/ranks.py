@@ -16,6 +16,11 @@ from verify.files import write_json
 from verify.processes import die_with_parent, under_a_launcher
 
 RANKS_VARIABLE = "VERIFY_RANKS"
+#: The ranks stay on this machine, whatever a batch system would have mpiexec do. One that waits
+#: sleeps: where others want its core, each message of MPICH takes a time slice of theirs else.
+AT_HOME = {
+    "HYDRA_RMK": "user", "HYDRA_LAUNCHER": "fork", "MPIR_CVAR_CH4_PROGRESS_THROTTLE": "1",
+}  # fmt: skip
 _WAIT_SECONDS = 2.0
 
 
@@ -38,8 +43,7 @@ def main(count: int, module: str, argument: str) -> NoReturn:
     """Become mpiexec."""
     die_with_parent()  # holds after exec
     under_a_launcher()
-    # the ranks stay on this machine, whatever a batch system would have mpiexec do
-    here = {"HYDRA_RMK": "user", "HYDRA_LAUNCHER": "fork", RANKS_VARIABLE: str(count)}
+    here = {**AT_HOME, RANKS_VARIABLE: str(count)}
     flags = ["-P", "-X", "faulthandler", "-m", module, argument]
     command = [mpiexec(), "-n", str(count), sys.executable, *flags]
     os.execve(command[0], command, {**os.environ, **here})

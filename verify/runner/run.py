@@ -85,7 +85,6 @@ def run_cases(
     options: Options,
     progress: Progress,
     command: str = "",
-    drawings: Path | None = None,
     before: Callable[[RunDirectory], None] | None = None,
 ) -> RunSummary:
     """Solve, compare and judge `scenes` into the directory `out`; resume a run that is there.
@@ -100,8 +99,6 @@ def run_cases(
     progress : Progress
     command : str
         The command line, for the record.
-    drawings : Path, optional
-        Folder into which each case is drawn for the report as soon as it is judged.
     before : callable, optional
         Puts answers of ``options.imported`` into the run directory.
 
@@ -157,7 +154,7 @@ def run_cases(
             if before is not None:
                 before(directory)
             plans = [plan_case(scene, options, loaded, directory, bundle) for scene in scenes]
-            work = Work(plans, directory, options, origin, progress, bundle, cluster, drawings)
+            work = Work(plans, directory, options, origin, progress, bundle, cluster)
             results = work.until_done(stop.check)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)

@@ -1,4 +1,4 @@
-"""Work of a run: solves, comparisons and drawings that wait, run or are done."""
+"""Work of a run: solves and comparisons that wait, run or are done."""
 
 import os
 from bisect import insort
@@ -14,7 +14,7 @@ from verify.printable import one_line
 from verify.processes import memory_limit
 from verify.result import FORECAST, LOG, CaseResult, SolveRecord, Status, write_result
 from verify.runner.child import POLL_SECONDS, Child, Ending, death
-from verify.runner.comparing import Comparison, Drawings, comparison_label, stored_result
+from verify.runner.comparing import Comparison, comparison_label, stored_result
 from verify.runner.cost import forecast_text
 from verify.runner.directory import (
     LEVELS,
@@ -126,7 +126,6 @@ class Work:
         progress: Progress,
         bundle: ReferenceBundle | None,
         cluster: ClusterEngine | None,
-        drawings: Path | None,
     ) -> None:
         cache = ReferenceCache(options.cache) if options.cache else None
         self.references: ReferenceBundle | ReferenceCache | None = bundle or cache
@@ -146,8 +145,6 @@ class Work:
         self.again: set[Path] = set()
         side_by_side = max(1, min(options.jobs, sum(plan.count for plan in plans)))
         self.memory = memory_limit(options.memory, side_by_side)
-        limits = options.timeout, self.memory
-        self.drawings = Drawings(drawings, list(self.plans), directory, *limits)
         self.cluster = cluster
 
     def until_done(self, check: Callable[[], None]) -> list[CaseResult]:
@@ -168,7 +165,6 @@ class Work:
                     if (result := comparison.poll()) is not None:
                         self.comparing.remove(comparison)
                         self._case_done(result)
-                self.drawings.poll()
                 sleep(POLL_SECONDS)
             check()  # asked while the last of it ended
         finally:
@@ -176,7 +172,6 @@ class Work:
                 solve.kill()
             for comparison in self.comparing:
                 comparison.kill()
-            self.drawings.kill()
             if self.cluster is not None:
                 self.cluster.close()
         return [self.results[name] for name in self.plans]
@@ -194,8 +189,7 @@ class Work:
         return any(job.case == case for job in (*self.waiting, *self.running.values()))
 
     def _unfinished(self) -> bool:
-        todo = (self.waiting, self.to_judge, self.drawings.waiting)
-        return any((*todo, self.running, self.comparing, self.drawings.running))
+        return any((self.waiting, self.to_judge, self.running, self.comparing))
 
     def _has_room(self) -> bool:
         """Whether something can be started: solves run where the engine is, all else here."""
@@ -206,12 +200,12 @@ class Work:
         return bool(self.waiting) and self._here() < self.options.jobs
 
     def _has_room_here(self) -> bool:
-        return bool(self.to_judge or self.drawings.waiting) and self._here() < self.options.jobs
+        return bool(self.to_judge) and self._here() < self.options.jobs
 
     def _here(self) -> int:
         """Count the processes that run here."""
         solves = 0 if self.options.cluster else len(self.running)
-        return solves + len(self.comparing) + len(self.drawings.running)
+        return solves + len(self.comparing)
 
     def _prepare(self, plan: CasePlan) -> None:
         folder = self.directory.case_folder(plan.scene.name)
@@ -223,10 +217,7 @@ class Work:
 
     def _start(self) -> None:
         if self._has_room_here():
-            if self.to_judge:
-                self._judge(self.to_judge.pop(0))
-            else:
-                self.drawings.start()
+            self._judge(self.to_judge.pop(0))
             return
         job = self.waiting.pop(0)
         if (record := stored_record(job)) is not None:
@@ -387,7 +378,6 @@ class Work:
         if (result := stored_result(folder, key)) is not None:
             self._case_done(result)
             return
-        self.drawings.prepare()
         models = {
             model: [self._relative(one.folder) for one in plan.models if one.model == model]
             for model in plan.other_scenes
@@ -415,4 +405,3 @@ class Work:
                 write_result(done, folder / "result.json")
             self.results[done.case] = done
             self.progress.judged(done)
-            self.drawings.ask(done.case)

@@ -213,16 +213,19 @@ class ToolPathCut(CutShape):
     def passed_at(self, points: Array) -> Array:
         """Give the times (n,) in s at which the blade is first at points (n, d) of the cut, in m.
 
-        A point off the cut has the time of the nearest place that the search finds on it.
+        A point off the cut has the time of the nearest place that the search finds on it; one past
+        the end the time at which the blade would be there, if it went on.
         """
         tips, moments, blades = self._tips(), self.moments, self._blades()
         points = np.asarray(points, dtype=float)
         nearest = np.full(len(points), np.inf)
         times = np.full(len(points), np.inf)
-        for k in range(len(tips) - 1):
-            if not (tips[k] != tips[k + 1]).any() and not (blades[k] != blades[k + 1]).any():
-                continue
-            share, distance = _place_in_patch(points, tips[k : k + 2], blades[k : k + 2])
+        still = np.all(tips[1:] == tips[:-1], axis=1) & np.all(blades[1:] == blades[:-1], axis=1)
+        moves = np.flatnonzero(~still)
+        for k in moves:
+            share, distance, beyond = _place_in_patch(points, tips[k : k + 2], blades[k : k + 2])
+            if k == moves[-1]:
+                share += beyond
             closer = distance < nearest - _SAME * np.linalg.norm(np.ptp(tips, axis=0))
             nearest = np.where(closer, distance, nearest)
             reached = moments[k] + share * (moments[k + 1] - moments[k])
@@ -240,10 +243,11 @@ class ToolPathCut(CutShape):
         return np.array(self.direction, dtype=float).reshape(-1, 3)
 
 
-def _place_in_patch(points: Array, tips: Array, blades: Array) -> tuple[Array, Array]:
+def _place_in_patch(points: Array, tips: Array, blades: Array) -> tuple[Array, Array, Array]:
     """Share (n,) of a move at which the blade is nearest to points, and its distance (n,) then.
 
-    The move sweeps tip(s) + r · blade(s), both linear in s, with s and r from 0 to 1.
+    The move sweeps tip(s) + r · blade(s), both linear in s, with s and r from 0 to 1. The third is
+    by how much s would be above 1 (n,), at most 1.
     """
     tip, move = tips[0], tips[1] - tips[0]
     blade, turn = blades[0], blades[1] - blades[0]
@@ -259,9 +263,10 @@ def _place_in_patch(points: Array, tips: Array, blades: Array) -> tuple[Array, A
         s_new = s + np.where(flat, f / np.where(a > 0.0, a, 1.0), (c * f - b * g) / determinant)
         r_new = r + np.where(flat, 0.0, (a * g - b * f) / determinant)
         s, r = np.clip(s_new, -1.0, 2.0), np.clip(r_new, -1.0, 2.0)
+    beyond = np.maximum(s - 1.0, 0.0)
     s, r = np.clip(s, 0.0, 1.0), np.clip(r, 0.0, 1.0)
     place = tip + s[:, None] * move + r[:, None] * (blade + s[:, None] * turn)
-    return s, np.linalg.norm(points - place, axis=1)
+    return s, np.linalg.norm(points - place, axis=1), beyond
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -87,12 +87,7 @@ class View:
     underlay: Underlay | None = None
 
 
-def view_of(
-    frames: Sequence[Frame],
-    towards: Sequence[float] | None = None,
-    skin: float | None = None,
-    zoom: float = 1.0,
-) -> View:
+def view_of(frames: Sequence[Frame], skin: float | None = None, zoom: float = 1.0) -> View:
     """Choose a view that holds the first and the last frame.
 
     Below a `skin` (`Stage.skin`) its first frame is drawn as what lies under it. With `zoom` above
@@ -104,8 +99,7 @@ def view_of(
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high[2] == low[2]
     sheet = high[2] - low[2] < _SHEET * (high[:2] - low[:2]).min()
-    usual = (0.0, 0.0, 1.0) if flat else (0.25, -0.45, 1.0) if sheet else (0.6, -0.9, 0.7)
-    eye = np.array(towards if towards is not None else usual)
+    eye = np.array((0, 0, 1.0) if flat else (0.25, -0.45, 1.0) if sheet else (0.6, -0.9, 0.7))
     up = np.array([0.0, 1.0, 0.0]) if abs(eye[2]) >= 0.5 * np.linalg.norm(eye) else np.eye(3)[2]
     centre, width = 0.5 * (low + high), float(np.linalg.norm(high - low)) / zoom
     held = frames[-1].hooks or frames[-1].blades

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from verify.simulator.point_numbers import GrowingArray, distinct, of_lists
-from verify.xfem.arrays import Bools, Floats, Ints, Sides
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, XfemError
 from verify.xfem.clip import Partition
 from verify.xfem.mesh import SimplexMesh, connected
 
@@ -254,17 +254,6 @@ class Slots(NamedTuple):
     home: Bools
 
 
-class Renumbered(NamedTuple):
-    """Dof node of each group at touched nodes (-1: of others); sources of new ones; a conflict.
-
-    The conflict is a piece whose slot descends from another dof node than its group, or -1.
-    """
-
-    number: Ints
-    source: Ints
-    conflict: int
-
-
 def slots_before(division: Division, local: Ints, first_piece: Ints) -> Slots:
     """Find what the slots of a patch are before its dof nodes are numbered anew.
 
@@ -290,11 +279,17 @@ def slots_before(division: Division, local: Ints, first_piece: Ints) -> Slots:
 
 def number_groups(
     slots: Slots, group: Ints, piece_cells: Ints, mesh_nodes: int, count: int
-) -> Renumbered:
+) -> tuple[Ints, Ints]:
     """Give every group (p, d + 1) of slots its dof node, new ones from `count` on.
 
     A group keeps the dof node from which it descends. If several descend from one, the group in
     which the node lies keeps it, else the first. The others get new numbers, with it as source.
+    Returns the dof node of each group at touched nodes (-1: of others), and the sources.
+
+    Raises
+    ------
+    XfemError
+        If a slot descends from another dof node than its group.
     """
     piece, corner = np.nonzero(slots.solid[:, None] & slots.touched)
     mine, before = group[piece, corner], piece_cells[slots.old[piece], corner]
@@ -303,7 +298,8 @@ def number_groups(
     ancestor[mine] = before
     conflicts = piece[ancestor[mine] != before]
     if len(conflicts):
-        return Renumbered(ancestor, ancestor[:0], int(conflicts[0]))
+        cell = slots.cell[conflicts[0]]
+        raise XfemError(f"a cut would join parts of cell {cell} that are separate")
     away[mine[slots.home[piece, corner] & (before < mesh_nodes)]] = False
     known = np.flatnonzero(ancestor >= 0)
     known = known[np.lexsort((known, away[known], ancestor[known]))]
@@ -313,4 +309,4 @@ def number_groups(
     parted = parted[np.lexsort((parted, ancestor[parted]))]
     number = ancestor.copy()
     number[parted] = count + np.arange(len(parted))
-    return Renumbered(number, ancestor[parted], -1)
+    return number, ancestor[parted]

@@ -4,16 +4,11 @@ Each vertex belongs to the piece that contains it. A facet is split where the cu
 through, that is where the elements on both its edges are split; which vertices are doubled follows
 from the pieces, so the surface opens where the material does, and nowhere else. Only facets near
 elements that a cut touched are looked at again (thesis 3.2.4, 4.4.2).
-
-`verify.xfem.pieces` divides facets by any number of cuts. For the one that is under way it is done
-here: at a step a blade meets a hundred facets, and with so few only the number of calls costs.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from verify.simulator.division import MeshPatch
@@ -22,7 +17,6 @@ from verify.simulator.moving_surface import MovingSurface
 from verify.simulator.places import MaterialPlaces
 from verify.simulator.point_numbers import (
     EdgePoints,
-    FoundPoints,
     PointNumbers,
     distinct,
     of_lists,
@@ -34,125 +28,6 @@ from verify.xfem.pieces import ROUND_OFF, split_cells
 
 _INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is looked up
 _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
-
-
-class DividedFacets(NamedTuple):
-    """Parts of triangles.
-
-    Attributes
-    ----------
-    ends, positions : (z, 2) int and (z, 3) float arrays
-        Of the new points: the edge on which each lies, that above the cut first, and where it is.
-    ids, at : (q, 3) int and (q, 3, 3) float arrays
-        Corners of the parts, in the direction of their facet, and their coordinates in it. New
-        points count from the number of those given on.
-    source, side : (q,) arrays
-        Facet of each part, ascending, and its side of the cut; 0 if the facet is not divided.
-    """
-
-    ends: Ints
-    positions: Floats
-    ids: Ints
-    at: Floats
-    source: Ints
-    side: Sides
-
-
-def divide_facets(
-    facets: Ints, values: Floats, points: Floats, is_cut: Callable[[Floats], Bools]
-) -> DividedFacets:
-    """Divide triangles by a cut where both places in which it crosses their edges are split.
-
-    Parameters
-    ----------
-    facets : (f, 3) int array
-        Places of their corners in `points`.
-    values : (n,) float array
-        Level set at the points, exactly zero within round-off.
-    points : (n, 3) float array
-    is_cut : callable
-        Whether the body is split at places (z, 3).
-    """
-    above = values[facets] >= 0.0
-    crossed = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-    # the corner alone on its side comes first, then the others in the direction of the facet
-    sides = above[crossed]
-    alone = np.argmax(sides == (sides.sum(axis=1) == 1)[:, None], axis=1)
-    turn = (alone[:, None] + np.arange(3)) % 3
-    corners = facets[crossed[:, None], turn]
-    positive = sides[np.arange(len(alone)), alone]
-    # the points on the edges from that corner to both others, each edge once
-    other, first = corners[:, 1:].ravel(), np.repeat(corners[:, 0], 2)
-    up = np.repeat(positive, 2)
-    edge = np.where(up, first, other) << 32 | np.where(up, other, first)
-    edges, point = np.unique(edge, return_inverse=True)
-    ends = np.stack([edges >> 32, edges & 0xFFFFFFFF], axis=1)
-    high, low = values[ends].T
-    share = np.stack([-low / (high - low), high / (high - low)], axis=1)
-    places = np.einsum("ze,zei->zi", share, points[ends])
-    # where the level set is zero at an end, the point is that end
-    new = share[:, 1] > 0.0
-    number = np.where(new, len(points) + np.cumsum(new) - 1, ends[:, 0])
-    point = point.reshape(-1, 2)
-    is_through = is_cut(places)[point].all(axis=1)
-    row = np.full(len(facets), -1)
-    row[crossed[is_through]] = np.flatnonzero(is_through)
-    parts = _divided(facets, row, alone, positive, number[point], share[point])
-    return DividedFacets(ends[new], places[new], *parts)
-
-
-@njit(cache=True)
-def _divided(facets, row, alone, positive, points, shares):
-    """Write the parts of facets: corners, their coordinates, facet, side of the cut.
-
-    `row` (f,) is the row of a divided facet in the other arrays. They are: its corner alone on its
-    side; whether the corner is above the cut; the two points (r, 2) on the edges from it; and the
-    shares (r, 2, 2) of the ends of these edges in the points, the end above first.
-    """
-    most = 3 * len(facets)
-    ids, at = np.empty((most, 3), dtype=np.int64), np.zeros((most, 3, 3))
-    source, side = np.empty(most, dtype=np.int64), np.zeros(most, dtype=np.int8)
-    known, where, count = np.empty(5, dtype=np.int64), np.zeros((5, 3)), 0
-    for facet in range(len(facets)):
-        r = row[facet]
-        if r < 0:
-            ids[count], source[count] = facets[facet], facet
-            for k in range(3):
-                at[count, k, k] = 1.0
-            count += 1
-            continue
-        # corners a, b, c and the points u on ab, v on ac
-        where[:] = 0.0
-        for k in range(3):
-            corner = (alone[r] + k) % 3
-            known[k], where[k, corner] = facets[facet, corner], 1.0
-        for k in range(2):
-            own = shares[r, k, 0 if positive[r] else 1]
-            known[3 + k] = points[r, k]
-            where[3 + k] = own * where[0] + (1.0 - own) * where[1 + k]
-        # as in `verify.xfem.clip`: the diagonal begins at the corner with the lower number
-        lower = known[1] < known[2]
-        parts = ((0, 3, 4), (3, 1, 4 if lower else 2), (1 if lower else 3, 2, 4))
-        for number, part in enumerate(parts):
-            one, two, three = known[part[0]], known[part[1]], known[part[2]]
-            if one == two or two == three or three == one:
-                continue
-            for k in range(3):
-                ids[count, k], at[count, k] = known[part[k]], where[part[k]]
-            source[count] = facet
-            side[count] = 1 if positive[r] == (number == 0) else -1
-            count += 1
-    return ids[:count], at[:count], source[:count], side[:count]
-
-
-class _Fragments(NamedTuple):
-    """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts, if whole."""
-
-    ids: Ints
-    source: Ints
-    at: Floats
-    label: Sides
-    whole: Bools
 
 
 class _Corners(NamedTuple):
@@ -285,24 +160,31 @@ class EmbeddedSurface:
     def _replace(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> None:
         """Put the parts of some facets in the place of what there is of these.
 
-        They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is
-        found with which pieces the parts move.
+        They are divided by the cuts with these `numbers`, whose level sets at the `nodes` are
+        `values` (q, cuts), and bisected where others are. Then it is found with which pieces they
+        move.
         """
-        parts = self._fragments(facets, nodes, numbers, values)
-        material = parts.at @ self.points[self.facets[parts.source]]
+        ids, source, at, side = self._divided(facets, nodes, numbers, values)
+        self._edges.add(ids.ravel())
+        ids, at, origin = self._edges.bisect(ids, at)
+        source = source[origin]
+        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
+        label[:, numbers] = side[origin]
+        alone = np.bincount(source, minlength=len(facets)) == 1
         # where the corners of a whole facet are is known; only which piece that is may be new
-        divided = np.flatnonzero(~parts.whole)
-        found = self._place_corners(parts.source[divided], material[divided])
-        source, known = parts.source, self._corners
+        divided = np.flatnonzero(~alone[source] | label.any(axis=1))
+        source, known = facets[source], self._corners
+        material = at @ self.points[self.facets[source]]
+        found = self._place_corners(source[divided], material[divided])
         corners = _Corners(known.cell[source], known.weights[source], known.inside[source])
         corners.cell[divided], corners.weights[divided] = found.cell, found.weights
         corners.inside[divided] = found.inside
         self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
-            parts.ids, material, corners.weights,
+            ids, material, corners.weights,
             lambda rows: corners.weights.reshape(-1, corners.weights.shape[2])[rows] != 0.0,
-            self._pieces(corners, parts.label), np.zeros(len(parts.ids), dtype=bool),
-            self._cutter.body.piece_cells.rows, parts.source, self._facet_range,
+            self._pieces(corners, label), np.zeros(len(ids), dtype=bool),
+            self._cutter.body.piece_cells.rows, source, self._facet_range,
         )  # fmt: skip
 
     def _pieces(self, corners: _Corners, label: Sides) -> Ints:
@@ -327,38 +209,7 @@ class EmbeddedSurface:
             found[rows[better]], agree[rows[better]] = pieces[better], total[better]
         return found.reshape(corners.cell.shape)
 
-    def _fragments(self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats) -> _Fragments:
-        """Divide facets, bisect them where others are, and say on which sides they lie.
-
-        `values` (q, cuts) are the level sets of the cuts with these `numbers` at the `nodes`.
-        """
-        several = len(numbers) != 1 or self.facets.shape[1] == 2
-        divide = self._divided_by_several if several else self._divided_by_one
-        ids, source, at, side = divide(facets, nodes, numbers, values)
-        self._edges.add(ids.ravel())
-        ids, at, origin = self._edges.bisect(ids, at)
-        source = source[origin]
-        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
-        label[:, numbers] = side[origin]
-        alone = np.bincount(source, minlength=len(facets)) == 1
-        is_whole = alone[source] & ~label.any(axis=1)
-        return _Fragments(ids, facets[source], at, label, is_whole)
-
-    def _divided_by_one(
-        self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats
-    ) -> tuple[Ints, Ints, Floats, Sides]:
-        """Divide facets by the only cut there is: points, which facet, corners in it, side."""
-        corners, local = self.points[nodes], np.searchsorted(nodes, self.facets[facets])
-        parts = divide_facets(
-            local, values[:, 0], corners, lambda places: self.is_cut(places, int(numbers[0]))
-        )
-        positions = np.concatenate([corners, parts.positions])
-        cut = np.zeros(len(parts.ends), dtype=np.int64)
-        found = FoundPoints(positions, values, parts.ends, cut)
-        point = self._numbers.number(found, nodes, numbers)
-        return point[parts.ids], parts.source, parts.at, parts.side[:, None]
-
-    def _divided_by_several(
+    def _divided(
         self, facets: Ints, nodes: Ints, numbers: Ints, values: Floats
     ) -> tuple[Ints, Ints, Floats, Sides]:
         """Divide facets by any number of cuts, as elements are."""

@@ -263,12 +263,9 @@ class GrowingBody:
         joined = join_parts(division.patch, division.partition, division.solid)
         local, group = joined.cells[joined.piece_cell], joined.group
         slots = slots_before(division, local, self.first_piece)
-        number, self._source, conflict = number_groups(
+        number, self._source = number_groups(
             slots, group, self.piece_cells.rows, len(self.mesh.points), self.node_count
         )
-        if conflict >= 0:
-            cell = slots.cell[conflict]
-            raise XfemError(f"a cut would join parts of cell {cell} that are separate")
         self.node_parent.append(self.node_parent.rows[self._source])
         place = self._store_pieces(division, slots)
         there = np.flatnonzero(slots.solid)

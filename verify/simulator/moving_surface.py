@@ -47,8 +47,6 @@ class MovingSurface:
         (f,) whether it lies on a cut.
     owner : GrowingArray
         (f,) to what it belongs: an element, or a facet of a surface that is given.
-    retired : int
-        How many facets have been taken out of use.
     """
 
     def __init__(self, corners: int, space: int, facet_corners: int) -> None:
@@ -60,7 +58,6 @@ class MovingSurface:
         self.inner = GrowingArray(np.empty(0, dtype=bool))
         self.owner = GrowingArray(np.empty(0, dtype=np.int64))
         self._owners: tuple[int, int] | None = None
-        self.retired: int = 0
         self._keys = RowNumbers()
 
     def add(
@@ -124,7 +121,6 @@ class MovingSurface:
     def retire(self, facets: Ints) -> None:
         """Take facets out of use."""
         self.facets.rows[facets, 0] = -1
-        self.retired += len(facets)
 
     @property
     def used(self) -> Ints:

@@ -14,7 +14,7 @@ which a cut crosses a face of it: the record is by these.
 from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,15 +109,6 @@ NONE = np.iinfo(np.int64).max  # no further node or cut
 _WIDTH = NODES + CUTS
 
 
-class FoundPoints(NamedTuple):
-    """Points of a patch, with the methods of `ZeroPoints` that its division needs."""
-
-    positions: Floats
-    values: Floats
-    ends: Ints
-    cut: Ints
-
-
 class PointNumbers:
     """Numbers of zero points: mesh nodes keep theirs, zero points follow.
 
@@ -149,12 +140,12 @@ class PointNumbers:
         """(k, 7) mesh nodes (4) and cuts (3) of each zero point, ascending, padded at the end."""
         return self._supports.rows
 
-    def number(self, points: ZeroPoints | FoundPoints, whole_nodes: Ints, cuts: Ints) -> Ints:
+    def number(self, points: ZeroPoints, whole_nodes: Ints, cuts: Ints) -> Ints:
         """Find numbers of all points of a patch: its nodes, then its zero points.
 
         Parameters
         ----------
-        points : ZeroPoints or FoundPoints
+        points : ZeroPoints
             Of the patch.
         whole_nodes : int array
             Number in the whole mesh of each node of the patch.

@@ -21,6 +21,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import Delaunay, cKDTree
 
 from verify.errors import InputError
+from verify.geometry.planar import inside_polygon
+from verify.geometry.simplices import boundary_facets, refine_uniformly
 from verify.read_mesh import read_with_meshio
 from verify.scene import Skin
 from verify.xfem.arrays import Bools, Floats, Ints
@@ -158,17 +160,10 @@ def _next_finer(
     raise AssertionError
 
 
-def inside(points: Floats, rings: list[Floats]) -> Bools:
+def _inside(points: Floats, rings: list[Floats]) -> Bools:
     """Tell whether points (n, 2) lie within the first ring and in none of the others."""
-    odd = np.zeros(len(points), dtype=bool)
-    for ring in rings:
-        for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-            if y0 == y1:
-                continue
-            crosses = (y0 > points[:, 1]) != (y1 > points[:, 1])
-            at = x0 + (points[:, 1] - y0) * (x1 - x0) / (y1 - y0)
-            odd ^= crosses & (points[:, 0] < at)
-    return odd
+    first, *holes = (inside_polygon(points, ring) for ring in rings)
+    return np.asarray(first & ~np.any([np.zeros_like(first), *holes], axis=0))
 
 
 def _resampled(ring: Floats, size: float) -> Floats:
@@ -189,13 +184,13 @@ def _lattice(rings: list[Floats], border: Floats, size: float) -> Floats:
     x = low[0] + (column - 0.5 * (row % 2)) * size
     points = np.column_stack([x.ravel(), (low[1] + row * rise).ravel()])
     far = cKDTree(border).query(points)[0] > _CLEARANCE * size
-    return points[far & inside(points, rings)]
+    return points[far & _inside(points, rings)]
 
 
 def _triangles(points: Floats, rings: list[Floats]) -> Ints:
     cells = Delaunay(points).simplices.astype(np.int64)
     corners = points[cells]
-    kept = inside(corners.mean(axis=1), rings)
+    kept = _inside(corners.mean(axis=1), rings)
     edges = corners[:, 1:] - corners[:, :1]
     doubled = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     longest = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1)
@@ -217,16 +212,14 @@ def _means(points: Floats, triangles: Ints) -> Floats:
 
 def _check_formula(points: Floats, triangles: Ints, rings: list[Floats], size: float) -> None:
     """Check that every point is used, and that the triangles have the border of the domain."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    single, uses = np.unique(edges, axis=0, return_counts=True)
-    border = single[uses == 1]
     expected, begin = [], 0
     for ring in rings:
         number = begin + np.arange(len(ring))
         expected.append(np.sort(np.column_stack([number, np.roll(number, -1)]), axis=1))
         begin += len(ring)
     wanted = np.unique(np.concatenate(expected), axis=0)
-    if not np.array_equal(border, wanted) or len(np.unique(triangles)) != len(points):
+    border, used = boundary_facets(triangles)[0], len(np.unique(triangles))
+    if not np.array_equal(border, wanted) or used != len(points):
         raise InputError(f"an element size of {size:.3g} m is too coarse for the outline")
 
 
@@ -372,13 +365,7 @@ def _surface(skin: Skin, folder: Path, count: float) -> tuple[Floats, Ints, Bool
 
 def quartered(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """Split each triangle in four at the middles of its edges."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    single, place = np.unique(edges, axis=0, return_inverse=True)
-    middle = len(points) + place.reshape(-1, 3)
-    (a, b, c), (ab, bc, ca) = triangles.T, middle.T
-    parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    cells = np.concatenate([np.column_stack(part) for part in parts])
-    return np.concatenate([points, points[single].mean(axis=1)]), cells
+    return refine_uniformly(points, triangles, triangles[:0, :2])[:2]
 
 
 def read_surface(path: Path) -> tuple[Floats, Ints]:

@@ -270,15 +270,13 @@ class Grips:
         return displacement, velocity
 
 
-def stage_of(scene: Scene, level: int = 0) -> Stage:
+def stage_of(scene: Scene) -> Stage:
     """Set up what a scene asks for.
 
     Parameters
     ----------
     scene : Scene
-        Dynamic, with a time step, at finite rotation.
-    level : int
-        Mesh level, 0 is the coarsest.
+        Dynamic, with a time step, at finite rotation; its coarsest mesh is played.
 
     Raises
     ------
@@ -291,7 +289,7 @@ def stage_of(scene: Scene, level: int = 0) -> Stage:
         raise UnsupportedSceneError(reason)
     where = str(scene.file or scene.name)
     try:
-        mesh, rim = _mesh(scene, level)
+        mesh, rim = _mesh(scene)
         analysis = scene.analysis
         assert analysis.duration is not None
         assert analysis.time_step is not None
@@ -348,11 +346,11 @@ def _refusal(scene: Scene) -> str | None:
     return None
 
 
-def _mesh(scene: Scene, level: int) -> tuple[SimplexMesh, Bools | None]:
+def _mesh(scene: Scene) -> tuple[SimplexMesh, Bools | None]:
     if isinstance(scene.geometry, Skin):
         skin = skin_mesh(scene.geometry, _folder(scene))
         return SimplexMesh(skin.points, skin.cells), skin.rim
-    return background_mesh(scene, level)[0], None
+    return background_mesh(scene, 0)[0], None
 
 
 def _folder(scene: Scene) -> Path:

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
+from verify.geometry.simplices import boundary_facets, nearest_parts
 from verify.simulator.embedded_surface import EmbeddedSurface
 from verify.simulator.growing_body import Increment
 from verify.simulator.moving_surface import BodySurface, MovingSurface
@@ -75,7 +76,7 @@ class Surfaces:
         self.shown, self.touchable = found
         if stage.mesh.space == 3:
             uncut = self.shown.facets.rows[self.shown.used]
-            self._rim = self.shown.material.rows[_borders(uncut)]
+            self._rim = self.shown.material.rows[boundary_facets(uncut)[0]]
 
     def update(self, increment: Increment) -> None:
         """Let them follow a cut."""
@@ -119,22 +120,11 @@ class Surfaces:
 
         Vertices are doubled where, and only where, the skin is parted.
         """
-        edges = _borders(skin)
+        edges = boundary_facets(skin)[0]
         if not len(edges) or not len(self._rim):
             return edges
-        middle, (a, b) = material[edges].mean(axis=1)[:, None], np.moveaxis(self._rim, 1, 0)
-        along = b - a
-        share = np.einsum("qrs,rs->qr", middle - a, along) / np.einsum("rs,rs->r", along, along)
-        nearest = a + np.clip(share, 0.0, 1.0)[:, :, None] * along
-        away = np.linalg.norm(middle - nearest, axis=2).min(axis=1)
+        away = nearest_parts(material[edges].mean(axis=1), self._rim)[0]
         return np.asarray(edges[away > 1e-9 * np.ptp(material, axis=0).max()])
-
-
-def _borders(triangles: Ints) -> Ints:
-    """Find edges (l, 2) that belong to one triangle only."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    found, count = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(found[count == 1])
 
 
 def _pieces(

@@ -4,7 +4,7 @@ Each returns its numbers in the order of the limits in `claims.toml`, which it d
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 from reference.exact import exact_of
 from verify.conformance.scenes import held, pull, unit_scene, weight
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.accuracy import assess_accuracy
 from verify.judge.convergence import observed_rate
 from verify.judge.intervals import quotient_half_width
 from verify.printable import words_of
-from verify.result import Metric, SolveRecord, Status
+from verify.result import Metric
 from verify.scene import Scene, load_scene, load_scenes, scene_content
 from verify.simulator.thesis import FaceCount, count_face, count_strips, delays
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.measured_scenes import measured_scene, variant_of
+from verify.study.measured_scenes import measured_scene, measured_solve, variant_of
 from verify.system import critical_step, lowest_frequency, with_uncut_twin
 
 Array = NDArray[np.float64]
@@ -84,15 +83,13 @@ def _solved(case: str, method: str, level: int) -> tuple[Solution, dict[str, Met
     """Solve one level of a case by a method and compare with its exact solution."""
     scene, variant = load_scene(case), variant_of(method)
     solution = variant.found().solve(scene, level, repetitions=1, **variant.parameters)
-    record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
-    solutions = {variant.solver: {level: solution}}
-    (measured,) = assess_accuracy(scene, [record], solutions, exact_of(scene)).solves
+    measured = measured_solve(scene, variant.solver, level, solution, exact_of(scene))
     return solution, {metric.name: metric for metric in measured.metrics}
 
 
-def _quotient(one: Metric, other: Metric, note: str = "") -> Number:
+def _quotient(one: Metric, other: Metric) -> Number:
     parts = one.value, one.uncertainty, other.value, other.uncertainty
-    return within(one.value / other.value, quotient_half_width(*parts), note)
+    return within(one.value / other.value, quotient_half_width(*parts))
 
 
 @cache
@@ -288,7 +285,7 @@ def ghost_locks() -> list[Number]:
     content = scene_content(load_scene(_SLIVER))
 
     def error(method: str) -> float:
-        rows = {m.quantity: m for m in measured_scene(asdict(variant_of(method)), content)}
+        rows = {m.quantity: m for m in measured_scene(method, content)}
         if _L2 not in rows:
             raise InputError("; ".join(m.reason for m in rows.values()))
         return rows[_L2].value or 0.0

@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.judge.accuracy import assess_accuracy
 from verify.judge.models import coarsest
-from verify.result import SolveRecord, Status
 from verify.scene import Scene, scene_content
 from verify.solution import Solution
 from verify.solvers.interface import name_with
-from verify.study.measured_scenes import Variant
+from verify.study.measured_scenes import Variant, measured_solve
 from verify.study.study import Finding, Making, Solved, Study
 
 Array = NDArray[np.float64]
@@ -201,8 +199,7 @@ def _distance(answer: Solution, other: Solution) -> float:
 
 
 def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
-    record = SolveRecord(scene.name, "solver", 0, Status.SOLVED, size=answer.size)
-    (measured,) = assess_accuracy(scene, [record], {"solver": {0: answer}}, None).solves
+    measured = measured_solve(scene, "solver", 0, answer, None)
     asked = [measured.metric(quantity.name) for quantity in scene.quantities]
     found = {
         m.name if m.unit == "1" else f"{m.name}, {m.unit}": m.value for m in asked if m is not None

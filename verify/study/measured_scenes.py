@@ -16,7 +16,7 @@ from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
 from verify.runner.tasks import Failure, Task
 from verify.scene import Scene, ValueCheck, restore_scene, scene_content
-from verify.solution import checked_solution
+from verify.solution import Solution, checked_solution
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.interface import one_name, parameters_in, refusal_of, solver_in
 from verify.study.study import Finding, Making, Study, held
@@ -100,17 +100,17 @@ class MeasuredStudy(Study):
         return [asdict(one) for one in self.measurements]
 
 
-def measured_scene(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
+def measured_scene(variant: str, content: dict[str, Any]) -> list[Measurement]:
     """Solve a scene on its finest level and measure what the comparison measures of it.
 
     Parameters
     ----------
-    variant : dict
-        Values of a `Variant`.
+    variant : str
+        As `variant_of` reads it.
     content : dict
         As `verify.scene.scene_content` writes it.
     """
-    return measurements(Variant(**variant), restore_scene(content))
+    return measurements(variant_of(variant), restore_scene(content))
 
 
 def measurements(
@@ -139,7 +139,7 @@ def _place(scene: Scene) -> tuple[str, float | None]:
 
 def measured_families(
     study: str,
-    measure: Callable[[dict[str, Any], dict[str, Any]], list[Measurement]],
+    measure: Callable[[str, dict[str, Any]], list[Measurement]],
     families: Mapping[str, Sequence[Scene]],
     variants: Sequence[Variant],
     making: Making,
@@ -163,7 +163,7 @@ def measured_families(
     parts = [(v, scene) for rows in families.values() for v in variants for scene in rows]
     tasks = [
         Task(f"{scene.name} {variant.label}", measure,
-             {"variant": asdict(variant), "content": scene_content(scene)}, (variant.label,))
+             {"variant": variant.label, "content": scene_content(scene)}, (variant.label,))
         for variant, scene in parts
     ]  # fmt: skip
     found = making.parts(study, tasks, may_fail=True)
@@ -176,14 +176,20 @@ def measured_families(
     return rows
 
 
+def measured_solve(
+    scene: Scene, name: str, level: int, solution: Solution, exact: Any
+) -> SolveRecord:
+    """Measure the solution of one level of a scene, held against an exact field if there is one."""
+    record = SolveRecord(scene.name, name, level, Status.SOLVED, size=solution.size)
+    (measured,) = assess_accuracy(scene, [record], {name: {level: solution}}, exact).solves
+    return measured
+
+
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
     from reference.exact import exact_of
 
     solution = checked_solution(solver.solve(scene, level, repetitions=1, **variant.parameters))
-    record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
-    solutions = {variant.solver: {level: solution}}
-    result = assess_accuracy(scene, [record], solutions, exact_of(scene))
-    (measured,) = result.solves
+    measured = measured_solve(scene, variant.solver, level, solution, exact_of(scene))
     if measured.status is not Status.SOLVED:
         raise NotMeasuredError(measured.reason)
     for metric in measured.metrics:

@@ -13,7 +13,7 @@ from verify.printable import one_line, words_of
 from verify.scene import Analysis, Box, Rectangle, Scene, restore_scene
 from verify.solvers import Solver
 from verify.solvers.interface import refusal_of
-from verify.study.measured_scenes import Measurement, Variant, measurements
+from verify.study.measured_scenes import Measurement, Variant, measurements, variant_of
 from verify.system import (
     CONDITION,
     FREQUENCY,
@@ -29,9 +29,9 @@ UNKNOWNS = "unknowns of the system"
 Row = tuple[str, str, float | None, str]
 
 
-def measured_row(variant: dict[str, Any], content: dict[str, Any]) -> list[Measurement]:
+def measured_row(variant: str, content: dict[str, Any]) -> list[Measurement]:
     """Measure a scene as `measured_scene` does, and the system of its solver."""
-    return measurements(Variant(**variant), restore_scene(content), _further)
+    return measurements(variant_of(variant), restore_scene(content), _further)
 
 
 def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
