@@ -20,6 +20,7 @@ from importlib import import_module
 from importlib.resources import files
 from multiprocessing import get_context
 from pathlib import Path
+from signal import SIG_IGN, SIGINT, signal
 from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
@@ -320,7 +321,7 @@ def _drawn_cases(run: Run, palette: Palette, jobs: int) -> list[CaseView]:
     if (jobs := min(jobs, len(asked) // _FEWEST)) > 1:
         with (
             suppress(BrokenProcessPool),  # the rest is drawn here
-            ProcessPoolExecutor(jobs, get_context("spawn")) as pool,
+            ProcessPoolExecutor(jobs, get_context("spawn"), signal, (SIGINT, SIG_IGN)) as pool,
         ):
             for view, styles in pool.map(drawn_case, *zip(*asked, strict=True)):
                 if any(palette[label] != style for label, style in styles.items()):
