@@ -36,8 +36,7 @@ def run_line(line, folder, path=None):
     first, *words = shlex.split(command)
     environment = {"PYTHONPATH": os.pathsep.join([str(path), str(ROOT), *_given()])}
     if first == "verify" and not list(folder.glob("*.dist-info")):
-        beside = path == folder  # where a forked process looks, too
-        with patch.object(sys, "path", [str(path), *sys.path]), forking(lambda _: beside):
+        with patch.object(sys, "path", [str(path), *sys.path]), forking(lambda _: True):
             done = run_here(words, folder, environment)
         for name in {file.stem for file in path.glob("*.py")}:
             sys.modules.pop(name, None)

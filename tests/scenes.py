@@ -13,6 +13,16 @@ def catalogue():
     return {name: load_scenes(path) for name, path in list_cases().items()}
 
 
+@cache
+def _rows_of_files():
+    return {path: catalogue()[name] for name, path in list_cases().items()}
+
+
+def read_once(source):
+    """As `load_scenes`, but for cases of the project, which are as `catalogue` has read them."""
+    return _rows_of_files().get(source) or load_scenes(source)
+
+
 def box(upper, lower=None):
     """Geometry of a rectangle or box, by default from the origin."""
     kind = "rectangle" if len(upper) == 2 else "box"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from doc_pages import DOCS, ROOT, blocks, commands, run_line
+from scenes import read_once
 
 from verify.cli import build_parser
 from verify.foreign import foreign_solver, state_of
@@ -18,7 +19,10 @@ ELSEWHERE = {"verify doctor"}  # what it finds is held in tests/install
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
+def test_every_command_of_the_page_succeeds(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("verify.scene.load_scenes", read_once)
     case = blocks("guide/write-a-case.md", "toml")[0]
     # a reference four digits better than the 20 % that are asked, in a tenth of the time of eight
     case = case.replace("[48, 16], ", "") + "[reference]\nsize = 0.01\n"

@@ -11,7 +11,7 @@ import time
 
 import pytest
 from command_line import run_here
-from scenes import catalogue
+from scenes import catalogue, read_once
 
 from verify.cli import build_parser, main, progress
 from verify.cli.progress import Waiting, waiting_reported
@@ -41,8 +41,7 @@ def test_help_teaches_by_examples_that_parse(command, capsys):
 
 def test_list_names_every_case_with_its_title_and_wraps_at_the_width(capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)  # what runs tests side by side sets it
-    rows = {path: catalogue()[name] for name, path in list_cases().items()}
-    monkeypatch.setattr("verify.scene.load_scenes", rows.__getitem__)  # as read for `SCENES`
+    monkeypatch.setattr("verify.scene.load_scenes", read_once)  # of them are `SCENES`, too
     assert main(["list"]) == 0
     whole = capsys.readouterr().out
     assert [line.split()[0] for line in whole.splitlines()] == list(SCENES)

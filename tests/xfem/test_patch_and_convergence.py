@@ -43,14 +43,15 @@ def test_a_thin_strip_that_bends_is_factorised_where_iterations_do_not_end():
     phantom = xfem.cut_mesh(mesh, [])
     held = xfem.Supports.none(phantom).prescribe(phantom, np.flatnonzero(mesh.points[:, 0] == 0.0))
     load = xfem.body_force(phantom, (0.0, 0.0, -1.0))
-    solution = xfem.solve_static(phantom, xfem.isotropic(1e4, 0.3, "solid"), held, load)
+    material = xfem.isotropic(1e4, 0.3, "solid")
+    solution = xfem.solve_static(phantom, material, held, load)
     assert phantom.node_count > 2000
     assert solution.solver == "direct"
     work = np.sum(load * solution.displacement)
     # round-off times the condition number, (length/thickness)⁴
     assert work == pytest.approx(2.0 * solution.strain_energy, rel=1e-4)
     with pytest.raises(NotConvergedError):
-        xfem.solve_static(phantom, xfem.isotropic(1e4, 0.3, "solid"), held, load, "iterative")
+        xfem.solve_static(phantom, material, held, load, "iterative", kernels=FAST)
 
 
 def test_energy_and_displacement_of_f3_converge_at_first_and_second_order():
