@@ -1,8 +1,8 @@
 """Iterations against error: solvers in steps that stop by a count, over iterations and substeps.
 
 Two errors are told apart. The iteration error is the distance from the same steps, solved; the
-whole error is the distance from the smallest steps, solved. The smallest are a quarter of those of
-any setting, which else would have no error of its steps. A solver solves them too, by default the
+whole error is the distance from the smallest steps, solved. The smallest are a quarter of any
+setting's, which else would have no error of its steps. A solver solves them too, by default the
 same one with ``step=solved``. Both answer on one mesh, and nodes are compared. The work of a
 setting is the number of iterations in a step of the case: it does not depend on the machine.
 """

@@ -62,8 +62,8 @@ ROUND_OFF = 8.0 * np.finfo(float).eps  # of the extent of the mesh: a level set 
 class _Outline(NamedTuple):
     """Where a cut may be extended past its end, to the far side of the cell in which it ends.
 
-    It may not where another cut meets the cell, nor where it would meet the outline of the body
-    at a facet that it does not meet itself: a body that hangs on the last cell would be parted.
+    It may not where another cut meets the cell, nor where the extension alone would meet a facet
+    of the outline. A body that hangs on its last cell would be parted there.
 
     Attributes
     ----------
