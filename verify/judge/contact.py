@@ -191,13 +191,11 @@ def _errors(
     if scale == 0.0:
         return [], dict.fromkeys(CONTACT_ERRORS, "no face is pressed in the reference")
     width = truth.width_of_norm([norm(fine - coarse) for coarse, fine in pairwise(known)]) / scale
-    around = cKDTree(contact.points).sparse_distance_matrix(
-        cKDTree(contact.points), _AROUND * size, output_type="coo_matrix"
-    )
-    mean, total = np.zeros_like(error), np.zeros(len(weights))
-    np.add.at(mean.T, around.row, (weights * error)[:, around.col].T)
-    np.add.at(total, around.row, weights[around.col])
-    shares = (norm(error), norm(error - mean / total))
+    tree = cKDTree(contact.points)
+    around = tree.sparse_distance_matrix(tree, _AROUND * size, output_type="coo_matrix").tocsr()
+    around.data[:] = 1.0
+    mean = around.dot((weights * error).T).T / around.dot(weights)
+    shares = (norm(error), norm(error - mean))
     rows = zip(CONTACT_ERRORS, shares, strict=True)
     return [Metric(n, v / scale, "1", None, width, truth.source) for n, v in rows], {}
 

@@ -272,13 +272,8 @@ def _flat(values: Floats, axis: int) -> Floats:
 
 def _normals(corners: Floats) -> tuple[Floats, Floats]:
     """Find unit normals (f, d) and areas (f,) of facets by their corners (f, d, d)."""
-    edges = corners[:, 1:] - corners[:, :1]
-    if corners.shape[2] == 2:
-        normal, share = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1), 1.0
-    else:
-        normal, share = np.cross(edges[:, 0], edges[:, 1]), 0.5
-    size = np.linalg.norm(normal, axis=1)
-    return normal / np.maximum(size, np.finfo(float).tiny)[:, None], share * size
+    _, lengths, ways = np.linalg.svd(corners[:, 1:] - corners[:, :1])
+    return ways[:, -1], lengths.prod(axis=1) / lengths.shape[1]
 
 
 def _curved(flat: Floats, points: Floats, step: Floats, cuts: Sequence[Cut]) -> Floats:
