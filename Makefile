@@ -47,6 +47,7 @@ demo: setup ## solve the demo cases and write build/demo/report.html
 # No claim about time: what passes here does so however busy the machine is. Kernels are compiled
 # before, or both workers and all that they start compile the same ones at once.
 test: setup ## run the tests, without claims about time and heavy studies
+	@echo "compiling the kernels that are not yet compiled (a minute the first time)"
 	@$(BIN)/python -m verify doctor --compile >/dev/null
 	@$(PYTEST) -n $(JOBS) --dist loadfile --no-loadscope-reorder -m "not timing and not heavy"
 

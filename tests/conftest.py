@@ -1,5 +1,6 @@
 """Fixtures of all tests: a cache of their own, and claims about time that a busy machine spoils."""
 
+import gc
 import os
 import shutil
 import tempfile
@@ -28,6 +29,11 @@ def pytest_unconfigure(config):
     """Remove it."""
     if folder := getattr(config, "cache_of_session", None):
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def pytest_collection_finish():
+    """Look for garbage in what tests make alone: all that is imported lives on."""
+    gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)
