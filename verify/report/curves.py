@@ -148,21 +148,21 @@ def _can_be_drawn(measured: Metric) -> bool:
     )
     return known and all(
         math.isfinite(n) and abs(n) < _DRAWABLE[1]
-        for n in (measured.value, measured.uncertainty, *_error_of(measured))
+        for n in (measured.value, measured.uncertainty, *error_of(measured))
     )
 
 
-def _error_of(measured: Metric) -> tuple[float, float]:
-    """Return the relative error that is drawn, and its half-width."""
+def error_of(measured: Metric) -> tuple[float, float]:
+    """Return an error, or the relative error of a quantity with a reference, and its half-width."""
     if not measured.reference:
-        return abs(measured.value), measured.uncertainty
+        return measured.value, measured.uncertainty
     value, low, high = measured.relative_distance()
     return value, max(value - low, high - value)
 
 
 def _point(solve: SolveRecord, measured: Metric) -> Point:
-    value, uncertainty = _error_of(measured)
-    drawn = value if value >= _DRAWABLE[0] else 0.0
+    value, uncertainty = error_of(measured)
+    drawn = abs(value) if abs(value) >= _DRAWABLE[0] else 0.0
     size = solve.size if solve.size and _DRAWABLE[0] < solve.size < _DRAWABLE[1] else None
     unknowns = float(solve.unknowns) if solve.unknowns and solve.unknowns > 0 else None
     return Point(solve.level, size, unknowns, drawn, max(uncertainty, 0.0), duration(solve))

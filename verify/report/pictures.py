@@ -24,7 +24,7 @@ from verify.report.bodies import (
     zoomed,
 )
 from verify.report.notation import ROUND_OFF, number, number_text, solver_title
-from verify.report.problem import cut_lines
+from verify.report.problem import cut_lines, plane_corners
 from verify.report.run_directory import CaseEntry
 from verify.result import REFERENCE, CaseResult, SolveRecord, Status, error_picture, finest_of
 from verify.solution import Solution
@@ -297,13 +297,7 @@ def plane_tips(scene: Mapping[str, Any]) -> list[tuple[Points, float]]:
 
     An end on the boundary or on another cut is no tip.
     """
-    body = scene.get("geometry") or {}
-    if body.get("kind") == "rectangle":
-        (x0, y0), (x1, y1) = body["lower"], body["upper"]
-        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
-    elif body.get("kind") == "polygon":
-        corners = np.asarray(body["corners"], dtype=float)
-    else:
+    if (corners := plane_corners(scene.get("geometry") or {})) is None:
         return []
     near = _ON * float(np.ptp(corners, axis=0).max())
     lines = [line for cut in scene.get("cuts") or [] for line in cut_lines(cut)]

@@ -135,12 +135,11 @@ def _body(axes: Axes, body: Mapping[str, Any]) -> tuple[Points, dict[str, list[P
                       linestyle=":" if hidden else "-")  # fmt: skip
         _label(axes, solid, f"{x1 - x0:.4g} × {y1 - y0:.4g} × {z1 - z0:.4g} m")
         return solid, {name: [solid[list(face)]] for name, face in _FACES.items()}
+    corners = plane_corners(body)
+    assert corners is not None
     if body["kind"] == "rectangle":
-        (x0, y0), (x1, y1) = body["lower"], body["upper"]
-        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
         parts = {name: [corners[list(ends)]] for name, ends in _SIDES.items()}
     else:
-        corners = np.asarray(body["corners"], dtype=float)
         sides = [np.array(pair) for pair in pairwise(_closed(corners))]
         parts = {}
         for name, side in zip(body.get("names") or [], sides, strict=False):
@@ -150,6 +149,14 @@ def _body(axes: Axes, body: Mapping[str, Any]) -> tuple[Points, dict[str, list[P
     lengths = np.ptp(corners, axis=0)
     _label(axes, corners, f"{lengths[0]:.4g} × {lengths[1]:.4g} m")
     return corners, parts
+
+
+def plane_corners(body: Mapping[str, Any]) -> Points | None:
+    """Return the corners (k, 2) of a rectangle or polygon, m; None of another body."""
+    if body.get("kind") == "rectangle":
+        (x0, y0), (x1, y1) = body["lower"], body["upper"]
+        return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
+    return np.asarray(body["corners"], dtype=float) if body.get("kind") == "polygon" else None
 
 
 def _label(axes: Axes, corners: Points, words: str) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from verify.report.curves import duration, metric_names
+from verify.report.curves import duration, error_of, metric_names
 from verify.report.notation import (
     NORMS,
     ROUND_OFF,
@@ -152,10 +152,7 @@ def _error_of(metric: Metric | None) -> str:
     """Return an error, or the relative error of a quantity that has a reference; else nothing."""
     if metric is None or not (is_error(metric.name) or metric.reference):
         return ""
-    value, half = metric.value, metric.uncertainty
-    if metric.reference:
-        value, low, high = metric.relative_distance()
-        half = max(value - low, high - value)
+    value, half = error_of(metric)
     if value + half < ROUND_OFF:
         return f"round-off ({number(value, 2)})" if value else number(value)
     return error_text(value, half)
