@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from cut_comparison import assert_same_cut
 
+from verify.geometry.simplices import measures
 from verify.simulator.semi_progressive import SemiProgressiveCutter
 from verify.xfem.arrays import XfemError
 from verify.xfem.cuts import ToolPath
 from verify.xfem.mesh import SimplexMesh, box_mesh, rectangle_mesh
 from verify.xfem.phantom import cut_mesh
+from verify.xfem.subdivision import subdivide
 
 PLANE_STROKES = [
     ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),
@@ -42,6 +44,11 @@ def test_at_every_moment_the_growing_cut_is_the_cut_made_at_once(mesh, paths) ->
             assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts))
     assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, [path.sweep for path in paths]))
     assert split > len(paths)
+    # divided for who draws it, with the points in which cuts meet: a few facets are in more parts
+    grown, whole = (subdivide(one) for one in (cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts)))
+    for simplices in (lambda body: body.points[body.cells], lambda body: body.cut_facets):
+        one, other = (measures(simplices(body)).sum() for body in (grown, whole))
+        assert one == pytest.approx(other, rel=1e-12)
 
 
 def test_delay_is_element_size_over_tool_speed() -> None:
