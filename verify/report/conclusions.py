@@ -105,6 +105,8 @@ def _close(
         return None
     bounds = [f"at least {least:g}"] * (least > 0.0) + [f"at most {most:g}"]
     text = template.format(number(own.ratio, 2))
+    if own.scatter is not None:
+        text += f" Over positions of the mesh it is {number(own.scatter[0], 2)}."
     return Found(text, own.written, f"medians {', '.join(bounds)}", own.within(least, most))
 
 
