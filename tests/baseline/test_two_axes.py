@@ -51,6 +51,17 @@ def test_independent_values_and_tolerances_come_from_the_case_never_from_what_wa
     assert quantities["xfem/1/sag"]["own"]["commit"] == "c0ffee"
 
 
+def test_bounds_of_errors_are_asked_of_solvers_and_not_of_the_reference(baseline, tmp_path):
+    """C6's, rounded in its bundle, balances its energy to 1.1e-10; solvers are asked for 1e-10."""
+    reference = replace(runs.solve(error=0.05), solver="reference")
+    code, _ = baseline("save", runs.run(tmp_path / "old", runs.result(runs.solve(), reference)))
+    assert code == 0
+    known = stored(baseline)["quantities"]
+    assert known["reference/1/displacement_l2"]["independent"]["tolerance"] is None
+    assert known["reference/1/strain_energy"]["independent"]["tolerance"] == 0.01  # of a book
+    assert known["xfem/1/displacement_l2"]["independent"]["tolerance"] == 0.02
+
+
 def test_a_value_that_moves_within_its_accuracy_fails_on_the_own_axis_only(saved, tmp_path):
     new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.002)))
     code, answer = saved("check", new)

@@ -17,6 +17,7 @@ from verify.judge.intervals import ERROR_METRICS
 from verify.provenance import KERNEL, seconds_of_note
 from verify.result import (
     HANDED_OVER,
+    REFERENCE,
     CaseResult,
     Metric,
     SolveRecord,
@@ -186,7 +187,8 @@ def _independent(
                 source=check["source"],
                 **origin,
             )
-    bound = next((check["at_most"] for check in checks if check["check"] == "error"), None)
+    asked = (c for c in checks if c["check"] == "error" and (c["solver"] or solver != REFERENCE))
+    bound = next((check["at_most"] for check in asked), None)
     if metric.name in ERROR_METRICS:
         return Independent(value=0.0, tolerance=bound, source=metric.source, **origin)
     if metric.reference is None:
