@@ -19,6 +19,7 @@ from verify.runner.references import BESIDE, bundle_of_case
 from verify.runner.selection import select_cases
 from verify.scene import case_folder, load_scene
 from verify.solution import read_solution, write_solution
+from verify.solvers import find_solver
 
 FORBIDDEN = ("numba", "llvmlite", "pyvista", "vtkmodules", "gmsh", "dolfinx", "petsc4py", "mpi4py")
 WITH_BUNDLE = [
@@ -30,21 +31,22 @@ WITH_BUNDLE = [
 def answers_of_another(scene, folder, factor=1.0):
     """Write what another program could have answered: the coarse levels of the reference.
 
-    Of a scene without a bundle those of another solver, or none if that does not take it.
+    Of a scene without a bundle those of a solver; return whose known findings are then its own.
     """
-    bundle, own = bundle_of_case(scene), Stranger()
-    if bundle is None and own.refuses(scene):
-        return
+    bundle, own, like = bundle_of_case(scene), Stranger(), "conforming"
+    if own.refuses(scene):
+        own, like = find_solver("xfem"), "xfem"
     for level in range(scene.mesh.count):
         place = folder / f"level-{level}"
         place.mkdir(parents=True)
         if bundle is None:
-            answer = own.solve(scene, level)
+            answer = own.solve(scene, level, 1)
         else:
             bundle.take(scene, Job(scene.name, "reference", level, 1, "any", place))
             answer = read_solution(place / "solution")
         answer = replace(answer, displacement=factor * answer.displacement)
         write_solution(answer, place / "solution")
+    return "reference" if bundle else like
 
 
 def said(python, place, *command, environment=None):
@@ -65,9 +67,13 @@ def said(python, place, *command, environment=None):
 
 
 def verdicts(answer):
-    """Return verdicts by case and metric."""
+    """Return verdicts by case and metric, of several the worst."""
+    worst_last = ("PASS", "UNDECIDED", "FAIL", "ERROR")
     return {
-        case["case"]: {one["metric"]: one["verdict"] for one in case["verdicts"]}
+        case["case"]: {
+            one["metric"]: one["verdict"]
+            for one in sorted(case["verdicts"], key=lambda v: worst_last.index(v["verdict"]))
+        }
         for case in json.loads(answer.out)["cases"]
     }
 
@@ -110,20 +116,35 @@ def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_pat
     for name in FORBIDDEN:
         code = f"import {name}"
         assert subprocess.run([light.python, "-c", code], capture_output=True).returncode
-    for scene in select_cases(["benchmark"], weight="heavy"):
-        if scene.judged_by_exact or bundle_of_case(scene):  # else FEniCSx has to solve it
-            answers_of_another(scene, tmp_path / "answers" / scene.name)
-    asked = ["import", "benchmark", "answers", "--solver", "mine", "--out", "out", "-j", 2]
-    answer = said(light.python, tmp_path, *asked, "--json")
-    found = verdicts(answer)
-    answered = sorted(name for name in found if (tmp_path / "answers" / name).is_dir())
-    print(f"{answer.seconds:.0f} s of processor for {len(answered)} scenes: {', '.join(answered)}")
-    # fields of bundles are rounded to 7e-9: their energies do not balance to the 1e-10 of C6
-    judged = {
-        v for one in found.values() for metric, v in one.items() if metric != "ledger_mismatch"
+    # fields of bundles are rounded to 7e-9: their energies do not balance to the 1e-10 of C6; a
+    # corner of 1e-4 elements weighs 2.5e-7 N, its stiffness times its fall is rounded to 1e-12 N
+    may_fail = {
+        ("benchmark/c6_block", "ledger_mismatch"),
+        ("benchmark/c8_slivers_corner[epsilon=0.0001]", "fall_of_the_corner"),
     }
-    assert judged <= {"PASS", "UNDECIDED"}
-    assert answer.seconds < 2 * 60.0
+    scenes = select_cases(["benchmark"], weight="heavy")
+    for scene in scenes:
+        place = tmp_path / ("plane" if scene.dimension == 2 else "space") / scene.name
+        like = answers_of_another(scene, place)
+        may_fail |= {(scene.name, k.metric) for k in scene.known_findings if k.solver == like}
+    found, seconds = {}, {}
+    for place in ("plane", "space"):
+        asked = ["import", "benchmark", place, "--solver", "mine", "--out", f"out-{place}"]
+        answer = said(light.python, tmp_path, *asked, "-j", 2, "--json")
+        own = {n: one for n, one in verdicts(answer).items() if (tmp_path / place / n).is_dir()}
+        found, seconds[place] = found | own, answer.seconds
+        print(f"{answer.seconds:.0f} s of processor for {len(own)} scenes: {', '.join(own)}")
+    assert set(found) == {scene.name for scene in scenes}
+    failed = {
+        (name, metric): verdict
+        for name, one in found.items()
+        for metric, verdict in one.items()
+        if verdict not in ("PASS", "UNDECIDED")
+    }
+    print(failed)
+    assert set(failed.values()) <= {"FAIL"}
+    assert set(failed) <= may_fail
+    assert seconds["plane"] < 2 * 60.0
     size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())
     print(f"{size / 1e6:.0f} MB")
     assert size < 350e6
@@ -141,7 +162,7 @@ def test_every_bundle_judges_in_a_minute(tmp_path, light, case):
 
 
 REST, SLIVER, MOTION = (
-    "benchmark/c1_slit", "benchmark/c8_slivers[epsilon=1e-06]", "cutting/plate_crossed_quick",
+    "benchmark/c1_slit", "benchmark/c8_slivers[epsilon=1e-06]", "benchmark/c6_block",
 )  # fmt: skip
 REPOSITORY = {
     "pytest.ini": "[pytest]\nverify_solvers = stranger_solver:Stranger\n",
