@@ -399,8 +399,7 @@ def time_at(levels: TimedErrors, error: float) -> Times | None:
 def times_at_equal_error(one: TimedErrors, other: TimedErrors) -> tuple[Times, Times] | None:
     """Return the times of two solvers at the smallest error that both reach.
 
-    None where that error lies below the coarsest level of either: its time would be that of a mesh
-    nobody would choose.
+    None where that error lies below the coarsest level of either: nobody would choose such a mesh.
     """
     if not one or not other:
         return None
@@ -746,7 +745,7 @@ class Pair:
     wins, ties, losses : int
         Scenes, of the solver; their sum is the number of scenes in common.
     ratio : float or None
-        Number of the solver over that of its rival, median over scenes; None if there is none.
+        Number of the solver over its rival's, median over scenes; None if there is none.
     low, high : float or None
         Range of the ratios: 5th and 95th percentile; below ten scenes least and largest.
     count : int

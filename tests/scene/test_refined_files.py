@@ -171,12 +171,13 @@ def test_at_a_tip_energies_are_of_first_order_against_a_graded_reference(tmp_pat
     load = '[[loads]]\nkind = "cut_faces"\npressure = 1e3\n'
     scene = case(tmp_path, 2, mesh, cut_across(2, mesh[-1], reach=0.6), refine=3, more=load)
 
-    def energies(name, levels):
+    def energies(name, levels, **given):
         solver = find_solver(name)
-        return [float(solver.solve(scene, k, 0).ledger["strain"][0]) for k in levels]
+        return [float(solver.solve(scene, k, 0, **given).ledger["strain"][0]) for k in levels]
 
     best = energies("reference", range(1, 3))
-    short = best[-1] - np.array(energies("xfem", range(4)))
+    # extended to the far side of its element, the end may lie on either side of where it is asked
+    short = best[-1] - np.array(energies("xfem", range(4), tip="inside"))
     orders = np.log2(short[:-1] / short[1:])
     assert orders.mean() == pytest.approx(1.0, abs=0.2), (short, orders)
     assert best[-1] - best[0] < 0.1 * short[-1]
