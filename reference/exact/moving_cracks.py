@@ -272,9 +272,12 @@ class Impact(ExactSolution):
         return self._length - abs(run - self._length), 1.0 if run < self._length else -1.0
 
     def _ahead(self, far: Array) -> NDArray[np.bool_]:
-        """Tell which points (n,) no wave has reached: all of halves that are apart."""
+        """Tell which points (n,) no wave has reached: all of halves that are apart.
+
+        A point on the front counts as ahead, in spite of round-off: a free end has no stress.
+        """
         front = self._front()[0]
-        return np.asarray((far > front) | (front <= 0.0))
+        return np.asarray((far > front - 1e-12 * self._length) | (front <= 0.0))
 
     def _local(self, points: Array, near: Array | None) -> tuple[Array, Array]:
         """Compute the side (n,) of the meeting place, 1 or −1, and distance from it, m."""
