@@ -57,7 +57,8 @@ heavy: setup ## run the heavy studies (minutes to hours)
 # One after the other; a claim that fails while other programs run is repeated, then undecided;
 # with VERIFY_SHARED_MACHINE=1 also where the other programs are not to be seen (continuous integration).
 bench: setup ## run the claims about time, print medians with their spread, write docs/results/speed.md
-	@VERIFY_SPEED=1 $(PYTEST) -m "timing and not heavy" -p no:xdist -rs --benchmark-columns=median,iqr,rounds
+	@VERIFY_SPEED=1 $(PYTEST) -m "timing and not heavy" -p no:xdist -rs --benchmark-columns=median,iqr,rounds \
+	    $$(grep -rl --include='*.py' 'mark\.timing' tests)
 
 # Side by side, the longest first; each says its words at its end.
 check: setup ## ruff, format, types, layers, words
