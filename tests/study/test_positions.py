@@ -154,7 +154,6 @@ def test_errors_on_each_mesh_are_those_of_the_solver(tmp_path, monkeypatch, caps
     (["statics/f1_patch", "--positions", "17"], "17; a mesh has 16"),
     (["statics/f1_patch", "--level", "2"], "2: 'statics/f1_patch' has 0..1"),
     (["statics/f1_patch", "--solver", "xfem"], "one solver has no ratio"),
-    (["dynamics/freed_half"], "'dynamics/freed_half' moves"),
     (["curved/arc_from_a_corner"], "has unstructured meshes"),
 ])  # fmt: skip
 def test_what_has_no_positions_is_refused_before_a_solve(words, message, tmp_path, capsys):

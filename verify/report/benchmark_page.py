@@ -161,7 +161,8 @@ def _scatter(
 ) -> tuple[float, float] | None:
     """Return the 90 % range of a ratio over positions of the mesh, if this scene was studied."""
     cases = {result.case for result in members}
-    ratios = mesh_ratios(evidence, METRIC, name, best, cases.__contains__)
+    rows = evidence.benchmark_positions
+    ratios = mesh_ratios(rows, METRIC, name, best, cases.__contains__)
     if not ratios:
         return None
     low, high = np.quantile(ratios, [0.05, 0.95])

@@ -291,6 +291,11 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
             factor=QUARTER, words=("XFEM: in motion its error is {} times a conforming mesh's.",
              "XFEM, which needs no new mesh: in motion its error is {} times a conforming mesh's.",
              "XFEM needs no new mesh, but in motion its error is {} times a conforming mesh's."))),
+        Sentence("motion, remeshed", "XFEM beside remeshing on three such scenes", partial(
+            _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
+            factor=QUARTER, words=tuple(
+                f"Beside a new mesh for each cut {word} {{}} times its error." for word in (
+                    "it is more accurate,", "it is as accurate,", "it is less accurate,")))),
         Sentence("real time", "a blade in real time (`verify study thesis`)", _real_time),
         Sentence("sofa", "real time beside SOFA (`make bench`)", _sofa),
     ),

@@ -38,7 +38,7 @@ class Evidence:
         Programs that are one discretisation.
     coverage : dict of str to dict
         As in `verify.result.Ranking`.
-    positions, slivers, claims, speed : list of dict
+    positions, benchmark_positions, slivers, claims, speed : list of dict
         Rows of their tables; empty if there are none.
     hand : dict
         Steps of the real-time engine in the thesis study; empty if there are none.
@@ -53,6 +53,7 @@ class Evidence:
     groups: Sequence[Sequence[str]] = ()
     coverage: Mapping[str, Mapping[str, Sequence[int]]] = field(default_factory=dict)
     positions: list[Row] = field(default_factory=list)
+    benchmark_positions: list[Row] = field(default_factory=list)
     slivers: list[Row] = field(default_factory=list)
     claims: list[Row] = field(default_factory=list)
     speed: list[Row] = field(default_factory=list)
@@ -91,7 +92,7 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
             results |= {result.case: result for result in new}
             if new:
                 commands[name] = str(run.record.get("command") or "unknown")
-    for name in ("positions", "slivers", "thesis"):
+    for name in ("positions", "benchmark_positions", "slivers", "thesis"):
         if (record := runs / name / f"{name}.json").is_file():
             found = read_json(record)
             commands[name] = str(found.get("command") or "unknown")
@@ -107,6 +108,7 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
     positions = table("positions", "positions.csv")
     return Evidence(
         results=list(results.values()), positions=positions,
+        benchmark_positions=table("benchmark_positions", "positions.csv"),
         slivers=table("slivers", "slivers.csv"), claims=table("claims", "claims.csv"),
         speed=_rows(published / "speed.csv"),
         hand=dict(thesis.get("hand") or {}),
@@ -222,7 +224,7 @@ def beside(
     pair = pair_in(evidence.pairs.get(kind, ()), metric, solver, rival)
     if pair is None or pair.ratio is None or pair.low is None or pair.high is None:
         return None
-    ratios = mesh_ratios(evidence, metric, solver, rival,
+    ratios = mesh_ratios(evidence.positions, metric, solver, rival,
                          lambda scene: _is(kind, False, scene in evidence.tips))  # fmt: skip
     scatter = None
     if len(ratios):
@@ -243,11 +245,11 @@ def pair_in(pairs: Sequence[Pair], metric: str, solver: str, rival: str) -> Pair
 
 
 def mesh_ratios(
-    evidence: Evidence, metric: str, solver: str, rival: str, counts: Callable[[str], bool]
+    rows: Sequence[Row], metric: str, solver: str, rival: str, counts: Callable[[str], bool]
 ) -> list[float]:
     """Return ratios of two solvers, one for each position of the mesh of the scenes that count."""
     values: dict[tuple[str, str], dict[str, float]] = {}
-    for row in evidence.positions:
+    for row in rows:
         if row["metric"] == metric and counts(row["scene"]) and _is_told(row):
             place = values.setdefault((row["scene"], row["position"]), {})
             place[row["solver"]] = float(row["value"])

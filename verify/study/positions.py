@@ -103,7 +103,7 @@ def positions_study(
     Parameters
     ----------
     levels : sequence of (Scene, int)
-        Scenes at rest on structured meshes, each with the level that is solved.
+        Scenes on structured meshes, each with the level that is solved.
     solvers : sequence of str
         Two at least, with parameters of their solves.
     positions : int
@@ -113,13 +113,11 @@ def positions_study(
     Raises
     ------
     InputError
-        If fewer than two solvers are asked, or a scene moves or has no such positions.
+        If fewer than two solvers are asked, or a scene has no such positions.
     """
     if len(solvers) < 2:
         raise InputError("one solver has no ratio to another; expected two at least", "--solver")
     for scene, _ in levels:
-        if scene.analysis.kind != "static":
-            raise InputError(f"'{scene.name}' moves; expected scenes at rest", "positions")
         if scene.mesh.pattern != "structured":
             said = f"'{scene.name}' has {scene.mesh.pattern} meshes"
             raise InputError(f"{said}; only structured ones have positions", "positions")
@@ -142,7 +140,9 @@ def _at(scene: Scene, level: int, number: int) -> Scene:
     if not 0 <= level < scene.mesh.count:
         raise InputError(f"{level}: '{scene.name}' has 0..{scene.mesh.count - 1}", "--level")
     update: dict[str, Any] = {"mesh": {"position": number}}
-    if scene.judged_by_exact:  # the others are not read, and factors along a front take longest
+    if (
+        scene.judged_by_exact and scene.analysis.kind == "static"
+    ):  # the others are not read, and factors along a front take longest
         update["quantities"] = [{"kind": "strain_energy"}]
     try:
         one = changed(on_one_level(scene, level), "", update)
