@@ -47,6 +47,11 @@ FROZEN = {
         "c7_spinning": "309841d4862cfc9a",
     },
 }
+FROZEN["1.2"] = FROZEN["1.1"] | {
+    "c5_blade_01": "479761e5b7789144",
+    "c5_blade_03": "a12cf7889650e8b3",
+    "c5_blade_06": "e9174c5d93525630",
+}
 
 
 def digest(table):

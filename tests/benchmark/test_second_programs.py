@@ -35,6 +35,31 @@ def test_a_program_gives_what_is_stated(scene):
         assert half_width <= 1.01 * wide, name
 
 
+def test_a_strained_body_at_rest_has_no_momentum_on_elements_that_move():
+    speed, slope, time = 0.45, 0.03, 0.13
+    strip = c5_blade.Strip(speed, 2)
+    u = slope * strip.places(time)
+    rate = speed * slope * (1 - np.abs(strip.x) / c5_blade.HALF_LENGTH)
+    mass, carried, twice, stiffness, _ = strip.matrices(time)
+    scale = np.abs(mass @ rate).max()
+    assert np.abs(mass @ rate - carried @ u).max() <= 1e-12 * scale
+    assert np.abs(carried.T @ rate - twice @ u).max() <= 1e-12 * np.abs(twice @ u).max()
+    force = stiffness @ u
+    assert np.abs(force[np.abs(strip.x) < 0.29]).max() <= 1e-12 * np.abs(force).max()
+    area = 2 * c5_blade.HALF_LENGTH * c5_blade.WIDTH
+    strained = 0.5 * c5_blade.SHEAR * slope**2 * area
+    assert strip.energy(time, u, rate) == pytest.approx(strained, rel=1e-12)
+
+
+def test_a_blade_at_a_speed_that_no_scene_has_takes_what_the_closed_form_says():
+    speed, g = 0.45, np.sqrt(1 - 0.45**2)
+    found = c5_blade.outputs(speed, 8)
+    opening = 2 * c5_blade.exact(c5_blade.PLACE, 0.0, c5_blade.END, speed)[0]
+    assert found["opening_behind"] == pytest.approx(opening, rel=1e-3)
+    assert found["K_III"] == pytest.approx(1000 * 0.006 * np.sqrt(2 * g / 0.1), rel=1e-2)
+    assert found["energy_taken"] == pytest.approx(1000 * 0.006**2 / 0.1, rel=1e-3)
+
+
 def test_a_turned_body_that_nothing_strains_is_at_rest():
     """Middles of edges that lie beside them strain it: so this program was wrong at first."""
     nodes, triangles, *_ = c7_spinning.grid(4)
