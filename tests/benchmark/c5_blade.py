@@ -1,7 +1,8 @@
 """C5, second route: half of the strip, quadratic triangles that move with the edge of the blade.
 
-Made from docs/benchmark/c5.md alone, with numpy, scipy and scikit-fem. `python c5_blade.py 0.3 8 12`
-prints its outputs at 0.3 of the shear wave's speed. It does so with 8 and 12 elements across.
+Made from docs/benchmark/c5.md alone, with numpy, scipy and scikit-fem.
+`python c5_blade.py 0.3 8 12` prints its outputs at 0.3 of the shear wave's speed, with 8 and 12
+elements across.
 
 A point of the mesh is at x = X + v t q, q = 1 - |X|/0.3: the edge stays at the node X = 0, and no
 node is let go. The velocity is u' = U' - v q du/dx, with U' at fixed X. It is singular as du/dx
