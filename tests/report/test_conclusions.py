@@ -24,7 +24,7 @@ from verify.report.benchmark_page import (
 )
 from verify.report.conclusions import answer
 from verify.report.evidence import Evidence, benchmark_scenes, beside
-from verify.report.front_page import arena_head, figures, write_front
+from verify.report.front_page import arena_head, combined, figures, write_front
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
 SCRIPT = Path(__file__).parents[2] / ".ci/results"
@@ -345,6 +345,22 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     assert "SOFA" not in head  # of another run
     assert "snapping 7 of 8" in head  # bars count scenes
     assert "getfem 2 of 3" in head
+
+
+def test_what_no_scene_combines_is_said():
+    far = case("dynamics/far", "through", moving=True)
+    far.scene["analysis"]["kinematics"] = "corotational"
+    far.scene["cuts"][0]["kind"] = "tool_path"
+    pressed = case("contact/pressed[angle=1]", "inner")
+    again = replace(pressed, case="contact/pressed[angle=2]")
+    for one in (pressed, again):
+        one.scene.update({"geometry": {"kind": "box"}, "contact": {"expected": "closed"}})
+    lines = combined(made([*supporting().results, far, pressed, again]))
+    of = {line.split(" | ")[0]: line.strip("|").split(" | ")[1:] for line in lines[4:]}
+    assert [int(n) for n in of["| plane, none of these"][:3]] == [4, 4, 3]
+    assert of["| plane, turning far"] == ["**none**", "**none**", "**none**", "1 "]
+    assert of["| space, faces that close"] == ["**none**", "1", "**none**", "**none** "]
+    assert of["| space, none of these"] == ["**none**"] * 3 + ["**none** "]
 
 
 def test_no_folder_of_a_machine_is_published(tmp_path, monkeypatch):

@@ -1,16 +1,26 @@
 """Front pages of the results and of the ranked run: answers and figures."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from verify.files import write_whole
 from verify.report.benchmark_page import discretisations, time_plot, title_of
 from verify.report.conclusions import STILL, Answer, drifts, steps_kept
-from verify.report.evidence import MEASURE, Beside, Evidence, benchmark_scenes, beside
+from verify.report.evidence import (
+    MEASURE,
+    Beside,
+    Evidence,
+    benchmark_scenes,
+    beside,
+    ends_inside,
+    moves,
+)
 from verify.report.notation import Drawing, number, solver_title
 from verify.report.plots import Bar, Palette, Ranged, Series, bars, loglog, ranges
 from verify.report.rendering import Beside as Pictures
 from verify.report.rendering import in_markdown
+from verify.result import CaseResult
 
 PICTURES = "front-pictures"
 _STEPS = (
@@ -56,14 +66,61 @@ def write_front(
 
 
 def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> list[str]:
-    """Return the first lines of the page of the ranked run: answers, and coverage as bars."""
+    """Return the first lines of the page of the ranked run: answers, coverage, what is combined."""
     shown = _pictures(folder, coverage(evidence))
     lines: list[str] = []
     for own in answers:
         if own.question in _OF_THE_ARENA:
             told = " ".join(one.text for one in own.found.values() if one.source == "arena")
             lines += [f"- **{own.question}**: {told}"] if told else []
-    return [*lines, "", " ".join(figure[0] for figure in shown.values())]
+    return [*lines, "", " ".join(figure[0] for figure in shown.values()), "", *combined(evidence)]
+
+
+def combined(evidence: Evidence) -> list[str]:
+    """Return the lines of a table of what scenes combine; where no scene does, nothing is known."""
+    lines = ["What no scene combines is not compared (sweeps count once):", "",
+             f"| scenes | {' | '.join(_KINDS)} |", "|---" * (len(_KINDS) + 1) + "|"]  # fmt: skip
+    for where, dimension in (("plane", 2), ("space", 3)):
+        for mechanics in _MECHANICS:
+            own = [
+                r
+                for r in evidence.results
+                if _dimension(r.scene) == dimension
+                and mechanics == next(n for n, of in _MECHANICS.items() if of(r.scene))
+            ]
+            found = [{r.case.partition("[")[0] for r in own if of(r)} for of in _KINDS.values()]
+            cells = [str(len(names)) if names else "**none**" for names in found]
+            lines.append(f"| {where}, {mechanics} | {' | '.join(cells)} |")
+    return lines
+
+
+def _dimension(scene: Mapping[str, Any]) -> int:
+    geometry = scene.get("geometry") or {}
+    if geometry.get("kind") == "file":
+        return int(geometry.get("dimension") or 2)
+    return 3 if geometry.get("kind") in ("box", "skin") else 2
+
+
+def _asks(scene: Mapping[str, Any], table: str, key: str) -> str:
+    return str((scene.get(table) or {}).get(key) or "")
+
+
+def _opens_by_a_blade(result: CaseResult) -> bool:
+    return any(cut.get("kind") == "tool_path" for cut in result.scene.get("cuts") or [])
+
+
+_KINDS: dict[str, Callable[[CaseResult], bool]] = {
+    "at rest, cut through": lambda r: not moves(r) and not ends_inside(r.scene),
+    "at rest, cut ends inside": lambda r: not moves(r) and ends_inside(r.scene),
+    "in motion, opened at once": lambda r: moves(r) and not _opens_by_a_blade(r),
+    "in motion, by a blade": lambda r: moves(r) and _opens_by_a_blade(r),
+}
+_MECHANICS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+    "faces that close": lambda s: _asks(s, "contact", "expected") == "closed",
+    "neo-Hookean": lambda s: "neo" in _asks(s, "material", "model"),
+    "turning far": lambda s: _asks(s, "analysis", "kinematics") not in ("", "linear"),
+    "none of these": lambda s: True,
+}
 
 
 def figures(evidence: Evidence) -> dict[str, Drawing | None]:
