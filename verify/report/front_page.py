@@ -66,7 +66,7 @@ def write_front(
 
 
 def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> list[str]:
-    """Return the first lines of the page of the ranked run: answers, coverage, what is combined."""
+    """Return the first lines of the page of the ranked run: answers, coverage, combinations."""
     shown = _pictures(folder, coverage(evidence))
     lines: list[str] = []
     for own in answers:
