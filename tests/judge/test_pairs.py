@@ -193,19 +193,28 @@ def test_no_error_that_the_reference_cannot_tell_from_none_is_paid_for():
 
 
 def test_programs_with_equal_errors_in_three_scenes_are_one_discretisation():
-    same = [{"x": e, "z": 1.2 * e, "y": e * (1 + 5e-7), "w": 1.2 * e} for e in (0.1, 0.02, 0.3)]
+    same = [{"x": e, "z": 1.2 * e, "y": e + 5e-7, "w": 1.2 * e} for e in (0.1, 0.02, 0.3)]
     names = ["x", "z", "y", "w"]
     assert groups_of(of(same), names) == [["x", "y"], ["z", "w"]]
     assert groups_of(of(same[:2]), names) == []
-    apart = [*same, {"x": 0.1, "y": 0.1 * (1 + 5e-6)}]
+    apart = [*same, {"x": 0.1, "y": 0.1 + 2e-6}]
     assert groups_of(of(apart), names) == [["z", "w"]]
-    # exact ones agree whatever made them
+    # small ones agree whatever made them
     assert groups_of(of([{"x": 1e-15, "y": 1e-13}] * 3), ["x", "y"]) == []
+    assert groups_of(of([{"x": 5e-7, "y": 1e-6}] * 3), ["x", "y"]) == []
     assert groups_of(of([*same, {"x": 1e-15, "y": 1e-13}]), names)[0] == ["x", "y"]
 
 
+def test_a_sweep_agrees_by_the_median_of_its_members():
+    same = of([{"x": e, "y": e} for e in (0.1, 0.2)])
+    for off, expected in (((0.0, 0.0, 1e-3), [["x", "y"]]), ((0.0, 1e-5, 1e-3), [])):
+        sweep = [case(f"s[{d}]", solve("x", error=0.3), solve("y", error=0.3 + d), family="s")
+                 for d in off]  # fmt: skip
+        assert groups_of([*same, *sweep], ["x", "y"]) == expected
+
+
 def test_a_group_is_one_only_if_every_pair_agrees():
-    chain = [{"a": e, "b": e * (1 + 7e-7), "c": e * (1 + 1.4e-6)} for e in (0.1, 0.2, 0.3)]
+    chain = [{"a": e, "b": e + 7e-7, "c": e + 1.4e-6} for e in (0.1, 0.2, 0.3)]
     assert groups_of(of(chain), ["a", "b", "c"]) == [["a", "b"]]
 
 
