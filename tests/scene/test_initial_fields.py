@@ -20,7 +20,7 @@ def interpolation_error(cells: int, shift: float) -> float:
     h = HALF / cells
     x, y = h * (np.arange(-cells - 1, cells + 2) + shift), h * np.arange(cells + 1)
     nodes = np.array([(a, b, 0.0025) for a in x for b in y])
-    above = nodes + np.array([0.0, 1e-6 * h, 0.0])  # the upper face of the cut
+    above = nodes + h * np.array([0.3, 0.3, 0.0])  # within an element, above the cut
     _, velocity = scene.initial.state(nodes, above, exact)
     linear = RegularGridInterpolator((x, y), velocity[:, 2].reshape(len(x), len(y)))
     points = np.random.default_rng(3).uniform((-HALF, 1e-9), HALF, (400_000, 2))
@@ -30,11 +30,14 @@ def interpolation_error(cells: int, shift: float) -> float:
 
 
 def test_no_velocity_at_a_node_at_the_edge_costs_no_more_than_the_order_of_interpolation():
-    """|v| ~ r^-½: errors are of order ½ in h, with a node at the edge at most twice as large."""
+    """|v| ~ r^-½: errors are of order ½ in h, at most twice as large with a node near the edge.
+
+    The value of a node 0.01 elements behind the edge would make it eight times as large.
+    """
     cells = np.array([12, 24, 48])
-    at_edge, beside = (
-        np.array([interpolation_error(n, shift) for n in cells]) for shift in (0.0, 0.5)
-    )
-    orders = -np.diff(np.log(at_edge)) / np.diff(np.log(cells))
-    assert orders == pytest.approx(0.5, abs=0.1)
-    assert (at_edge < 2.0 * beside).all(), at_edge / beside
+    beside = np.array([interpolation_error(n, 0.5) for n in cells])
+    for shift in (0.0, -0.01, -0.05):
+        near = np.array([interpolation_error(n, shift) for n in cells])
+        orders = -np.diff(np.log(near)) / np.diff(np.log(cells))
+        assert orders == pytest.approx(0.5, abs=0.1)
+        assert (near < 2.0 * beside).all(), near / beside
