@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ import pytest
 from verify.cli import main
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange import read_answers
-from verify.foreign.records import PROGRAMS
-from verify.scene import load_scene
+from verify.foreign.records import PROGRAMS, Takes
+from verify.scene import BodyForce, load_scene
 from verify.solvers import find_solver, solver_names
 from verify.solvers.interface import refusal_of
 
@@ -66,6 +67,20 @@ def test_contact_is_what_a_program_refuses_that_takes_the_same_crack_without(add
     assert why == "contact of the faces of a cut ('static') is not offered by linear"
     apart = scene.model_copy(update={"contact": type(scene.contact)()})
     assert refusal_of(find_solver("linear"), apart) is None
+
+
+def test_forces_in_formulas_are_refused_before_the_body_is_exported():
+    """By programs whose records say so: the export of a fine body in space takes ten seconds."""
+    takes = Takes([2, 3], ["static"], ["linear"], formulas=False)
+    scene = load_scene(CASE)
+    assert takes.refusal(scene) is None
+    for force in (["0.0", "x*y"], "exact"):
+        load = BodyForce(kind="body_force", force=force)
+        pulled = scene.model_copy(update={"loads": [*scene.loads, load]})
+        assert takes.refusal(pulled) == "body forces in formulas are not offered"
+        assert replace(takes, formulas=True).refusal(pulled) is None
+    even = BodyForce(kind="body_force", force=[0.0, -9.8])
+    assert takes.refusal(scene.model_copy(update={"loads": [even]})) is None
 
 
 @pytest.mark.parametrize(

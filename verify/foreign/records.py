@@ -18,7 +18,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from verify.errors import InputError
 from verify.files import asked_place
 from verify.printable import shown
-from verify.scene import Scene
+from verify.scene import BodyForce, Scene
 from verify.scene.strict import nearest
 
 PROGRAMS = Path(__file__).resolve().parent / "programs"
@@ -61,7 +61,9 @@ class Takes:
         Whether cuts may open in the course of a motion.
     histories : bool
         Whether supports and loads may change in time.
-    membranes : bool
+    membranes, damping : bool
+    formulas : bool
+        Whether body forces may be formulas, or the exact solution's.
     initial : list of str
         Kinds of initial states.
     """
@@ -81,6 +83,7 @@ class Takes:
     histories: bool = False
     membranes: bool = False
     damping: bool = False
+    formulas: bool = True
     initial: list[str] = field(default_factory=lambda: ["rest"])
 
     def refusal(self, scene: Scene) -> str | None:
@@ -107,6 +110,9 @@ class Takes:
             return "supports and loads that change in time are not offered"
         if not self.damping and any(analysis.damping):
             return "damping is not offered"
+        forces = [load.force for load in scene.loads if isinstance(load, BodyForce)]
+        if not self.formulas and any(isinstance(f, str) for force in forces for f in force):
+            return "body forces in formulas are not offered"
         return None
 
 
