@@ -27,7 +27,8 @@ _FIRST = ("xfem", MEASURE, "conforming mesh=remeshed")  # of the named ones
 _LEGEND = (
     "Relative L² error of the displacement over the least error of the scene, at equal element "
     "size. **Bold**: the interval overlaps that of the best. In brackets: 90 % range of the ratio "
-    "over positions of the mesh, where they were studied. – refused with a reason; × asked, and "
+    "over positions of the mesh on level 1, where they were studied; where orders differ, ratios "
+    "grow with the level. – refused with a reason; × asked, and "
     "not solved; blank: not asked. ≈ the reference cannot tell the error from none. Several "
     "members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶."
 )
