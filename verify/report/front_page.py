@@ -176,7 +176,8 @@ def _differences(evidence: Evidence, kind: str) -> list[str]:
                             if not 1 / _FAR <= own.ratio <= _FAR],
     }  # fmt: skip
     told = [f"{what}: {', '.join(names)}" for what, names in shown.items() if names]
-    return [f"*{'; '.join(told).capitalize()}.*", ""] if told else []
+    text = "; ".join(told)
+    return [f"*{text[0].upper()}{text[1:]}.*", ""] if told else []
 
 
 def coverage(evidence: Evidence) -> dict[str, Drawing | None]:
