@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
+from verify.errors import InputError
+from verify.printable import place_text
 from verify.scene.acceptance import (
     Acceptance,
     BladeCheck,
@@ -33,9 +35,9 @@ from verify.scene.strict import (
 from verify.scene.tool_path import Cut
 
 Array = NDArray[np.float64]
-# Of a velocity like r^-½, beside those in elements: between nodes it errs less by 0 than by the
-# value of a node that is nearer to the edge than a tenth of an element.
-_LARGEST = 2.0
+# Of a velocity like r^-½, over those within cells: a tip less than 1/1000 of a cell away, and at
+# the node but for round-off.
+_LARGEST, _UNBOUNDED = 30.0, 1e4
 
 
 class AtRest(Strict):
@@ -117,8 +119,8 @@ class InitialField(Strict):
     def state(self, points: Array, near: Array, exact: Any) -> tuple[Array, Array]:
         """Displacement and velocity (n, d) of points (n, d), m and m/s.
 
-        At the tip of a crack the exact velocity is unbounded, like r^-½. At a node there, or within
-        about a tenth of an element of it, 0 is taken: a change of the order of interpolation.
+        At a node at the tip of a crack the exact velocity is unbounded, like r^-½, and 0 is taken:
+        a change of the order of interpolating it from any nodes.
 
         Parameters
         ----------
@@ -126,23 +128,39 @@ class InitialField(Strict):
         near : (n, d) array
             Points of the material that they move: on which side of a cut they are.
         exact : ExactSolution or None
+
+        Raises
+        ------
+        InputError
+            If a point lies beside the tip of a crack, where the exact velocity is unbounded.
         """
         at_start = None if exact is None else exact.at(0.0)
         fields = []
         for given, name in ((self.displacement, "displacement"), (self.velocity, "velocity")):
             if given == "exact":
-                values = getattr(at_start, name)
-                fields.append(_bounded(values(points, near), values(near, near)))
+                field = getattr(at_start, name)
+                values = field(points, near)
+                fields.append(
+                    _bounded(values, field(near, near), points) if name == "velocity" else values
+                )
             else:
                 fields.append(field_values(given or [0.0] * points.shape[1], points))
         return fields[0], fields[1]
 
 
-def _bounded(values: Array, beside: Array) -> Array:
-    """Take 0 for values (n, d) that stand out from all of those beside the points."""
+def _bounded(values: Array, beside: Array, points: Array) -> Array:
+    """Take 0 for velocities (n, d) at a tip; refuse what stands out beside one."""
     size = np.linalg.norm(values, axis=1)
-    most = _LARGEST * float(np.linalg.norm(beside, axis=1).max(initial=0.0))
-    return np.where(((size <= most) | (most == 0.0))[:, None], values, 0.0)
+    most = float(np.linalg.norm(beside, axis=1).max(initial=0.0))
+    stands_out = ~(size <= _LARGEST * most) & (most > 0.0)
+    beside_tip = np.flatnonzero(stands_out & (size <= _UNBOUNDED * most))
+    if len(beside_tip):
+        raise InputError(
+            f"initial.velocity: the exact field is unbounded beside the node "
+            f"{place_text(points[beside_tip[0]])}; expected no node so near to the tip at the "
+            "time 0: another mesh, or another place of the tip"
+        )
+    return np.where(stands_out[:, None], 0.0, values)
 
 
 Initial = Annotated[AtRest | Equilibrium | InitialField | Moving, Field(discriminator="kind")]
