@@ -23,7 +23,7 @@ from reference.meshing import ConformingMesh, open_cut
 from reference.nodal_algebra import NodalMatrix, NodalSolver, TiedSolver
 from reference.space import ConformingSpace, TiedUnknowns
 from verify.errors import InputError
-from verify.geometry.simplices import distance_to_pieces
+from verify.geometry.simplices import nearest_cut
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Gravity, Scene, ToolPathCut
 from verify.scene.physics import PrescribedMotion, factor_at, first_factor
@@ -126,9 +126,7 @@ def facet_openings(
     """Find when each facet of the cut opens.
 
     Facets of a cut open with it. A facet on a tool path opens when the blade has passed the last of
-    its corners; if `swept`, at each node as the first facet there begins to be swept. A facet
-    belongs to the cut that it is closest to: one on a curved cut is off by its own sagitta, and
-    cuts do not lie on each other.
+    its corners; if `swept`, at each node as the first facet there begins to be swept.
 
     Parameters
     ----------
@@ -141,18 +139,11 @@ def facet_openings(
     delay : float
         By which facets on tool paths open late, s.
     """
-    mesh = space.mesh
-    corners = mesh.realised_cut
-    places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
-    points = places.reshape(-1, mesh.dimension)
-    off = [
-        distance_to_pieces(points, cut.pieces()).reshape(places.shape[:2]).max(axis=1)
-        for cut in scene.final_cuts
-    ]
+    corners = space.mesh.realised_cut
+    nearest = nearest_cut(corners, [cut.pieces() for cut in scene.final_cuts])
     _, place = np.unique(space.node_points, axis=0, return_inverse=True)
     shares = SweptShares(len(corners), by_node=True)
     times, passed = np.zeros((2, *facing.shape[:2]))
-    nearest = np.argmin(off, axis=0) if off else np.zeros(0, dtype=np.int64)
     for i, cut in enumerate(scene.cuts):
         mine = nearest == i
         if isinstance(cut, ToolPathCut):

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -10,6 +11,7 @@ _LONGEST = 2000  # characters of a message; more is no message
 # ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
 _HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 _KEPT = "\n\t"
+_NAMED = re.compile(r"([A-Za-z_]\w*\.)*[A-Z]\w*(Error|Exception|Exit|Interrupt)(:|$)")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
@@ -53,6 +55,16 @@ def words_of(error: BaseException, longest: int = _LONGEST) -> str:
     except Exception:
         said = ""
     return one_line(f"{type(error).__name__}{': ' if said else ''}{said}", longest)
+
+
+def last_error(said: str) -> str:
+    """Return the last line in which Python names an error, else the last line; "" of nothing.
+
+    What a program says at its end, after its error or before, is not why it ended.
+    """
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    named = [line for line in lines if _NAMED.match(line)]
+    return one_line((named or lines or [""])[-1])
 
 
 def duration_text(seconds: float) -> str:

@@ -2,14 +2,26 @@
 
 import json
 import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from verify.cli import main
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.foreign import foreign_solver, install, installing, remove, state_of
-from verify.foreign.installing import mark_of, solvers_folder
+from verify.foreign.installing import ForeignProgram, mark_of, solvers_folder
+from verify.printable import last_error
+from verify.scene import load_scene
+
+ROOTED = """
+import json, os, pathlib, sys
+import rooted
+folder = pathlib.Path(sys.argv[1]) / f"level-{sys.argv[2]}"
+said = {"schema": 1, "refused": f"{rooted.version()} at {os.environ['ROOTED']}"}
+(folder / "solution.json").write_text(json.dumps(said))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -23,9 +35,11 @@ def locked(add_example, wheel, environment, monkeypatch):
     """A solver of the package ``cutfake``, with the hash of its wheel in the lock."""
     call = installing._call
 
-    def made_once(solver, command):  # most of what an installation takes is an empty environment
+    def made_once(
+        solver, command, paths=None
+    ):  # most of what an installation takes is an empty environment
         if command[1:3] != ["-m", "venv"]:
-            return call(solver, command)
+            return call(solver, command, paths)
         if not environment.exists():
             call(solver, [*command[:3], str(environment)])
         return shutil.copytree(environment, command[3], symlinks=True)
@@ -90,3 +104,45 @@ def test_a_system_package_is_found_where_it_is_and_else_the_way_to_it_is_said(ad
     assert not mark_of("elsewhere").exists()
     install("here", sys.executable)  # remembers this Python
     assert mark_of("here").is_file()
+
+
+@pytest.mark.parametrize("way", ["path file", "user site", "PYTHONPATH"])
+def test_a_python_of_the_system_has_its_package_by_any_way_that_python_knows(
+    way, add_example, tmp_path, monkeypatch
+):
+    python, package = sys._base_executable, tmp_path / "package"
+    package.mkdir()
+    (package / "rooted.py").write_text("def version():\n    return '7.1'\n")
+    if way == "path file":
+        subprocess.run([python, "-m", "venv", "--without-pip", tmp_path / "own"], check=True)
+        python = str(tmp_path / "own/bin/python")
+        (site,) = tmp_path.glob("own/lib/python3*/site-packages")
+        (site / "rooted.pth").write_text(str(package))
+    elif way == "user site":
+        monkeypatch.setenv("PYTHONUSERBASE", str(tmp_path / "user"))
+        asked = [python, "-c", "import site; print(site.getusersitepackages())"]
+        site = Path(
+            subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
+        )
+        shutil.copytree(package, site)
+    else:
+        monkeypatch.setenv("PYTHONPATH", str(package))
+    folder = add_example("rooted", python=python, text=ROOTED)
+    record = folder / "solver.toml"
+    text = record.read_text().replace("[parameters]", 'variables = ["ROOTED"]\n[parameters]')
+    text = text.replace('version_of = "numpy"', 'version_of = "rooted:version"')
+    record.write_text(text.replace('module = "numpy"', 'module = "rooted"'))
+    monkeypatch.setenv("ROOTED", "its root")
+    assert install("rooted").version == "7.1"
+    monkeypatch.delenv("ROOTED")
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    with pytest.raises(UnsupportedSceneError, match=r"^7\.1 at its root$"):
+        ForeignProgram("rooted").solve(load_scene("statics/f1_patch"), 0)
+
+
+def test_the_reason_of_a_failure_is_its_error_not_what_a_program_says_after_it():
+    said = "Traceback (most recent call last):\n  File 'x'\nValueError: no mesh\n[INFO] unloaded\n"
+    assert last_error(said) == "ValueError: no mesh"
+    assert last_error("one\nstopped early\n\n") == "stopped early"
+    assert last_error("a.b.LostError: gone\nSystemExit\n") == "SystemExit"
+    assert last_error("") == ""

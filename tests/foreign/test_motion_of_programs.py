@@ -108,6 +108,21 @@ def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(modules, tmp_pa
     assert_same_motion(found, expected, 1e-9)
 
 
+@pytest.mark.parametrize("case", ["plate_bent_path", "hanging_block_quick"])
+def test_facets_behind_a_blade_open_one_by_one_as_the_conforming_solver_says(
+    case, modules, tmp_path
+):
+    scene = load_scene(f"cutting/{case}")
+    times = scene.analysis.model_copy(update={"time_step": scene.analysis.output_times[-1] / 25})
+    scene = scene.model_copy(update={"analysis": times})
+    export_case(scene, tmp_path, [0], conforming=True)
+    laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    modules["motion"].run_engine(laid, newmark(modules["example"]))
+    found = read_answers(scene, tmp_path).solutions[0]
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1, opening="late")
+    assert_same_motion(found, expected, 1e-9)
+
+
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 def test_a_program_that_says_with_which_mass_it_moves_keeps_its_energy(mass, modules, tmp_path):
     scene = undamped("dynamics/block_falls_apart")

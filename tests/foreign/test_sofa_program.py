@@ -50,18 +50,22 @@ class Node:
 def init(root):
     parts = root.children[0].objects
     topology, force = parts["TetrahedronSetTopologyContainer"], parts["ConstantForceField"]
-    law = parts["FastTetrahedralCorotationalForceField"]
-    assert law.method.value == "polar"
-    assert force.indices.value == list(range(len(topology.position.value)))
-    mesh = cut_mesh(SimplexMesh(np.array(topology.position.value), topology.tetrahedra.value), [])
-    mass = side_wise_mass(mesh, parts["DiagonalMass"].massDensity.value)
+    law, points = parts["CorotationalFEMForceField"], parts["MechanicalObject"].rest_position.value
+    held, mass = parts["PartialFixedProjectiveConstraint"], parts["DiagonalMass"].vertexMass.value
+    assert (law.template.value, law.rotationMethod.value) == ("Vec3d,Tetrahedron", "polar")
+    assert np.ptp(law.youngModulus.value) < 1e-10 * law.youngModulus.value[0]
+    np.testing.assert_array_equal(force.indices.value, np.arange(len(points)))
+    np.testing.assert_array_equal(held.fixedDirections.value, [1, 1, 1])
+    mesh = cut_mesh(SimplexMesh(points, topology.tetrahedra.value), [])
+    lumped = side_wise_mass(mesh, mass[0] / side_wise_mass(mesh, 1.0).weights[0])
+    np.testing.assert_allclose(mass, lumped.weights, rtol=1e-12)
     body = DynamicBody(
-        InternalForce(mesh, isotropic(law.youngModulus.value, law.poissonRatio.value, "solid")),
-        mass,
-        weight=np.array(force.forces.value),
-        supports=Supports.none(mesh).prescribe(
-            mesh, np.array(parts["FixedProjectiveConstraint"].indices.value)
+        InternalForce(
+            mesh, isotropic(law.youngModulus.value[0], law.poissonRatio.value[0], "solid")
         ),
+        lumped,
+        weight=force.forces.value,
+        supports=Supports.none(mesh).prescribe(mesh, held.indices.value),
     )
     root.body, root.moved = body, body.rest()
 
@@ -69,16 +73,22 @@ def init(root):
 def animate(root, dt):
     state = root.children[0].objects["MechanicalObject"]
     RealTimeEuler(root.body, dt).advance(root.moved)
-    state.position.value = np.array(state.rest_position.value) + root.moved.displacement
+    state.position.value = state.rest_position.value + root.moved.displacement
     state.velocity.value = root.moved.velocity
 
 
 @pytest.fixture
-def program(monkeypatch):
+def missing(request):
+    """Module of SOFA that cannot be loaded; by default none."""
+    return getattr(request, "param", None)
+
+
+@pytest.fixture
+def program(monkeypatch, missing):
     sofa, runtime = ModuleType("Sofa"), ModuleType("SofaRuntime")
-    sofa.__version__, sofa.Core = "stand-in", SimpleNamespace(Node=Node)
+    sofa.GetVersion, sofa.Core = lambda: "stand-in", SimpleNamespace(Node=Node)
     sofa.Simulation = SimpleNamespace(initRoot=init, animate=animate, unload=lambda root: None)
-    runtime.importPlugin = lambda name: None
+    runtime.importPlugin = lambda name: name != missing
     monkeypatch.setitem(sys.modules, "Sofa", sofa)
     monkeypatch.setitem(sys.modules, "SofaRuntime", runtime)
     monkeypatch.syspath_prepend(PROGRAMS)
@@ -99,9 +109,15 @@ def test_the_program_moves_the_beam_of_the_record_as_sofa_did(program, tmp_path)
     scene = load_scene(str(tmp_path / "beam.toml"))
     export_case(scene, tmp_path / "out", conforming=True)
     case = program.run.__globals__["Case"](tmp_path / "out", 0, conforming=True)
-    case.parameters = {"method": "polar"}
+    case.parameters = {"rotation": "polar", "scheme": "euler"}
     program.solve(case)
     found = read_answers(scene, tmp_path / "out").solutions[0]
     assert found.displacement[-1][tip, 1].mean() == pytest.approx(-0.0619945794431326, abs=1e-11)
     answer = json.loads((tmp_path / "out/level-0/solution.json").read_text())
     assert answer["iterations"] == {"steps": 100}
+
+
+@pytest.mark.parametrize("missing", ["Sofa.Component.Mass"], indirect=True)
+def test_a_module_that_cannot_be_loaded_is_named(program, missing):
+    with pytest.raises(RuntimeError, match=f"SOFA has no {missing}: set SOFA_ROOT"):
+        program.solve(None)

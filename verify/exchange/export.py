@@ -30,7 +30,7 @@ from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
 from verify.files import asked_place, read_json, whole_file, write_json
-from verify.printable import one_line
+from verify.printable import last_error, one_line
 from verify.result import Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene
@@ -188,6 +188,7 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
     if problem.conforming:  # on a background mesh they would ignore the cuts
         content["nodal_forces"] = problem.nodal_forces()
         content["free_pieces"] = problem.free_pieces()
+        content["cut_opens"] = problem.cut_opens()
     write_json(content, conditions)
     return [mesh, conditions]
 
@@ -428,9 +429,10 @@ class ProgramSolver:
         )  # fmt: skip
         wall = perf_counter() - start
         if done.returncode:
-            said = done.stderr.strip() or done.stdout.strip() or "said nothing"
+            said = done.stderr.strip() or done.stdout.strip()
             text = f"'{self.name}': {words[0]} ended with {done.returncode}"
-            raise RuntimeError(f"{text}: {said.splitlines()[-1][-_TAIL:]}{_raised_at(said)}")
+            why = last_error(said)[-_TAIL:] or "said nothing"
+            raise RuntimeError(f"{text}: {why}{_raised_at(said)}")
         return wall
 
 

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from reference.exact import ExactSolution, exact_of
 from verify.compare.hooke import hooke
 from verify.errors import UnsupportedSceneError
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import measures, nearest_cut
 from verify.scene import (
     Box,
     CutFaces,
@@ -28,6 +28,7 @@ from verify.scene import (
     Rectangle,
     Scene,
     Support,
+    ToolPathCut,
     Traction,
 )
 from verify.scene.parts import HeldFacets, Pieces, pieces_on_part
@@ -131,6 +132,23 @@ class Problem:
     cut_facets: Array
     held: list[HeldNodes]
     loads: list[Load]
+
+    def cut_opens(self) -> Array:
+        """Time (f,) in s from which on each of `cut_facets` is open.
+
+        That of its cut; on a tool path, when the blade has passed all of the facet.
+        """
+        cuts = self.scene.cuts
+        nearest = nearest_cut(self.cut_facets, [cut.pieces() for cut in self.scene.final_cuts])
+        times = np.zeros(len(self.cut_facets))
+        for i, cut in enumerate(cuts):
+            mine = self.cut_facets[nearest == i]
+            if isinstance(cut, ToolPathCut):
+                passed = cut.passed_at(mine.reshape(-1, mine.shape[2]))
+                times[nearest == i] = passed.reshape(mine.shape[:2]).max(axis=1)
+            else:
+                times[nearest == i] = cut.opens_at
+        return times
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
         """Which components (n, d) of which nodes are held, and their values (n, d), m."""

@@ -10,14 +10,14 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from verify.errors import InputError
 from verify.exchange.export import ProgramSolver
 from verify.files import read_json, write_json
 from verify.foreign.records import PROGRAMS, ForeignSolver, foreign_solver
-from verify.printable import one_line
+from verify.printable import last_error
 from verify.runner.fingerprint import file_digest
 from verify.scene import Scene
 
@@ -50,8 +50,9 @@ class ForeignProgram(ProgramSolver):
         self.name, self.conforming = name, record.conforming
         self.parameters, self.choices = record.parameters, record.choices
         self._takes = record.takes
-        # without the user's packages and paths, which belong to another Python
-        self.command = (state.python, "-s", str(program), "{folder}", "{level}")
+        self._paths, self._variables = state.paths, state.variables
+        alone = ("-s",) if state.paths is None else ()
+        self.command = (state.python, *alone, str(program), "{folder}", "{level}")
         self.files = [*record.folder.glob("*.*"), *PROGRAMS.glob("*.py"), mark_of(name)]
         self.files = [file for file in self.files if file.is_file()]
 
@@ -60,9 +61,11 @@ class ForeignProgram(ProgramSolver):
         return self._takes.refusal(scene)
 
     def environment(self) -> dict[str, str]:
-        """Return that of this process, with the reader and writer as the only path."""
+        """Return that of this process, with the reader and writer as the first path."""
         inherited = {key: value for key, value in os.environ.items() if key != "PYTHONHOME"}
-        return {**inherited, "PYTHONPATH": str(PROGRAMS), "PYTHONDONTWRITEBYTECODE": "1"}
+        paths = os.pathsep.join([str(PROGRAMS), *([self._paths] if self._paths else [])])
+        own = {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+        return {**inherited, **self._variables, **own}
 
 
 _ASKED = """
@@ -71,7 +74,10 @@ module, of = sys.argv[1:]
 importlib.import_module(module)
 if ":" in of:
     found = getattr(importlib.import_module(of.split(":")[0]), of.split(":")[1])
-    version = str(found("version") if callable(found) else found)
+    try:
+        version = str(found() if callable(found) else found)
+    except TypeError:
+        version = str(found("version"))
 else:
     version = importlib.metadata.version(of)
 print(json.dumps({"version": version, "python": platform.python_version()}))
@@ -89,11 +95,18 @@ class State:
     version : str
     missing : str
         What to do about it, if it is not there.
+    paths : str, optional
+        PYTHONPATH with which a Python of the system has it, its user's packages too; None: it has
+        it without either, which is tried first, since they may belong to another Python.
+    variables : dict of str to str
+        Of its record, as they were when it was found.
     """
 
     python: str = ""
     version: str = ""
     missing: str = ""
+    paths: str | None = None
+    variables: dict[str, str] = field(default_factory=dict)
 
 
 def solvers_folder() -> Path:
@@ -120,14 +133,16 @@ def state_of(solver: ForeignSolver) -> State:
             return State(missing=f"its Python {said['python']} has gone: {command}")
         if said["lock"] != _lock_digest(solver):
             return State(missing=f"installed from another lock: {command}")
-        return State(said["python"], said["version"])
+        return State(
+            said["python"], said["version"], paths=said.get("paths"),
+            variables=said.get("variables", {}),
+        )  # fmt: skip
     if solver.install.kind == "system":
         try:
-            said = _ask(solver, solver.install.python)
+            return _find(solver, solver.install.python)
         except InputError:
             command = f"{solver.install.how}; or {command} --python THE-PYTHON-THAT-HAS-IT"
             return State(missing=command)
-        return State(solver.install.python, said["version"])
     return State(missing=command)
 
 
@@ -156,7 +171,7 @@ def install(name: str, python: str | None = None) -> State:
     if interpreter is None:
         raise InputError(f"{name}: no Python '{asked}'", "--python")
     if system:
-        said = _ask(solver, interpreter)
+        state = _find(solver, interpreter)
     else:
         _check_version(solver, interpreter)
     shutil.rmtree(folder, ignore_errors=True)
@@ -164,15 +179,13 @@ def install(name: str, python: str | None = None) -> State:
     try:
         if not system:
             interpreter = _environment(solver, interpreter, folder / "environment")
-            said = _ask(solver, interpreter)
-        write_json(
-            {"python": interpreter, "version": said["version"], "lock": _lock_digest(solver)},
-            mark_of(name),
-        )
+            state = State(interpreter, _ask(solver, interpreter)["version"])
+        said = {"python": state.python, "version": state.version, "lock": _lock_digest(solver)}
+        write_json({**said, "paths": state.paths, "variables": state.variables}, mark_of(name))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    return State(interpreter, said["version"])
+    return state
 
 
 def remove(name: str) -> Path:
@@ -209,24 +222,40 @@ def _check_version(solver: ForeignSolver, python: str) -> None:
         raise InputError(f"{python} {text} {solver.install.python} or later", "--python")
 
 
-def _ask(solver: ForeignSolver, python: str) -> dict[str, str]:
+def _find(solver: ForeignSolver, python: str) -> State:
+    """Ask a Python of the system, without its user's packages and paths, then with them."""
+    variables = {k: os.environ[k] for k in solver.install.variables if k in os.environ}
+    try:
+        return State(python, _ask(solver, python, "-s")["version"], variables=variables)
+    except InputError:
+        paths = os.environ.get("PYTHONPATH", "")
+        said = _ask(solver, python, paths=paths)
+        return State(python, said["version"], paths=paths, variables=variables)
+
+
+def _ask(
+    solver: ForeignSolver, python: str, *options: str, paths: str | None = None
+) -> dict[str, str]:
     """Import it with its Python; return the versions."""
-    said = _call(solver, [python, "-c", _ASKED, solver.module, solver.version_of])
+    words = [python, *options, "-c", _ASKED, solver.module, solver.version_of]
+    said = _call(solver, words, paths)
     # what it imports may speak too, at its end as well
     line = next(line for line in reversed(said.splitlines()) if line.startswith("{"))
     answer: dict[str, str] = json.loads(line)
     return answer
 
 
-def _call(solver: ForeignSolver, words: list[str]) -> str:
+def _call(solver: ForeignSolver, words: list[str], paths: str | None = None) -> str:
     """Run a command; what it says.
 
     Raises
     ------
     InputError
-        If it fails: with the last line that it said.
+        If it fails: with the error that it ended with, or the last line that it said.
     """
     outside = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    if paths:
+        outside["PYTHONPATH"] = paths
     try:
         done = subprocess.run(
             words, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
@@ -235,8 +264,7 @@ def _call(solver: ForeignSolver, words: list[str]) -> str:
     except OSError as error:
         raise InputError(f"{solver.name}: {words[0]}: {error.strerror}") from None
     if done.returncode:
-        said = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-        why = one_line(said[-1] if said else f"exit code {done.returncode}")
+        why = last_error(done.stderr or done.stdout) or f"exit code {done.returncode}"
         raise InputError(f"{solver.name} cannot be used with {words[0]}: {why}")
     return done.stdout
 

@@ -38,12 +38,15 @@ class Install:
         The least version of Python; of a system package the interpreter that it is installed for.
     how : str
         The command that installs a system package, for the user to read.
+    variables : list of str
+        Environment variables that it needs, as they are when it is installed.
     """
 
     __pydantic_config__ = _STRICT
     kind: Literal["packages", "system"]
     python: str
     how: str = ""
+    variables: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class Takes:
     kinematics: list[str]
     cuts: list[str] = field(
         default_factory=lambda: [
-            "polyline", "arc", "polygon", "disc", "cylinder", "sphere", "swept",
+            "polyline", "arc", "polygon", "disc", "cylinder", "sphere", "swept", "tool_path",
         ]
     )  # fmt: skip
     materials: Literal["one", "several"] = "several"

@@ -285,6 +285,17 @@ def distance_to_pieces(points: Array, pieces: Sequence[HasFeet]) -> Array:
     return np.asarray(np.min(away, axis=0), dtype=float)
 
 
+def nearest_cut(facets: Array, cuts: Sequence[Sequence[HasFeet]]) -> NDArray[np.int64]:
+    """Tell which of the cuts each facet (f, d, d) lies on, by the pieces of each cut.
+
+    A facet on a curved cut is off by its own sagitta: its farthest corner or middle decides.
+    """
+    places = np.concatenate([facets, facets.mean(axis=1, keepdims=True)], axis=1)
+    points = places.reshape(-1, facets.shape[2])
+    off = [distance_to_pieces(points, one).reshape(places.shape[:2]).max(axis=1) for one in cuts]
+    return np.argmin(off, axis=0) if off else np.zeros(0, dtype=np.int64)
+
+
 def distances(points: Array, parts: Array) -> Array:
     """Distances of points (..., d) to segments or triangles (m, k, d), broadcast to (..., m)."""
     edges = [(0, 1)] if parts.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]

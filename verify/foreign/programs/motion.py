@@ -1,7 +1,8 @@
 """Statics and motion of an exported case, for any engine that answers a step.
 
 Cuts that are still closed are nodes that are one: each time a cut opens, the engine is given the
-body anew, and the state goes over node by node. Beside `exchange_files` it needs numpy alone.
+body anew, and the state goes over node by node. Behind a blade a node opens once the blade has
+passed all facets there. Beside `exchange_files` it needs numpy alone.
 
 An engine is a class, called with the case and a `Stage`, with the methods
 
@@ -12,6 +13,7 @@ An engine is a class, called with the case and a `Stage`, with the methods
 """
 
 import time
+from contextlib import contextmanager
 
 import numpy as np
 from exchange_files import RefusedError, factor_at, loose_parts
@@ -25,6 +27,8 @@ class Stage:
 
     Attributes
     ----------
+    opens : (N,) array
+        When each node of the case parts from its twins, s.
     node : (N,) int array
         Node of the stage for each node of the case.
     first : (n,) int array
@@ -33,8 +37,9 @@ class Stage:
         Mesh (n, d), (m, d + 1) and mark (n, d) of the held components.
     """
 
-    def __init__(self, case, instant):
-        closed, everything = _opening(case) > instant, np.arange(len(case.points))
+    def __init__(self, case, instant, opens=None):
+        self.opens = _opening(case) if opens is None else opens
+        closed, everything = self.opens > instant, np.arange(len(case.points))
         place = np.unique(case.points, axis=0, return_inverse=True)[1].ravel()
         names = np.where(closed, place, len(place) + everything)
         self.case, self.instant = case, instant
@@ -94,35 +99,24 @@ def _uniform(case, load):
 
 
 def _opening(case):
-    """Return the time (N,) at which a node parts from its twins across a cut; −∞ without one."""
-    cuts, points = case.content["cuts"], case.points
-    _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
-    opens = np.full(len(points), -np.inf)
-    double = count[place.ravel()] > 1
-    times = sorted({cut["opens_at"] for cut in cuts})
-    if len(times) == 1:
-        opens[double] = times[0]
-    elif times:
-        near = [_distance(points, cut) < 1e-6 * case.problem["size"] for cut in cuts]
-        own = np.where(near, np.array([[cut["opens_at"]] for cut in cuts]), np.nan)[:, double]
-        if np.isnan(own).all(axis=0).any() or (np.ptp(np.nan_to_num(own, nan=0), axis=0) < 0).any():
-            raise RefusedError("curved cuts that open in turn")
-        first, last = np.nanmin(own, axis=0), np.nanmax(own, axis=0)
-        if (first < last).any():
-            raise RefusedError("cuts that meet and open in turn")
-        opens[double] = last
-    return opens
+    """Return the time (N,) at which a node parts from its twins; −∞ without one.
 
-
-def _distance(points, cut):
-    at = np.array(cut["points"], dtype=float)
-    if points.shape[1] == 3:  # of its plane; of a curved one nothing is near
-        normal = np.linalg.svd(at - at.mean(axis=0))[2][2]
-        return np.abs((points - at.mean(axis=0)) @ normal)
-    start, edge = at[:-1], np.diff(at, axis=0)
-    share = np.einsum("nsd,sd->ns", points[:, None] - start, edge) / (edge**2).sum(axis=1)
-    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * edge
-    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
+    It does when the last facet of a cut there is open: behind a blade no node opens early.
+    """
+    facets = np.array(case.problem["cut_facets"]).reshape(-1, case.dimension)
+    times = np.repeat(case.problem["cut_opens"], case.dimension)
+    both = np.concatenate([case.points, facets])
+    _, place = np.unique(both, axis=0, return_inverse=True)
+    place, corner = np.split(place.ravel(), [len(case.points)])
+    first, last = np.full(len(both), np.inf), np.full(len(both), -np.inf)
+    np.minimum.at(first, corner, times)
+    np.maximum.at(last, corner, times)
+    twins = np.bincount(place, minlength=len(both))
+    if (last[twins > 1] == -np.inf).any():
+        raise RuntimeError("a doubled node is no corner of a facet of a cut")
+    if ((twins > 2) & (first < last)).any():
+        raise RefusedError("cuts that meet and open in turn")
+    return np.where(twins > 1, last, -np.inf)[place]
 
 
 def run_engine(case, engine, mass=None, **said):
@@ -147,24 +141,22 @@ def run_engine(case, engine, mass=None, **said):
         u = case.timed("solve", lambda: engine(case, stage).equilibrium(values, force))
         fields = {"displacement": u[stage.node]}
     else:
-        if any(cut["kind"] == "tool_path" for cut in case.content["cuts"]):
-            raise RefusedError("tool paths: facets that open one by one")
-        _march(case, engine, trial=True)  # what is compiled or read is, in it
-        marched = [_march(case, engine) for _ in range(max(1, case.repetitions))]
-        outputs, steps = marched[0][:2]
-        case.timings = {"motion": [seconds for *_, seconds in marched]}
+        _March(case, engine).run(trial=True)  # what is compiled or read is, in it
+        marched = [_March(case, engine).run() for _ in range(max(1, case.repetitions))]
+        outputs, steps = marched[0].outputs, marched[0].steps
+        case.timings = {name: [one.seconds[name] for one in marched] for name in marched[0].seconds}
         names = ("displacement", "velocity", "acceleration")
         fields = {
             name: np.array([state[k] for state in outputs])
             for k, name in enumerate(names[: len(outputs[0])])
         }
         said = {"times": case.content["output_times"], "iterations": {"steps": steps}, **said}
-        said["mass"] = _lumped(case) if mass == "lumped" else mass
+        said["mass"] = lumped_mass(case) if mass == "lumped" else mass
     case.answer(case.points, case.cells, **fields, unknowns=case.points.size,
                 cut_facets=case.problem["cut_facets"], **said)  # fmt: skip
 
 
-def _lumped(case):
+def lumped_mass(case):
     """Mass (N,) of the nodes of linear cells: each has an equal share of its cells."""
     edges = np.diff(case.points[case.cells], axis=1)
     share = np.abs(np.linalg.det(edges)) * case.constant("density")
@@ -173,38 +165,80 @@ def _lumped(case):
     return np.bincount(case.cells.ravel(), share, minlength=len(case.points))
 
 
-def _march(case, engine, trial=False):
-    """Return the states at the outputs, the number of steps and the seconds."""
-    times, largest = np.array(case.content["output_times"]), _largest_step(case)
-    slack, parts = _SAME * times[-1], case.problem["held"] + case.problem["loads"]
-    breaks = np.array([0.0, *(t for part in parts for t, _ in part.get("history") or ())])
-    own = [cut["opens_at"] for cut in case.content["cuts"]]
-    stops = np.sort([t for t in {*times, *breaks, *own} if 0.0 <= t <= times[-1]])
-    stops = stops[np.diff(stops, prepend=-1.0) > slack]
-    clock, outputs, steps = time.perf_counter(), [], 0
-    stage, body, u, v = _initial(case, engine, slack)
-    for k, stop in enumerate(stops):
-        opened = Stage(case, stop + slack)
-        if len(opened.points) > len(stage.points):
-            u, v = (field[stage.node][opened.first] for field in (u, v))
-            stage, body = opened, engine(case, opened)
-        if k == 0 or stage is opened or np.abs(breaks - stop).min() < slack:
-            moved = stage.values(stop + _BEFORE * largest) - stage.values(stop)
-            v = np.where(stage.held, moved / (_BEFORE * largest), v)
-            body.begin(u, v, stage.force(stop), largest)
-        if np.abs(times - stop).min() < slack:
-            outputs.append([field[stage.node] for field in body.state()])
-        if k + 1 < len(stops):
-            count = max(1, int(np.ceil((stops[k + 1] - stop) / largest * (1 - 1e-9))))
-            dt = float(f"{(stops[k + 1] - stop) / count:.12g}")  # one up to round-off
-            for n in range(1, 2 if trial else count + 1):
-                end = stop + n * dt - (n == count) * _BEFORE * dt
-                body.step(dt, stage.values(end), stage.force(end))
-            u, v = body.state()[:2]
-            steps += count
-        if trial:
-            break
-    return outputs, steps, time.perf_counter() - clock
+class _March:
+    """A motion: an engine for the body as it is open, told anew when something opens or jumps.
+
+    Attributes
+    ----------
+    outputs : list
+        What the engine says at each output, on the nodes of the case.
+    steps : int
+    seconds : dict
+        Spent on ``"building"`` the body, at first and after each opening, and on its ``"motion"``.
+    """
+
+    def __init__(self, case, engine):
+        self.case, self.engine, self.outputs, self.steps = case, engine, [], 0
+        self.times, self.largest = np.array(case.content["output_times"]), _largest_step(case)
+        self.slack, parts = _SAME * self.times[-1], case.problem["held"] + case.problem["loads"]
+        jumps = (t for part in parts for t, _ in part.get("history") or ())
+        self.breaks = np.array([0.0, *jumps])
+        cuts = [cut for cut in case.content["cuts"] if cut["kind"] != "tool_path"]
+        stops = {*self.times, *self.breaks, *(cut["opens_at"] for cut in cuts)}
+        stops = np.sort([t for t in stops if 0.0 <= t <= self.times[-1]])
+        self.stops = stops[np.diff(stops, prepend=-1.0) > self.slack]
+        self.seconds = {"building": 0.0, "motion": 0.0}
+
+    def run(self, trial=False):
+        """March to the end, or for one step; return self."""
+        with self.timed("building"):
+            self.stage, self.body, self.u, self.v = _initial(self.case, self.engine, self.slack)
+        for k, stop in enumerate(self.stops):
+            self.open(stop, k == 0 or np.abs(self.breaks - stop).min() < self.slack)
+            if np.abs(self.times - stop).min() < self.slack:
+                self.outputs.append([field[self.stage.node] for field in self.body.state()])
+            if k + 1 < len(self.stops):
+                self.advance(stop, self.stops[k + 1], trial)
+            if trial:
+                break
+        return self
+
+    def open(self, instant, jumps=False):
+        """Build the body anew if a cut has opened; begin anew then, or if something jumps."""
+        opens = self.stage.opens
+        due = ((opens > self.stage.instant) & (opens <= instant + self.slack)).any()
+        if not due and not jumps:
+            return
+        with self.timed("building"):
+            if self.steps:
+                self.u, self.v = self.body.state()[:2]
+            if due:
+                before, self.stage = self.stage, Stage(self.case, instant + self.slack, opens)
+                self.u, self.v = (f[before.node][self.stage.first] for f in (self.u, self.v))
+                self.body = self.engine(self.case, self.stage)
+            soon = _BEFORE * self.largest
+            moved = self.stage.values(instant + soon) - self.stage.values(instant)
+            self.v = np.where(self.stage.held, moved / soon, self.v)
+            self.body.begin(self.u, self.v, self.stage.force(instant), self.largest)
+
+    def advance(self, start, stop, trial):
+        """Step from a stop to the next, opening on the way what blades have passed."""
+        count = max(1, int(np.ceil((stop - start) / self.largest * (1 - 1e-9))))
+        dt = float(f"{(stop - start) / count:.12g}")  # one up to round-off
+        for n in range(1, 2 if trial else count + 1):
+            if n > 1:
+                self.open(start + (n - 1) * dt)
+            end = start + n * dt - (n == count) * _BEFORE * dt
+            with self.timed("motion"):
+                self.body.step(dt, self.stage.values(end), self.stage.force(end))
+            self.steps += 1
+
+    @contextmanager
+    def timed(self, phase):
+        """Count the seconds of a block to a phase."""
+        start = time.perf_counter()
+        yield
+        self.seconds[phase] += time.perf_counter() - start
 
 
 def _largest_step(case):
