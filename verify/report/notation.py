@@ -134,7 +134,7 @@ _ERRORS = set(_METRICS) - {"strain_energy"}
 # not drawn and not in tables unless the case judges them; they are in the exported files
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 SECONDARY = _ERRORS - set(NORMS)
-_SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
+_SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference", "sofa": "SOFA"}
 ROUND_OFF = 1e-11  # relative errors below are round-off, as the rates of a result have it
 _MISSING = "–"
 # Control characters (not allowed in XML, invisible in HTML), and marks that turn the

@@ -1,0 +1,122 @@
+"""A page on one program of others beside two solvers of the project, from a run of its own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+
+from verify.files import write_whole
+from verify.judge.pairs import pairs_of
+from verify.report.benchmark_page import METRIC, time_plot
+from verify.report.evidence import moves, pair_in
+from verify.report.notation import digits_beside, number, solver_title
+from verify.report.rendering import Beside
+from verify.result import CaseResult, SolveRecord, Status, repeated_totals
+
+RIVALS = ("xfem", "conforming")
+_SAID = {"rest": "At rest", "motion": "In motion"}
+
+
+def write_engine(
+    results: Sequence[CaseResult], command: str, folder: Path, engine: str, drawn: Sequence[str]
+) -> None:
+    """Write ``index.md`` with its pictures into `folder`, which is made if it is not there.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Of a run of `engine` and `RIVALS`; what the engine did not answer has no row.
+    command : str
+        That made them.
+    folder : Path
+    engine : str
+    drawn : sequence of str
+        Cases of which time is drawn against error.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    asked = list(results)
+    results = [r for r in asked if any(_error(s) is not None for s in _of(r, engine))]
+    beside = Beside(folder / f"{engine}-pictures")
+    plots = [plot for r in results if r.case in drawn and (plot := time_plot(r.case, [r]))]
+    name, titles = solver_title(engine), [solver_title(one) for one in RIVALS]
+    notes = next((s.notes for r in results for s in _of(r, engine)), {})
+    refused = {s.reason: r.case for r in asked for s in _of(r, engine)
+               if s.status is Status.REFUSED}  # fmt: skip
+    lines = [
+        f"# {name} beside the compact solver", "",
+        *(f"- {line}" for line in _answers(results, engine)), "",
+        f"{name} {notes.get('version', '')}: {notes.get('scheme', '')}, mass "
+        f"{notes.get('mass', '')}, on the mesh with the cut imprinted, whose making is charged. "
+        "Recorded: the engine is no package, so `make results` makes these rows again only where "
+        "it is installed.", "",
+        f"Relative L² error of the displacement on the finest level; seconds for each cut, in "
+        f"motion milliseconds for each step, of {name}, {titles[0]}, {titles[1]}. ≈ the reference "
+        "cannot tell the error from none.", "",
+        f"| scene | {' | '.join(f'{t}: error' for t in (name, *titles))} | "
+        f"{' | '.join(f'{t}: time' for t in (name, *titles))} |",
+        f"| --- |{' --- |' * 6}",
+        *(_row(result, (engine, *RIVALS)) for result in sorted(results, key=moves)), "",
+        *(f"![{plot.alt}]({beside.drawing(plot)})" for plot in plots), "",
+        "<details><summary>Refused, and the command</summary>", "",
+        *(f"- {reason} ({case})" for reason, case in refused.items()),
+        f"- `{command}`", "", "</details>",
+    ]  # fmt: skip
+    write_whole(folder / "index.md", "\n".join(lines) + "\n")
+
+
+def _of(result: CaseResult, name: str) -> list[SolveRecord]:
+    return sorted((s for s in result.solves if s.solver == name), key=lambda s: s.level)
+
+
+def _error(solve: SolveRecord) -> float | None:
+    measured = solve.metric(METRIC)
+    return None if solve.status is not Status.SOLVED or measured is None else measured.value
+
+
+def _answers(results: Sequence[CaseResult], engine: str) -> list[str]:
+    """Say what the pairs of the run say, at rest and in motion: error and time of `xfem`."""
+    pairs, name, own = pairs_of(results, [engine, *RIVALS]), solver_title(engine), RIVALS[0]
+    lines = []
+    for kind, said in _SAID.items():
+        some = [pair for pair in pairs if pair.kind == kind]
+        texts = []
+        for metric, words in ((METRIC, "error"), ("time", "time at equal error")):
+            pair = pair_in(some, metric, own, engine)
+            if pair is not None and pair.ratio is not None:
+                texts.append(
+                    f"the {words} is {number(pair.ratio, 2)} [{number(pair.low, 2)}, "
+                    f"{number(pair.high, 2)}] times {name}'s over {pair.count} scenes "
+                    f"({pair.wins} won, {pair.ties} tied, {pair.losses} lost)"
+                )
+        if texts:
+            lines.append(f"**{said}**, of {solver_title(own)}: {'; '.join(texts)}.")
+    return lines
+
+
+def _row(result: CaseResult, names: Sequence[str]) -> str:
+    errors, times = [], []
+    for name in names:
+        last = next((s for s in reversed(_of(result, name)) if _error(s) is not None), None)
+        errors.append("–" if last is None else _written(last))
+        times.append("–" if last is None else _duration(last))
+    return f"| {result.case} | {' | '.join(errors)} | {' | '.join(times)} |"
+
+
+def _written(solve: SolveRecord) -> str:
+    measured = solve.metric(METRIC)
+    assert measured is not None
+    value, half = measured.value, measured.uncertainty or 0.0
+    return "≈" if half >= value else number(value, digits_beside(value, half, 3))
+
+
+def _duration(solve: SolveRecord) -> str:
+    totals = repeated_totals(solve.paid)
+    if not totals:
+        return "–"
+    steps = (solve.iterations or {}).get("steps")
+    if steps:
+        return f"{number(1e3 * median(totals) / steps, 2)} ms"
+    return f"{number(median(totals), 2)} s"
