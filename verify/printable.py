@@ -11,7 +11,10 @@ _LONGEST = 2000  # characters of a message; more is no message
 # ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
 _HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 _KEPT = "\n\t"
-_NAMED = re.compile(r"([A-Za-z_]\w*\.)*[A-Z]\w*(Error|Exception|Exit|Interrupt)(:|$)")
+# an error with its text, behind marks of a log such as "[ERROR] [Module] "
+_NAMED = re.compile(
+    r"(?:\[\w+\]\s*)*((?:[A-Za-z_]\w*\.)*[A-Z]\w*(?:Error|Exception|Exit|Interrupt)(?::.*)?)$"
+)
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
@@ -63,7 +66,7 @@ def last_error(said: str) -> str:
     What a program says at its end, after its error or before, is not why it ended.
     """
     lines = [line.strip() for line in said.splitlines() if line.strip()]
-    named = [line for line in lines if _NAMED.match(line)]
+    named = [found[1] for line in lines if (found := _NAMED.match(line))]
     return one_line((named or lines or [""])[-1])
 
 

@@ -143,6 +143,8 @@ def test_a_python_of_the_system_has_its_package_by_any_way_that_python_knows(
 def test_the_reason_of_a_failure_is_its_error_not_what_a_program_says_after_it():
     said = "Traceback (most recent call last):\n  File 'x'\nValueError: no mesh\n[INFO] unloaded\n"
     assert last_error(said) == "ValueError: no mesh"
+    logged = "[ERROR]   [Runtime] RuntimeError: no rest\nTraceback:\n  raise RuntimeError(text)\n"
+    assert last_error(logged) == "RuntimeError: no rest"
     assert last_error("one\nstopped early\n\n") == "stopped early"
     assert last_error("a.b.LostError: gone\nSystemExit\n") == "SystemExit"
     assert last_error("") == ""

@@ -202,7 +202,7 @@ def test_a_foreign_code_moves_as_the_conforming_solver_says(name, case):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("name", [installed("kratos"), installed("akantu")])
+@pytest.mark.parametrize("name", [installed("kratos"), installed("akantu"), installed("sofa")])
 @pytest.mark.parametrize(
     "case", ["statics/f1_patch", "statics/f1_3d", "material/plane_stress_patch"]
 )
@@ -215,6 +215,30 @@ def test_a_foreign_code_solves_as_the_conforming_solver_says(name, case):
     np.testing.assert_allclose(
         found.displacement, expected.displacement[:, rows], atol=1e-12 * scale
     )
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", [installed("sofa")])
+@pytest.mark.parametrize("case", ["tissue_strip_solid", "turned_apart_solid"])
+def test_tetrahedra_of_sofa_at_finite_rotation_are_those_of_the_conforming_solver(name, case):
+    scene = load_scene(f"rotation/{case}")
+    found = find_solver(name).solve(scene, 0, repetitions=1)
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1)
+    off = found.displacement - expected.displacement[:, same_nodes(found, expected)]
+    assert np.abs(off).max() < 1e-8 * np.abs(expected.displacement).max()
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", [installed("sofa")])
+@pytest.mark.parametrize("case", ["plate_bent_path", "hanging_block_quick"])
+def test_sofa_moves_behind_a_blade_by_newmarks_method(name, case, modules, tmp_path):
+    scene = load_scene(f"cutting/{case}")
+    found = find_solver(name).solve(scene, 0, repetitions=1, scheme="newmark")
+    export_case(scene, tmp_path, [0], conforming=True)
+    laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    modules["motion"].run_engine(laid, newmark(modules["example"], lumped=True))
+    expected = read_answers(scene, tmp_path).solutions[0]
+    assert_same_motion(found, expected, 1e-8)
 
 
 @pytest.mark.heavy
