@@ -1,9 +1,10 @@
-"""The page of a foreign engine: its numbers are those of the run. All are made by hand."""
+"""The page of a foreign engine: its numbers are the run's, and made by hand."""
 
 import re
 
+from verify.judge.pairs import pairs_of
 from verify.report.benchmark_page import METRIC
-from verify.report.engine_page import write_engine
+from verify.report.engine_page import RIVALS, write_engine
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
 NOTES = {"version": "v9", "scheme": "implicit Euler", "mass": "lumped"}
@@ -33,7 +34,8 @@ def test_rows_answers_and_refusals_are_those_of_the_run(tmp_path):
         case("statics/one", False, 0.02), case("statics/blurred", False, 0.03, half=0.05),
         case("statics/other", False, "membranes are not offered"),
     ]  # fmt: skip
-    write_engine(results, "verify run x", tmp_path, "sofa", ["dynamics/two"])
+    pairs = pairs_of(results, ["sofa", *RIVALS])
+    write_engine(results, pairs, "verify run x", tmp_path, "sofa", ["dynamics/two"])
     page = (tmp_path / "index.md").read_text("utf-8")
     rows = [line for line in page.splitlines() if re.match(r"\| (dynamics|statics)/", line)]
     assert rows == [

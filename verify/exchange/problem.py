@@ -136,7 +136,7 @@ class Problem:
     def cut_opens(self) -> Array:
         """Time (f,) in s from which on each of `cut_facets` is open.
 
-        That of its cut; on a tool path, when the blade has passed all of the facet.
+        When its cut opens; on a tool path, when the blade has passed all of the facet.
         """
         cuts = self.scene.cuts
         nearest = nearest_cut(self.cut_facets, [cut.pieces() for cut in self.scene.final_cuts])

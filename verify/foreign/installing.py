@@ -61,7 +61,7 @@ class ForeignProgram(ProgramSolver):
         return self._takes.refusal(scene)
 
     def environment(self) -> dict[str, str]:
-        """Return that of this process, with the reader and writer as the first path."""
+        """Return this process' own, with the reader and writer as the first path."""
         inherited = {key: value for key, value in os.environ.items() if key != "PYTHONHOME"}
         paths = os.pathsep.join([str(PROGRAMS), *([self._paths] if self._paths else [])])
         own = {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
@@ -153,7 +153,7 @@ def install(name: str, python: str | None = None) -> State:
     ----------
     name : str
     python : str, optional
-        Interpreter; default that of this process, or that which the record names.
+        Interpreter; by default of this process, or the one that the record names.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def _call(solver: ForeignSolver, words: list[str], paths: str | None = None) -> 
     Raises
     ------
     InputError
-        If it fails: with the error that it ended with, or the last line that it said.
+        If it fails: with the error that it ended with, or its last line.
     """
     outside = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     if paths:

@@ -126,7 +126,7 @@ class ForeignSolver:
     Attributes
     ----------
     name : str
-        That of its folder.
+        Its folder's.
     title, licence, source : str
         What it is; its licence; the publication.
     module, version_of : str
@@ -135,9 +135,9 @@ class ForeignSolver:
     install : Install
     takes : Takes
     parameters : dict
-        Those of ``--set NAME.…`` with their defaults.
+        Set by ``--set NAME.…``, with their defaults.
     choices : dict of str to list of str
-        What those of them may be that are words.
+        What they may be, where they are words.
     conforming : bool
         Whether the program wants the conforming mesh.
     """

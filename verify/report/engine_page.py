@@ -5,19 +5,23 @@ from pathlib import Path
 from statistics import median
 
 from verify.files import write_whole
-from verify.judge.pairs import pairs_of
 from verify.report.benchmark_page import METRIC, time_plot
 from verify.report.evidence import moves, pair_in
 from verify.report.notation import digits_beside, number, solver_title
 from verify.report.rendering import Beside
-from verify.result import CaseResult, SolveRecord, Status, repeated_totals
+from verify.result import CaseResult, Pair, SolveRecord, Status, repeated_totals
 
 RIVALS = ("xfem", "conforming")
 _SAID = {"rest": "At rest", "motion": "In motion"}
 
 
 def write_engine(
-    results: Sequence[CaseResult], command: str, folder: Path, engine: str, drawn: Sequence[str]
+    results: Sequence[CaseResult],
+    pairs: Sequence[Pair],
+    command: str,
+    folder: Path,
+    engine: str,
+    drawn: Sequence[str],
 ) -> None:
     """Write ``index.md`` with its pictures into `folder`, which is made if it is not there.
 
@@ -25,6 +29,8 @@ def write_engine(
     ----------
     results : sequence of CaseResult
         Of a run of `engine` and `RIVALS`; what the engine did not answer has no row.
+    pairs : sequence of Pair
+        Of the engine and `RIVALS` in it.
     command : str
         That made them.
     folder : Path
@@ -47,7 +53,7 @@ def write_engine(
                if s.status is Status.REFUSED}  # fmt: skip
     lines = [
         f"# {name} beside the compact solver", "",
-        *(f"- {line}" for line in _answers(results, engine)), "",
+        *(f"- {line}" for line in _answers(pairs, engine)), "",
         f"{name} {notes.get('version', '')}: {notes.get('scheme', '')}, mass "
         f"{notes.get('mass', '')}, on the mesh with the cut imprinted, whose making is charged. "
         "Recorded: the engine is no package, so `make results` makes these rows again only where "
@@ -76,9 +82,9 @@ def _error(solve: SolveRecord) -> float | None:
     return None if solve.status is not Status.SOLVED or measured is None else measured.value
 
 
-def _answers(results: Sequence[CaseResult], engine: str) -> list[str]:
+def _answers(pairs: Sequence[Pair], engine: str) -> list[str]:
     """Say what the pairs of the run say, at rest and in motion: error and time of `xfem`."""
-    pairs, name, own = pairs_of(results, [engine, *RIVALS]), solver_title(engine), RIVALS[0]
+    name, own = solver_title(engine), RIVALS[0]
     lines = []
     for kind, said in _SAID.items():
         some = [pair for pair in pairs if pair.kind == kind]

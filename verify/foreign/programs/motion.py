@@ -8,7 +8,7 @@ An engine is a class, called with the case and a `Stage`, with the methods
 
 - ``equilibrium(values, force)``: displacement (n, d) under the values of the held components
 - ``begin(u, v, force)``: the state at the start of a step, with the forces right then
-- ``step(dt, values, force)``: one time step; values and forces are those of its end
+- ``step(dt, values, force)``: one time step; values and forces are of its end
 - ``state()``: displacement, velocity and, if it has one, the acceleration in balance with them
 """
 

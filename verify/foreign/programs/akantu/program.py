@@ -51,7 +51,7 @@ class Body:
         self.model.setIntegrationScheme(name, "displacement", scheme, unknown)
 
     def equilibrium(self, values, force):
-        """Displacement at rest under forces and values of what is held."""
+        """Return the displacement at rest, given forces and the values of held components."""
         self.model.getDisplacement()[:] = values
         self.model.getExternalForce()[:] = force
         self.model.solveStep("equilibrium")

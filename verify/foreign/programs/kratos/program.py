@@ -100,7 +100,7 @@ class Body:
         return self.strategies[key]
 
     def equilibrium(self, values, force):
-        """Displacement at rest under forces and values of what is held."""
+        """Return the displacement at rest, given forces and the values of held components."""
         count, u = LOAD_STEPS if self.turns else 1, np.zeros_like(values)
         for n in range(1, count + 1):
             self.put(KM.DISPLACEMENT, np.where(self.held, n / count * values, u))

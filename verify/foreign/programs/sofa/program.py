@@ -2,11 +2,12 @@
 
 python program.py FOLDER LEVEL
 
-``scheme`` is implicit Euler or Newmark's method of average acceleration. (``trapezoidalScheme`` of
-v26.12 adds the velocity of the end to positions, not the mean, and is unstable.) A tetrahedron
-turns as the polar decomposition of its deformation gradient says, which is the scene's law. SOFA's
-triangles turn as that of their corners about the centroid: another law, which differs by a share of
-the strain. Equilibria are found by Newton's method with SOFA's own tangent, which holds rotations.
+``scheme`` is implicit Euler or Newmark's method of average acceleration. SOFA's
+``trapezoidalScheme`` (v26.12) is unstable: positions move by the velocity of the end, not by the
+mean. A tetrahedron turns as the polar decomposition of its deformation gradient says, which is the
+scene's law. SOFA's triangles turn as their corners do about the centroid: another law, which
+differs by a share of the strain. Equilibria are found by Newton's method with SOFA's own tangent,
+which holds rotations.
 """
 
 import numpy as np
@@ -91,7 +92,7 @@ class Body:
         Sofa.Simulation.initRoot(root)
 
     def equilibrium(self, values, force):
-        """Displacement at rest under forces and values of what is held."""
+        """Return the displacement at rest, given forces and the values of held components."""
         count, held = 1 if self.linear else LOAD_STEPS, self.stage.held
         self.graph(0.0 * values, 0.0 * values, force / count, "StaticSolver")
         for n in range(1, count + 1):
