@@ -83,6 +83,12 @@ for words in (["list"], ["describe", "statics/f1_patch"], ["schema"]):
 """
 
 
+def test_what_guests_are_built_on_loads_no_graphics():
+    code = "import sys, verify.exchange; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
 def test_reading_commands_load_no_solver_and_no_graphics_and_importing_them_nothing():
     command = [sys.executable, "-c", READING]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -23,8 +23,7 @@ from verify.compare.hooke import strain_and_stress
 from verify.compare.locate import SolutionField
 from verify.errors import InputError
 from verify.files import asked_place, read_json, whole_file, write_whole
-from verify.report.bodies import read_stored
-from verify.report.run_directory import CaseEntry, load_run
+from verify.report.run_directory import CaseEntry, load_run, read_stored
 from verify.result import CutRecord, SolveRecord, Status
 from verify.runner.directory import folder_name
 from verify.scene import Scene, restore_scene

@@ -27,7 +27,7 @@ from verify.errors import InputError
 from verify.geometry.simplices import mesh_edges
 from verify.read_mesh import read_with_meshio
 from verify.report.notation import RAISED, Drawing
-from verify.solution import Solution, read_solution
+from verify.solution import Solution
 
 _FEATURE_ANGLE = 30.0  # degrees between facets beyond which a 3D edge is drawn
 _SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle
@@ -64,27 +64,6 @@ class Body:
     def drawn_elements(self) -> NDArray[np.int64]:
         """Edges of the elements, none where they would be too dense to be seen."""
         return self.element_edges if len(self.element_edges) <= _MOST_EDGES else self.edges[:0]
-
-
-def read_stored(root: Path, path: str) -> Solution:
-    """Read the solution stored under `path` in the run directory `root`.
-
-    Raises
-    ------
-    InputError
-        If it is not there, not readable, or not inside the run directory.
-    """
-    target = (root / path).resolve()
-    if not target.is_relative_to(root.resolve()):
-        raise InputError("the solution lies outside the run directory", path)
-    # a record may name the file, its path without ending, or its folder
-    target = target / "solution" if target.is_dir() else target
-    if target.suffix not in (".json", ".vtu"):
-        target = target.with_name(target.name + ".json")
-    try:
-        return read_solution(target)
-    except OSError as error:
-        raise InputError(f"the solution cannot be read ({error.strerror})", path) from None
 
 
 def deformed_bodies(solution: Solution, scale: float, steps: Sequence[int] = (-1,)) -> list[Body]:

@@ -20,12 +20,11 @@ from verify.report.bodies import (
     deformed_bodies,
     error_body,
     packed,
-    read_stored,
     zoomed,
 )
 from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.problem import cut_lines, plane_corners
-from verify.report.run_directory import CaseEntry
+from verify.report.run_directory import CaseEntry, read_stored
 from verify.result import REFERENCE, CaseResult, SolveRecord, Status, error_picture, finest_of
 from verify.solution import Solution
 

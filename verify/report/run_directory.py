@@ -26,6 +26,7 @@ from verify.result import (
     folder_of_case,
     read_result,
 )
+from verify.solution import Solution, read_solution
 
 _RANKING = TypeAdapter(Ranking)
 
@@ -290,3 +291,24 @@ def _count(element: ElementTree.Element) -> None:
     element.set("tests", str(len(element.findall(".//testcase"))))
     for kind, name in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(kind, str(len(element.findall(f".//{name}"))))
+
+
+def read_stored(root: Path, path: str) -> Solution:
+    """Read the solution stored under `path` in the run directory `root`.
+
+    Raises
+    ------
+    InputError
+        If it is not there, not readable, or not inside the run directory.
+    """
+    target = (root / path).resolve()
+    if not target.is_relative_to(root.resolve()):
+        raise InputError("the solution lies outside the run directory", path)
+    # a record may name the file, its path without ending, or its folder
+    target = target / "solution" if target.is_dir() else target
+    if target.suffix not in (".json", ".vtu"):
+        target = target.with_name(target.name + ".json")
+    try:
+        return read_solution(target)
+    except OSError as error:
+        raise InputError(f"the solution cannot be read ({error.strerror})", path) from None

@@ -270,16 +270,28 @@ def _own() -> Sources:
 def _parsed(text: bytes, package: str) -> Source:
     """Read a source file of a package."""
     tree = ast.parse(text)
-    for node in ast.walk(tree):
+    for node in [tree, *_statements(tree)]:
         if isinstance(node, _WITH_DOCSTRING) and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
     imports = sorted(set(_imports(tree, package)))
     return Source(bytes_digest(ast.dump(tree).encode()), imports)
 
 
+def _below(node: ast.AST) -> Iterator[ast.AST]:
+    """Statements in the blocks of one, and what holds blocks itself: no expression holds any."""
+    for block in ("body", "handlers", "cases", "orelse", "finalbody"):
+        yield from getattr(node, block, ())
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    for one in _below(node):
+        yield one
+        yield from _statements(one)
+
+
 def _imports(tree: ast.AST, package: str) -> Iterator[str]:
     """Full names of imports, but for type checkers alone."""
-    for node in ast.iter_child_nodes(tree):
+    for node in _below(tree):
         if isinstance(node, ast.If) and _is_type_checking(node.test):
             for other in node.orelse:
                 yield from _imports(ast.Module([other], []), package)
