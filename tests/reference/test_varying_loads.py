@@ -6,7 +6,7 @@ from reference_scenes import energy_of, needs_fenicsx, polyline, square
 
 from reference.exact import exact_solution
 from verify.exchange import problem_of
-from verify.scene import BodyForce
+from verify.scene import BodyForce, load_scene
 from verify.solvers.body_of_scene import background_mesh, cuts_of
 from verify.solvers.boundary_conditions import loads_of
 from verify.xfem.phantom import cut_mesh
@@ -75,3 +75,22 @@ def test_the_reference_stores_the_energy_of_pure_bending(solver):
     assert energy_of(scene, solver, degree=2) == pytest.approx(
         known.strain_energy(scene), rel=1e-10
     )
+
+
+@pytest.mark.parametrize("degree", [pytest.param(k, marks=needs_fenicsx) for k in (1, 2)])
+def test_a_bump_that_is_narrower_than_two_facets_of_a_solid_acts_in_full(degree):
+    from reference.boundary_conditions import load_forces
+    from reference.space import conforming_space
+    from verify.solvers.conforming_meshes import peer_mesh
+
+    scene = load_scene("rotation/skin_on_fat")
+    space = conforming_space(peer_mesh(scene, 0, "imprinted"), degree, None)
+    force = load_forces(scene, space, None).reshape(-1, 3)
+    # 6000 (1 − ((x − 0.014)/0.0031)²)² over 2 mm of skin, and so on: 16/15 of a half-width in all
+    amount = 16 / 15 * 0.0031 * 0.002
+    pulls = amount * np.array([[-6000.0, -1500.0, 0.0], [6000.0, -1000.0, 0.0]])
+    scale = np.abs(pulls).max()
+    np.testing.assert_allclose(force.sum(axis=0), pulls.sum(axis=0), atol=1e-12 * scale)
+    at = np.array([[0.014, 0.0, 0.007], [0.026, 0.0, 0.007]])
+    turn = np.cross(space.node_points.reshape(-1, 3), force).sum(axis=0)
+    np.testing.assert_allclose(turn, np.cross(at, pulls).sum(axis=0), atol=1e-12 * scale)
