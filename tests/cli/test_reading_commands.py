@@ -171,6 +171,7 @@ def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
     for given, shorter in {
         "[[8, 8], [16, 16]]": "[[4, 4]]", "duration = 0.5": "duration = 0.05",
         "time = 0.3": "time = 0.03", "-1.225": "-0.01225", "-0.441": "-0.00441",
+        "size = 0.15": "size = 0.6",  # both checks are against values
     }.items():  # fmt: skip
         assert given in text
         text = text.replace(given, shorter)
