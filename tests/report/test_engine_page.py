@@ -7,7 +7,8 @@ from verify.report.benchmark_page import METRIC
 from verify.report.engine_page import RIVALS, write_engine
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
-NOTES = {"version": "v9", "scheme": "implicit Euler", "mass": "lumped"}
+NOTES = {"version": "v9", "scheme": "implicit Euler", "mass": "lumped",
+         "rotation": "polar decomposition of the corners"}  # fmt: skip
 
 
 def case(name, moving, engine, own=0.02, half=1e-5):
@@ -24,7 +25,9 @@ def case(name, moving, engine, own=0.02, half=1e-5):
                 timings={"solve": [2.0, 2.0, 2.0]}, notes=NOTES,
                 iterations={"steps": 500} if moving else {},
             ))  # fmt: skip
-    scene = {"cuts": [], "analysis": {"kind": "dynamic" if moving else "static"}}
+    kinematics = "corotational" if name == "dynamics/two" else "linear"
+    kind = "dynamic" if moving else "static"
+    scene = {"cuts": [], "analysis": {"kind": kind, "kinematics": kinematics}}
     return CaseResult(name, name, "", "0", scene, ReferenceRecord(), solves, [], [])
 
 
@@ -49,5 +52,7 @@ def test_rows_answers_and_refusals_are_those_of_the_run(tmp_path):
     assert "error is 0.35 [0.25, 0.50] times SOFA's over 2 scenes (2 won, 0 tied, 0 lost)" in moving
     assert "- membranes are not offered (statics/other)" in page
     assert "`verify run x`" in page
+    assert "SOFA has the polar decomposition of the corners (dynamics/two)." in page
+    assert "timed once" not in page
     assert "SOFA v9: implicit Euler, mass lumped" in page
     assert len(list((tmp_path / "sofa-pictures").glob("*.svg"))) == 1

@@ -58,9 +58,10 @@ def write_engine(
         f"{notes.get('mass', '')}, on the mesh with the cut imprinted, whose making is charged. "
         "Recorded: the engine is no package, so `make results` makes these rows again only where "
         "it is installed.", "",
+        *_turns(results, engine),
         f"Relative L² error of the displacement on the finest level; seconds for each cut, in "
         f"motion milliseconds for each step, of {name}, {titles[0]}, {titles[1]}. ≈ the reference "
-        "cannot tell the error from none.", "",
+        f"cannot tell the error from none.{_timed_once(results)}", "",
         f"| scene | {' | '.join(f'{t}: error' for t in (name, *titles))} | "
         f"{' | '.join(f'{t}: time' for t in (name, *titles))} |",
         f"| --- |{' --- |' * 6}",
@@ -94,12 +95,31 @@ def _answers(pairs: Sequence[Pair], engine: str) -> list[str]:
             if pair is not None and pair.ratio is not None:
                 texts.append(
                     f"the {words} is {number(pair.ratio, 2)} [{number(pair.low, 2)}, "
-                    f"{number(pair.high, 2)}] times {name}'s over {pair.count} scenes "
+                    f"{number(pair.high, 2)}] times {name}'s over {pair.count} "
+                    f"scene{'s' if pair.count != 1 else ''} "
                     f"({pair.wins} won, {pair.ties} tied, {pair.losses} lost)"
                 )
         if texts:
             lines.append(f"**{said}**, of {solver_title(own)}: {'; '.join(texts)}.")
     return lines
+
+
+def _timed_once(results: Sequence[CaseResult]) -> str:
+    counts = {len(repeated_totals(s.paid)) for r in results for s in _of(r, RIVALS[0])}
+    return " Each solve was timed once: no time is won or lost." if counts == {1} else ""
+
+
+def _turns(results: Sequence[CaseResult], engine: str) -> list[str]:
+    """Say by which rotations the engine's law is corotational, where the scenes' is."""
+    found: dict[str, list[str]] = {}
+    for result in results:
+        kinematics = result.scene.get("analysis", {}).get("kinematics", "linear")
+        note = next((s.notes["rotation"] for s in _of(result, engine) if "rotation" in s.notes), "")
+        if note and kinematics != "linear":
+            found.setdefault(note, []).append(result.case)
+    said = "; ".join(f"{note} ({', '.join(cases)})" for note, cases in found.items())
+    law = "The scenes' law has the polar decomposition of the deformation gradient"
+    return [f"{law}. {solver_title(engine)} has the {said}.", ""] if said else []
 
 
 def _row(result: CaseResult, names: Sequence[str]) -> str:
