@@ -55,7 +55,8 @@ def write_engine(
         f"# {name} beside the compact solver", "",
         *(f"- {line}" for line in _answers(pairs, engine)), "",
         f"{name} {notes.get('version', '')}: {notes.get('scheme', '')}, mass "
-        f"{notes.get('mass', '')}, on the mesh with the cut imprinted, whose making is charged. "
+        f"{notes.get('mass', '')}, on the mesh with the cut imprinted, whose making is charged, "
+        "as is building the body anew where a cut opens. "
         "Recorded: the engine is no package, so `make results` makes these rows again only where "
         "it is installed.", "",
         *_turns(results, engine),
