@@ -119,6 +119,7 @@ def test_facets_behind_a_blade_open_one_by_one_as_the_conforming_solver_says(
     laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
     modules["motion"].run_engine(laid, newmark(modules["example"]))
     found = read_answers(scene, tmp_path).solutions[0]
+    assert "when the blade has passed" in found.notes["a tool path opens"]
     expected = find_solver("conforming").solve(scene, 0, repetitions=1, opening="late")
     assert_same_motion(found, expected, 1e-9)
 

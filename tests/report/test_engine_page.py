@@ -27,7 +27,8 @@ def case(name, moving, engine, own=0.02, half=1e-5):
             ))  # fmt: skip
     kinematics = "corotational" if name == "dynamics/two" else "linear"
     kind = "dynamic" if moving else "static"
-    scene = {"cuts": [], "analysis": {"kind": kind, "kinematics": kinematics}}
+    cuts = [{"kind": "tool_path"}] if name == "dynamics/one" else []
+    scene = {"cuts": cuts, "analysis": {"kind": kind, "kinematics": kinematics}}
     return CaseResult(name, name, "", "0", scene, ReferenceRecord(), solves, [], [])
 
 
@@ -38,7 +39,7 @@ def test_rows_answers_and_refusals_are_those_of_the_run(tmp_path):
         case("statics/other", False, "membranes are not offered"),
     ]  # fmt: skip
     pairs = pairs_of(results, ["sofa", *RIVALS])
-    write_engine(results, pairs, "verify run x", tmp_path, "sofa", ["dynamics/two"])
+    write_engine(results, pairs, "verify run x", "0123456789", tmp_path, "sofa", ["dynamics/two"])
     page = (tmp_path / "index.md").read_text("utf-8")
     rows = [line for line in page.splitlines() if re.match(r"\| (dynamics|statics)/", line)]
     assert rows == [
@@ -51,8 +52,9 @@ def test_rows_answers_and_refusals_are_those_of_the_run(tmp_path):
     # 0.5 and 0.25 of the engine's error: geometric mean, least and largest
     assert "error is 0.35 [0.25, 0.50] times SOFA's over 2 scenes (2 won, 0 tied, 0 lost)" in moving
     assert "- membranes are not offered (statics/other)" in page
-    assert "`verify run x`" in page
+    assert "at commit 01234567: `verify run x`" in page
     assert "SOFA has the polar decomposition of the corners (dynamics/two)." in page
+    assert "Where a blade cuts (dynamics/one), SOFA's facets open when it has passed them" in page
     assert "timed once" not in page
     assert "SOFA v9: implicit Euler, mass lumped" in page
     assert len(list((tmp_path / "sofa-pictures").glob("*.svg"))) == 1

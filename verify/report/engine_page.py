@@ -19,6 +19,7 @@ def write_engine(
     results: Sequence[CaseResult],
     pairs: Sequence[Pair],
     command: str,
+    commit: str,
     folder: Path,
     engine: str,
     drawn: Sequence[str],
@@ -31,8 +32,8 @@ def write_engine(
         Of a run of `engine` and `RIVALS`; what the engine did not answer has no row.
     pairs : sequence of Pair
         Of the engine and `RIVALS` in it.
-    command : str
-        That made them.
+    command, commit : str
+        That made them, and of which version.
     folder : Path
     engine : str
     drawn : sequence of str
@@ -59,7 +60,7 @@ def write_engine(
         "as is building the body anew where a cut opens. "
         "Recorded: the engine is no package, so `make results` makes these rows again only where "
         "it is installed.", "",
-        *_turns(results, engine),
+        *_turns(results, engine), *_late(results, engine),
         f"Relative L² error of the displacement on the finest level; seconds for each cut, in "
         f"motion milliseconds for each step, of {name}, {titles[0]}, {titles[1]}. ≈ the reference "
         f"cannot tell the error from none.{_timed_once(results)}", "",
@@ -70,7 +71,7 @@ def write_engine(
         *(f"![{plot.alt}]({beside.drawing(plot)})" for plot in plots), "",
         "<details><summary>Refused, and the command</summary>", "",
         *(f"- {reason} ({case})" for reason, case in refused.items()),
-        f"- `{command}`", "", "</details>",
+        f"- at commit {commit[:8]}: `{command}`", "", "</details>",
     ]  # fmt: skip
     write_whole(folder / "index.md", "\n".join(lines) + "\n")
 
@@ -121,6 +122,20 @@ def _turns(results: Sequence[CaseResult], engine: str) -> list[str]:
     said = "; ".join(f"{note} ({', '.join(cases)})" for note, cases in found.items())
     law = "The scenes' law has the polar decomposition of the deformation gradient"
     return [f"{law}. {solver_title(engine)} has the {said}.", ""] if said else []
+
+
+def _late(results: Sequence[CaseResult], engine: str) -> list[str]:
+    """Say that programs which are handed facets open them late, where a blade cuts."""
+    blades = [
+        result.case
+        for result in results
+        if any(cut.get("kind") == "tool_path" for cut in result.scene.get("cuts") or [])
+    ]
+    text = (
+        f"Where a blade cuts ({', '.join(blades)}), {solver_title(engine)}'s facets open when it "
+        f"has passed them, {' and '.join(map(solver_title, RIVALS))}'s as it sweeps them."
+    )
+    return [text, ""] if blades else []
 
 
 def _row(result: CaseResult, names: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 import numpy as np
 from exchange_files import RefusedError, factor_at, loose_parts
 
+_LATE = "facets as a whole, when the blade has passed them"
 _SAME = 1e-9  # of the duration: times that close are one
 _BEFORE = 1e-7  # of the duration: so much earlier a history has not jumped yet
 
@@ -152,6 +153,8 @@ def run_engine(case, engine, mass=None, **said):
         }
         said = {"times": case.content["output_times"], "iterations": {"steps": steps}, **said}
         said["mass"] = lumped_mass(case) if mass == "lumped" else mass
+        if any(cut["kind"] == "tool_path" for cut in case.content["cuts"]):
+            said["notes"] = {**said.get("notes", {}), "a tool path opens": _LATE}
     case.answer(case.points, case.cells, **fields, unknowns=case.points.size,
                 cut_facets=case.problem["cut_facets"], **said)  # fmt: skip
 
