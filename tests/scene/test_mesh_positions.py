@@ -49,7 +49,7 @@ def scene(d, position, **mesh):
     cut = {**CUT[d], "points": [[float(x) for x in p] for p in CUT[d]["points"]]}
     return scenes.scene(
         [cut], d, geometry=scenes.box(upper, lower),
-        mesh={"cells": [counts], "position": position, **mesh},
+        mesh={"cells": [counts], "position": position} | mesh,
         supports=[{"where": "boundary", "displacement": rows}],
     )  # fmt: skip
 
@@ -87,6 +87,28 @@ def test_sixteen_meshes_of_one_body(d):
     meshes = [coordinates(mesh.points, mesh.cells) for mesh, _ in found]
     assert all(a != b for a, b in combinations(meshes, 2))
     assert found[0][0].points.tobytes() == background_mesh(scene(d, 0), 0)[0].points.tobytes()
+
+
+def test_a_layer_stays_a_layer_and_its_nodes_move_along_it():
+    """A slab of antiplane scenes: 16 meshes of one body, with one element across each."""
+    lower, upper, _ = (np.array(one) for one in BODY[3])
+    found = [background_mesh(scene(3, k, cells=[[4, 3, 1]]), 0)[0] for k in range(POSITIONS)]
+    for mesh, position in zip(found, map(mesh_position, range(POSITIONS)), strict=True):
+        n = np.array([4, 3, 0]) + position.more
+        n[2] = 1
+        assert len(mesh.cells) == 6 * np.prod(n)
+        sizes = measures(mesh.points[mesh.cells])
+        assert sizes.min() > 0.0
+        assert sizes.sum() == pytest.approx(np.prod(upper - lower), rel=1e-12)
+        off = (mesh.points - lower) / (upper - lower) * n
+        off -= np.rint(off)
+        around = ((mesh.points == lower) | (mesh.points == upper))[:, :2].any(axis=1)
+        assert np.abs(off[:, 2]).max() < 1e-12  # both faces stay
+        assert np.abs(off[around]).max() < 1e-12
+        moved = np.linalg.norm(off[~around], axis=1).max()
+        assert 0.05 < moved <= 0.2 + 1e-12 if position.way else moved < 1e-12
+    meshes = [coordinates(mesh.points, mesh.cells) for mesh in found]
+    assert all(a != b for a, b in combinations(meshes, 2))
 
 
 def test_eight_have_n_elements_and_half_of_each_are_falling():

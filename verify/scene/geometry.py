@@ -340,7 +340,7 @@ class MeshLevels(Strict):
         boundary stays as the file has it
     position
         structured: 0 as asked, else another mesh of nearly equal size: one element more or less
-        along each axis, falling diagonals, moved inner nodes
+        along each axis, falling diagonals, moved inner nodes; layers of one element stay layers
     """
 
     pattern: Literal["structured", "unstructured", "given"] = "structured"
@@ -380,7 +380,7 @@ class MeshLevels(Strict):
             sides = np.subtract(body.upper, body.lower)
             # a size that divides the side up to round-off is that size
             counts = np.ceil(sides / self.sizes[level] * (1 - 1e-9)).astype(np.int64)
-        return counts + mesh_position(self.position).more
+        return counts + np.where(counts > 1, mesh_position(self.position).more, 0)
 
 
 class ReferenceLevels(Strict):

@@ -20,7 +20,7 @@ class MeshPosition(NamedTuple):
     Attributes
     ----------
     more : int
-        Elements along each axis more than asked: −1, 0, 1.
+        Elements along each axis more than asked: −1, 0, 1. The one element of a layer stays one.
     falling : bool
         Whether elements are mirrored in x: squares are split along the falling diagonal.
     way : int
@@ -49,7 +49,8 @@ def moved_mesh(
 
     A node moves by at most a fifth of an element, its sides the units of length. Every simplex has
     edges I along the axes that become I + E, with rows of E of at most 2/5. So ‖E‖ < 1 up to three
-    dimensions, and measures stay positive.
+    dimensions, and measures stay positive. Across a layer of one element there are no inner nodes:
+    its nodes move along the layer, whose faces stay where they are.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def moved_mesh(
     Returns
     -------
     points : (n, d) array
-        The boundary keeps its nodes.
+        The boundary keeps its nodes, but for both faces of a layer of one element.
     cells : (m, d + 1) array
         Oriented as before.
     """
@@ -79,9 +80,11 @@ def moved_mesh(
         cells = np.argsort(place)[mirrored][cells]
         cells[:, -2:] = cells[:, :-3:-1]
     if position.way:
-        inner = np.all((index > 0) & (index < divided), axis=1)
+        layer = divided == 1
+        inner = np.all((index > 0) & (index < divided) | layer, axis=1)
+        moves = _moves(position.way, len(points), len(low))[place] * np.where(layer, 0.0, sides)
         points = points.copy()
-        points[inner] += (_moves(position.way, len(points), len(low))[place] * sides)[inner]
+        points[inner] += moves[inner]
     return points, cells
 
 

@@ -26,7 +26,6 @@ from verify.scene.acceptance import (
 )
 from verify.scene.cuts import DiscCut, PolygonCut
 from verify.scene.geometry import GROUP, Box, MeshFile, Polygon, Rectangle, Skin
-from verify.scene.mesh_position import mesh_position
 from verify.scene.placement import (
     empty_region,
     misplaced_cut,
@@ -153,13 +152,13 @@ def _too_many_nodes(scene: SceneTables) -> tuple[Any, ...] | None:
     return None
 
 
-def _too_few_to_move(scene: SceneTables) -> int | None:
-    """Break the rule where one element less, or a moved inner node, is none."""
+def _too_few_to_move(scene: SceneTables) -> bool:
+    """Break the rule where the coarsest mesh is one element: no other mesh is nearly as fine."""
     body, mesh = scene.geometry, scene.mesh
     if not mesh.position or not isinstance(body, Rectangle | Box):
-        return None
-    least = int(mesh.divisions(body, 0).min()) - mesh_position(mesh.position).more
-    return least if least < 2 else None
+        return False
+    asked = mesh.model_copy(update={"position": 0})
+    return bool(asked.divisions(body, 0).max() == 1)
 
 
 def _too_many_steps(scene: SceneTables) -> tuple[float, float, float] | None:
@@ -259,7 +258,7 @@ RULES: Rules = (
     ("mesh.pattern", lambda s: s.mesh.pattern == "structured" and isinstance(s.geometry, Polygon),
      "only rectangles and boxes have structured meshes; use 'unstructured'"),
     ("mesh.position", _too_few_to_move,
-     "{} elements along an axis of level 0; positions other than 0 need at least two"),
+     "level 0 is one element; positions other than 0 need two along an axis at least"),
     ("supports", lambda s: not s.supports and _is_static(s), "a static scene needs at least one"),
     ("supports[*].components", lambda s, p: any(c >= s.dimension for c in p.held(s.dimension)),
      "z in a 2D scene"),
