@@ -75,7 +75,7 @@ BROKEN = [
      "mesh": {"pattern": "given", "refine": 1}}, "mesh.refine: belongs to a geometry of kind"),
     ({"geometry": {"kind": "polygon", "corners": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]}, "mesh":
      {"sizes": [0.1]}}, "mesh.pattern: only rectangles and boxes have structured meshes; use"),
-    ({"mesh": {"cells": [[1, 1]], "position": 3}}, "mesh.position: level 0 is one element; positions"),
+    ({"mesh": {"cells": [[1, 1]], "position": 3}}, "mesh.position: level 0 is one element;"),
     ({"supports": []}, "supports: a static scene needs at least one"),
     ({"supports": held(components=["x", "z"])}, "supports[0].components: z in a 2D scene"),
     ({"supports": [{"where": "boundary", "displacement": [0.0]}]},
