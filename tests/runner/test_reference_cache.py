@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fake_solvers import Instant
 
 from verify.errors import InputError
 from verify.provenance import versions
@@ -44,8 +45,6 @@ def job_of(folder, level):
 @pytest.fixture
 def kept(scene, cache, tmp_path):
     """Three levels, kept."""
-    from fake_solvers import Instant
-
     for level in range(LEVELS):
         job = job_of(tmp_path / f"solve-{level}", level)
         write_solution(Instant().field(2 << level, 1), job.folder / "solution")
@@ -120,6 +119,28 @@ def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, ke
     assert len(taken.points) == 81
     off = np.abs(taken.displacement - solved.displacement).max()
     assert off <= 2.0**-28 * np.abs(solved.displacement).max()  # eight digits are kept
+
+
+def test_a_bundle_keeps_six_digits_of_every_time_in_motion(scene, kept, tmp_path):
+    """A small field at one time is not rounded by a large one at another."""
+    job, random = job_of(tmp_path / "moving", 1), np.random.default_rng(3)
+    field = Instant().field(4, 1)
+    moving = random.standard_normal((3, *field.points.shape)) * np.array([[[1e-3]], [[0.0]], [[9]]])
+    solution = replace(
+        field, times=np.array([0.0, 0.1, 0.2]),
+        displacement=moving, velocity=1e5 * moving, acceleration=moving,
+    )  # fmt: skip
+    write_solution(solution, job.folder / "solution")
+    kept.remove([kept.find(scene)[1]])
+    assert kept.keep(scene, job, job.blank(Status.SOLVED, "")) == ""
+    write_bundle(tmp_path / "one.zip", [scene], kept)
+    ReferenceBundle(tmp_path / "one.zip").take(scene, job_of(tmp_path / "again", 1))
+    taken = read_solution(tmp_path / "again" / "solution")
+    for one, other in ((taken.displacement, moving), (taken.velocity, 1e5 * moving)):
+        off = np.abs(one - other).max(axis=(1, 2))
+        assert (off <= 2.0**-21 * np.abs(other).max(axis=(1, 2))).all()
+        assert off[0] > 0.0
+    assert taken.acceleration is None  # no factor of a crack is asked
 
 
 def test_a_bundle_of_the_schema_before_is_read(scene, kept, tmp_path):
