@@ -76,18 +76,21 @@ def cell_gradients(
     x, u = solution.points[nodes], solution.displacement[step][nodes]
     xi, weight = _rule(d, order or _ORDER[d])
     corner, corner_slope = _linear(xi)
-    shape, slope = (corner, corner_slope) if solution.order == 1 else _quadratic(xi)
+    if solution.order == 1:  # one Jacobian for all points of a cell
+        shape, corner_slope = corner, corner_slope[:1]
+        slope = corner_slope
+    else:
+        shape, slope = _quadratic(xi)
     jacobian = np.einsum("qka,mki->mqia", slope, x)  # ∂x_i/∂ξ_a
     inverse = np.linalg.inv(jacobian)
     gradient = np.einsum("mqib,mqbj->mqij", np.einsum("qka,mki->mqia", slope, u), inverse)
     hats = np.einsum("qka,mqaj->mqkj", corner_slope, inverse)
+    points = np.einsum("qk,mki->mqi", shape, x)
+    gradient, hats = (
+        np.broadcast_to(one, (*points.shape[:2], *one.shape[2:])) for one in (gradient, hats)
+    )
     return CellGradients(
-        np.einsum("qk,mki->mqi", shape, x),
-        np.abs(np.linalg.det(jacobian)) * weight,
-        gradient,
-        hats,
-        corner,
-        shape,
+        points, np.abs(np.linalg.det(jacobian)) * weight, gradient, hats, corner, shape
     )
 
 

@@ -70,7 +70,13 @@ def near_radius(body: AnyBody) -> float:
 
 def near_tip(body: AnyBody, points: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
     """Tell whether points (n, d) are nearer to a tip or front than `radius` m."""
-    return np.asarray(body.tip_distance(points) < radius)
+    near = np.zeros(len(points), dtype=bool)
+    ends = body.tips if isinstance(body, Body) else body.front.reshape(-1, 3)
+    if len(ends):  # most points are farther off than the box around all tips
+        low, high = ends.min(axis=0) - radius, ends.max(axis=0) + radius
+        (some,) = np.nonzero(((points >= low) & (points <= high)).all(axis=1))
+        near[some] = body.tip_distance(points[some]) < radius
+    return near
 
 
 def _lengths_with_tip(body: MembraneBody) -> list[float]:
@@ -171,10 +177,10 @@ class Rules:
         """Return weights (n,) of the points of a rule, 0 outside of the region."""
         if where in ("body", "cut"):
             return np.asarray(rule.weights)
-        if (where, id(rule)) not in self._made:
+        if ("near", id(rule)) not in self._made:
             near = near_tip(self._body, rule.points, self.radius)
-            here = near if where == "near" else ~near
-            self._made[where, id(rule)] = np.where(here, rule.weights, 0.0)
+            self._made["near", id(rule)] = np.where(near, rule.weights, 0.0)
+            self._made["far", id(rule)] = np.where(near, 0.0, rule.weights)
         return np.asarray(self._made[where, id(rule)])
 
     def norms(
