@@ -243,6 +243,25 @@ def test_scatter_is_the_range_over_positions_of_scenes_of_the_kind():
     assert found.meshes == 21
     assert beside(evidence, "rest", METRIC, "xfem").meshes == 42
     assert beside(evidence, "motion", METRIC, "xfem").meshes == 0
+    moved = [{**row, "scene": "dynamics/1"} for row in evidence.positions[:44]]
+    again = replace(evidence, benchmark_positions=[*evidence.positions, *moved])
+    assert beside(again, "motion", METRIC, "xfem").meshes == 21
+    assert beside(again, "rest", METRIC, "xfem").meshes == 42
+
+
+def test_a_difference_in_motion_has_to_show_over_positions_of_moving_scenes_of_the_benchmark():
+    sentence = next(s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
+                    if s.name == "motion")  # fmt: skip
+    cases = changed({"xfem": (2.6, 1.0)})
+    for factors, words in (((2.0, 3.0), "but in motion its error"), ((0.7, 3.0), "which needs no")):
+        rows = [
+            {"scene": "dynamics/2", "position": str(k), "solver": name, "metric": METRIC,
+             "value": str(value), "low": "0.1"}
+            for k in range(16) for name, value in (("xfem", factors[k % 2]), ("conforming", 1.0))
+        ]  # fmt: skip
+        found = sentence.of(made(cases, benchmark_positions=rows))
+        assert words in found.text
+        assert found.holds
 
 
 def test_a_run_without_a_solver_or_a_scene_leaves_the_sentence():

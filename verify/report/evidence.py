@@ -224,8 +224,11 @@ def beside(
     pair = pair_in(evidence.pairs.get(kind, ()), metric, solver, rival)
     if pair is None or pair.ratio is None or pair.low is None or pair.high is None:
         return None
-    ratios = mesh_ratios(evidence.positions, metric, solver, rival,
-                         lambda scene: _is(kind, False, scene in evidence.tips))  # fmt: skip
+    moving = {result.case for result in evidence.results if moves(result)}
+    # the protocol's six scenes are at rest, two of the benchmark's move
+    rows = evidence.benchmark_positions if kind == "motion" else evidence.positions
+    ratios = mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
+        kind, scene in moving, scene in evidence.tips))  # fmt: skip
     scatter = None
     if len(ratios):
         middle, low, high = (float(v) for v in np.quantile(ratios, [0.5, 0.05, 0.95]))
