@@ -1,9 +1,11 @@
 """Claims about rankings beside pairs: robustness, energy, and the omissions."""
 
 import pytest
+import scenes
 
 from verify.judge.ranks import rank_solvers
 from verify.result import CaseResult, Metric, ReferenceRecord, Regularisation, SolveRecord, Status
+from verify.solvers import find_solver
 
 
 def solve(case, solver, level, error=None, width=0.0, status=Status.SOLVED, **more):
@@ -84,6 +86,21 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
     said = [solve("a", "x", 0, 0.1, notes={"pieces inside out": "near (0.1, 0.2) m"})]
     (one,) = rank_solvers([case_of("a", said)])["stability"]
     assert one["inside_out"] == 1  # a text is no zero either
+
+
+@pytest.mark.fenicsx
+def test_a_conforming_body_that_turns_is_not_counted_as_inside_out():
+    """Its notes say so in words, as those of every solver that counts do in numbers."""
+    turned = {"angle": 20.0, "centre": [0.5, 0.5]}
+    scene = scenes.scene(
+        [], mesh={"cells": [[2, 2]]}, analysis={"kinematics": "finite_rotation"},
+        supports=[{"where": "boundary", "displacement": [0.1, 0.0], "rotation": turned}],
+    )  # fmt: skip
+    notes = find_solver("conforming").solve(scene, 0, 0).notes
+    assert notes["inside out"] == "nowhere"
+    told = [solve("a", "conforming", 0, 0.1, notes=notes)]
+    (one,) = rank_solvers([case_of("a", told)])["stability"]
+    assert one["inside_out"] == 0
 
 
 def moved(case, solver, drift):

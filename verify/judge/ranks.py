@@ -206,9 +206,9 @@ def _blown_up(solve: SolveRecord) -> bool:
 
 
 def _inside_out(solve: SolveRecord) -> bool:
-    """Whether a note such as ``pieces inside out`` holds anything but zero."""
+    """Whether a note such as ``pieces inside out`` holds anything but zero, or nowhere."""
     for name, said in solve.notes.items():
-        if name.endswith("inside out"):
+        if name.endswith("inside out") and said != "nowhere":
             try:
                 if float(said) != 0.0:
                     return True
