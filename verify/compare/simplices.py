@@ -115,6 +115,24 @@ def cells_of(solution: Solution) -> Simplices:
     return simplices(solution.points, solution.cells)
 
 
+_NONE = 1e-12  # of the volume: less than that is inside out by round-off, if at all
+
+
+def share_inside_out(solution: Solution) -> float:
+    """Compute the largest share of the volume, at any time, of cells that are inside out.
+
+    These are the cells with det F < 0. Of quadratic ones their corners count. A membrane has none.
+    """
+    shape, d = cells_of(solution), solution.dimension
+    if shape.corners.shape[1] == d:
+        return 0.0
+    corners = solution.cells[:, : d + 1]
+    found = [np.einsum("mka,mkb->mab", u[corners], shape.gradients) for u in solution.displacement]
+    turned = np.array([np.linalg.det(np.eye(d) + slope) < 0.0 for slope in found])
+    share = float((turned @ shape.volume).max() / shape.volume.sum())
+    return share if share > _NONE else 0.0
+
+
 def triangle_frames(corners: Array) -> Array:
     """Make orthonormal frames (m, 3, 3) of triangles in space, as rows: two along, one across.
 

@@ -37,7 +37,7 @@ from verify.compare.part_account import (
     part_metrics,
     part_records,
 )
-from verify.compare.simplices import cells_of, straight_or_raise
+from verify.compare.simplices import cells_of, share_inside_out, straight_or_raise
 from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.checks import result_of
 from verify.judge.contact import contact_metrics, exact_contact
@@ -45,8 +45,10 @@ from verify.judge.convergence import observed_rate, shifted_ends
 from verify.judge.cut_errors import MIXED, are_mixed, measured_cut, with_cut, with_other_errors
 from verify.judge.intervals import error_interval, sufficiency
 from verify.judge.notices import (
+    INSIDE_OUT,
     absurd_strain,
     doubtful_errors,
+    inside_out_notices,
     locking_notices,
     ringing_factors,
     unavailable_quantities,
@@ -158,6 +160,7 @@ def assess_accuracy(
         *unavailable_quantities(scene, measured),
         *ledger_notices(judged),
         *doubtful_errors(scene, judged),
+        *inside_out_notices(judged),
         *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
         *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
         *ringing_factors(scene, solutions.get(REFERENCE, {})),
@@ -305,6 +308,8 @@ def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rule
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
     if (off := one.motion.off_surface) > ROUND_OFF * one.body.size:
         record = _noted(record, {"surface": f"up to {off:.3g} m off the surface of the scene"})
+    if scene.analysis.kinematics != "linear" and (share := share_inside_out(one.solution)):
+        record = _noted(record, {INSIDE_OUT: f"{share:.2g} of the volume"})
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)

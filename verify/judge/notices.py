@@ -52,6 +52,22 @@ def doubtful_errors(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice
     return found
 
 
+INSIDE_OUT = "cells inside out"  # a note of a solve, from its field
+
+
+def inside_out_notices(records: Sequence[SolveRecord]) -> list[Notice]:
+    """Warn of material that is inside out on a finest level, whatever the solver says of it."""
+    return [
+        Notice(
+            NoticeKind.WARNING, INSIDE_OUT, record.solver,
+            f"{said} on level {record.level}: det F < 0, which no body does. Laws without a "
+            "barrier have such equilibria; expected smaller load steps or a finer mesh",
+        )
+        for record in finest_of(records).values()
+        if (said := record.notes.get(INSIDE_OUT))
+    ]  # fmt: skip
+
+
 def absurd_strain(
     scene: Scene,
     records: Sequence[SolveRecord],
