@@ -328,6 +328,13 @@ class SolveRecord:
         return next((metric for metric in self.metrics if metric.name == name), None)
 
     @property
+    def energy_taker(self) -> str | None:
+        """What the scene has take energy from the body: "a blade", "damping", or nothing."""
+        if self.metric("released_to_cut") is not None:
+            return "a blade"
+        return "damping" if any(self.account.get("damping", ())) else None
+
+    @property
     def not_compared(self) -> str:
         """Why nothing was measured of a solve that gave an answer; empty if something was."""
         return "" if self.metrics else self.notes.get("comparison", "")

@@ -278,6 +278,17 @@ def test_a_part_that_a_support_holds_is_not_free():
     assert lower.drift
 
 
+def test_parts_whose_faces_may_press_on_each_other_are_not_free():
+    """Halves that rebound have other momenta afterwards, and lose none."""
+    case, one = turning()
+    content = case.model_dump(mode="json", by_alias=True) | {"contact": {"expected": "closed"}}
+    content["analysis"] |= {"kinematics": "linear"}
+    _, parts, found, notes = accounted(Scene.model_validate(content), one)
+    assert [part.drift for part in parts] == [{}, {}]
+    assert "linear_momentum_drift" in found
+    assert "contact" in notes["part_linear_momentum_drift"]
+
+
 def test_parts_that_touch_in_a_point_are_two():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 2.0]])
     cells = np.array([[0, 1, 2], [2, 3, 4]])

@@ -118,6 +118,21 @@ def test_of_energy_the_worst_case_counts_and_round_off_is_as_good_as_zero():
     assert (by["z"]["rank"], by["z"]["value"], by["z"]["where"]) == (3, 1e-3, "a")
 
 
+@pytest.mark.parametrize("taker", ["a blade", "damping"])
+def test_energy_that_a_blade_or_damping_takes_is_no_drift(taker):
+    names = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump")
+    known = [Metric(name, 0.9, "1", source="own") for name in (*names, "ledger_mismatch")]
+    if taker == "a blade":
+        taken = {"metrics": [*known, Metric("released_to_cut", 0.9, "J", source="own")]}
+    else:
+        taken = {"metrics": known, "account": {"time": [0.0, 1.0], "damping": [0.0, 0.9]}}
+    results = [case_of("a", [moved("a", "x", 1e-3)]), case_of("b", [solve("b", "x", 0, **taken)])]
+    found = {one["metric"]: one for one in rank_solvers(results)["energy"]}
+    assert set(found) == {"energy_drift", "ledger_mismatch"}
+    (standing,) = found["energy_drift"]["standings"]
+    assert (standing["where"], standing["value"], standing["rank"]) == ("a", 1e-3, 1)
+
+
 def test_a_solver_that_fails_in_motion_is_listed_and_not_ranked_on_the_rest():
     failed = solve("b", "y", 0, status=Status.FAILED, reason="singular")
     results = [case_of("a", [moved("a", "x", 2e-3), moved("a", "y", 1e-5)]),

@@ -47,8 +47,10 @@ def part_records(scene: Scene, solution: Solution, account: MotionAccount) -> li
     """Make the record of each part of an account."""
     held, free_from = _held(scene, solution), _all_open(scene)
     force = uniform_force(scene)
-    if any(not isinstance(load, Gravity | BodyForce | Traction) for load in scene.loads):
-        force = None  # a load that this does not know may act on any part
+    if scene.contact.closed or any(
+        not isinstance(load, Gravity | BodyForce | Traction) for load in scene.loads
+    ):
+        force = None  # parts that touch push each other; another load may act on any part
     found = []
     for k, part in enumerate(account.parts):
         free = force is not None and not held[solution.cells[part.cells]].any()
@@ -82,7 +84,7 @@ def part_metrics(
             )
             for name in ("linear_momentum", "angular_momentum")
         ], {}  # fmt: skip
-    why = "no part is free of supports and tractions at two output times and moves"
+    why = "no part is free of supports, tractions and contact at two output times and moves"
     return [], dict.fromkeys(PART_METRICS, why if account.motions else NO_VELOCITIES)
 
 

@@ -94,11 +94,15 @@ def _uncompared(result: CaseResult) -> str:
     return f"no error is measured: {said or 'no reason given'}"
 
 
+_OF_ENERGY = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump")
+
+
 def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
     """Compare what is kept on the finest level of each case; the worst case counts.
 
-    Momenta count only where nothing acts from outside: elsewhere they have to change. Numbers at
-    round-off are as good as zero.
+    Momenta count only where nothing acts from outside, and changes of the energy only where neither
+    a blade nor damping takes any: elsewhere they have to change. Numbers at round-off are as good
+    as zero.
     """
     comparisons = []
     for metric in ACCOUNT:
@@ -107,6 +111,7 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
             for result in results
             if any(s.metric(metric) for s in result.solves if s.solver in solvers)
             and not ("momentum" in metric and _acted_on(result))
+            and not (metric in _OF_ENERGY and any(s.energy_taker for s in result.solves))
         ]
         if (found := _by_worst(metric, solvers, cases)) is not None:
             comparisons.append(found)

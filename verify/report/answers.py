@@ -196,14 +196,8 @@ def moving(
         solved = (s for s in result.solves if s.status is Status.SOLVED)
         for solve in finest_of(solved).values():
             followed = solve.solver != REFERENCE and len(solve.account.get("total", [])) > 1
-            if followed and _taker(solve) == taker:
+            if followed and solve.energy_taker == taker:
                 yield result, solve
-
-
-def _taker(solve: SolveRecord) -> str | None:
-    if solve.metric("released_to_cut") is not None:
-        return "a blade"
-    return "damping" if any(solve.account.get("damping", ())) else None
 
 
 def energy_curve(solve: SolveRecord) -> list[tuple[float, float]]:
