@@ -294,6 +294,20 @@ def test_groups_share_a_row_and_refusals_and_failures_are_told_apart():
     assert "kratos" not in of
 
 
+def test_who_misses_a_part_of_the_body_is_marked_and_never_the_least():
+    """Removed elements make a body softer than linear elements: errors can cancel."""
+    results = deepcopy(made().results)
+    for solve in (s for s in results[0].solves if s.solver == FUNCTIONS):
+        solve.notes["coverage"] = "cells cover the body times 0.993827160"
+    evidence = made(results)
+    of = {row.split("|")[1].strip(): row.split("|")[2:4] for row in whole_table(evidence)}
+    assert of[FUNCTIONS] == [" 0.56 [0.56, 0.56]† ", " **1** "]  # 0.5 over 0.9, in C1 alone
+    assert of["conforming P1 mesh=remeshed"][0] == " **1** "
+    figure = figures(evidence)["Accuracy at a tip"]
+    assert f"{FUNCTIONS}†" in figure.alt
+    assert "† a part of the body is missing" in figure.body
+
+
 def test_who_answers_no_scene_is_named_with_the_reasons(tmp_path):
     results = deepcopy(made().results)
     for result in results[:2]:

@@ -10,9 +10,11 @@ from verify.files import write_whole
 from verify.report.evidence import (
     JUDGED,
     MEASURE,
+    MISSING,
     Evidence,
     benchmark_scenes,
     mesh_ratios,
+    misses_material,
     pair_in,
 )
 from verify.report.notation import Drawing, number, solver_title
@@ -30,7 +32,9 @@ _LEGEND = (
     "over positions of the mesh on level 1, where they were studied; where orders differ, ratios "
     "grow with the level. – refused with a reason; × asked, and "
     "not solved; blank: not asked. ≈ the reference cannot tell the error from none. Several "
-    "members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶."
+    "members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶. "
+    f"{MISSING} A part of the body is missing, which is softer; linear elements are stiffer, and "
+    "the errors can cancel: it is never the least."
 )
 
 
@@ -123,6 +127,7 @@ def _cell(
         text = number(found.ratio, 2)
         if scatter:
             text += f" [{number(scatter[0], 2)}, {number(scatter[1], 2)}]"
+        text += MISSING * misses_material(members, name)
         return f"**{text}**" if found.ties >= max(found.wins, found.losses) else text
     statuses = {s.status for r in members for s in r.solves if s.solver in group}
     return "" if not statuses else "–" if statuses == {Status.REFUSED} else "×"
@@ -146,8 +151,9 @@ def _finest(members: Sequence[CaseResult], name: str) -> list[float]:
 
 
 def _best(members: Sequence[CaseResult], names: Sequence[str]) -> str | None:
-    """Return the solver of the least error among those that answered most members."""
-    found = {name: own for name in names if (own := _finest(members, name))}
+    """Return the solver of the least error among those that answered most members, in full."""
+    whole = [name for name in names if not misses_material(members, name)]
+    found = {name: own for name in whole if (own := _finest(members, name))}
     most = max(map(len, found.values()), default=0)
     full = {name: median(own) for name, own in found.items() if len(own) == most}
     return min(full, key=lambda name: full[name], default=None)

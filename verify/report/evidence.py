@@ -167,6 +167,15 @@ def _with_tips(names: set[str]) -> frozenset[str]:
     return frozenset(found)
 
 
+MISSING = "†"  # beside a name or number: of another body
+
+
+def misses_material(results: Sequence[CaseResult], solver: str) -> bool:
+    """Whether an answer of a solver that was compared does not cover the body."""
+    own = (s for r in results for s in r.solves if s.solver == solver)
+    return any(s.metrics and "coverage" in s.notes for s in own)
+
+
 @dataclass(frozen=True)
 class Beside:
     """One discretisation beside another.

@@ -9,11 +9,13 @@ from verify.report.benchmark_page import discretisations, time_plot, title_of
 from verify.report.conclusions import STILL, Answer, drifts, steps_kept
 from verify.report.evidence import (
     MEASURE,
+    MISSING,
     Beside,
     Evidence,
     benchmark_scenes,
     beside,
     ends_inside,
+    misses_material,
     moves,
 )
 from verify.report.notation import Drawing, number, solver_title
@@ -146,7 +148,8 @@ def _compared(evidence: Evidence, kind: str) -> Iterator[tuple[str, Beside]]:
         if MEASURE not in group:
             found = (beside(evidence, kind, "displacement_l2", name) for name in group)
             if (own := next((one for one in found if one is not None), None)) is not None:
-                yield title_of(group), own
+                gone = any(misses_material(evidence.results, name) for name in group)
+                yield title_of(group) + MISSING * gone, own
 
 
 def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
@@ -162,6 +165,8 @@ def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
     over = (
         "90 % over positions of the mesh (* range over scenes)" if studied else "range over scenes"
     )
+    if any(MISSING in row.name for row in rows):
+        over += f"; {MISSING} a part of the body is missing"
     title = f"{_SCENES[kind]}: error over a conforming mesh's"
     return ranges(title, f"median, {over}", rows, Palette(), 1.0, (1 / _FAR, _FAR))
 
