@@ -22,7 +22,7 @@ TURN = {2: [[-1.0, 0.0], [0.0, -1.0]], 3: [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [
 
 
 def turned(d, kinematics):
-    """Turn a cut body by half a turn; and mirror what is below the cut, on the way or not."""
+    """Turn a cut body by half a turn; and the same with the part below the cut mirrored."""
     scene = scenes.scene(
         [CUT[d]], d, analysis={"kinematics": kinematics},
         supports=[{"where": "boundary", "displacement": [0.0] * d}],

@@ -90,7 +90,7 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
 
 @pytest.mark.fenicsx
 def test_a_conforming_body_that_turns_is_not_counted_as_inside_out():
-    """Its notes say so in words, as those of every solver that counts do in numbers."""
+    """Its notes say so in words; notes of other solvers have numbers."""
     turned = {"angle": 20.0, "centre": [0.5, 0.5]}
     scene = scenes.scene(
         [], mesh={"cells": [[2, 2]]}, analysis={"kinematics": "finite_rotation"},
