@@ -250,6 +250,9 @@ def _always(forces: _Floats) -> Callable[[float], _Floats]:
     return lambda _time: forces
 
 
+_INTO_PIECE = 0.01  # of the way to its centroid; a node on the cut itself is on the piece's side
+
+
 def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
     """Return the state of a body at the time 0, before what opens then.
 
@@ -263,7 +266,11 @@ def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
     if isinstance(initial, Moving):
         state.velocity[free] = initial.velocities(phantom.node_points)[free]
     elif isinstance(initial, InitialField):
-        u, v = initial.state(phantom.node_points, phantom.node_piece_points, exact)
+        # a node that no cut has doubled is on its own side: its largest piece may be on the other
+        points, beside = phantom.node_points, phantom.node_piece_points
+        alone = np.bincount(phantom.node_parent)[phantom.node_parent] == 1
+        share = np.where(alone, _INTO_PIECE, 1.0)[:, None]
+        u, v = initial.state(points, points + share * (beside - points), exact)
         state.displacement[free], state.velocity[free] = u[free], v[free]
     elif isinstance(initial, Equilibrium):
         state.displacement[:] = _equilibrium(scene, body, exact)
