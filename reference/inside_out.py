@@ -41,8 +41,6 @@ class Orientation:
         Centroid of its cell, m.
     share : float
         Of the body, where det F is not positive.
-    reach : float
-        Largest distance of such a cell from the next singular place, m; 0 for cells that touch it.
     stray : str
         Place of the least det F that is not positive outside the zones; "" if there is none.
     """
@@ -50,7 +48,6 @@ class Orientation:
     least: float
     place: tuple[float, ...]
     share: float
-    reach: float
     stray: str
 
 
@@ -94,22 +91,21 @@ class OrientationCheck:
         least = values.min(axis=1, initial=np.inf)
         share = np.count_nonzero(~(values > 0), axis=1) / max(values.shape[1], 1)
         out = np.flatnonzero(share)
-        away = self._distances(own[out])
-        stray = out[away > ZONE * float(np.ptp(space.node_points, axis=0).max())]
+        zone = ZONE * float(np.ptp(space.node_points, axis=0).max())
+        stray = out[self._distances(own[out]) > zone]
         all_ranks = domain.comm.allgather(
             (
                 self._worst(least, np.arange(len(own))),
                 self._worst(least, stray),
                 float(share @ space.measures[own]),
-                float(away.max(initial=0.0)),
             )
         )
-        worst, strays, shares, reaches = zip(*all_ranks, strict=True)
+        worst, strays, shares = zip(*all_ranks, strict=True)
         value, place = min(worst)
         lost, where = min(strays)
         whole = float(space.measures.sum())
         said = "" if not where else f"det F is {lost:.2g} at {place_text(where)}"
-        return Orientation(value, place, sum(shares) / whole, max(reaches), said)
+        return Orientation(value, place, sum(shares) / whole, said)
 
     def _worst(self, least: Array, among: Ints) -> tuple[float, tuple[float, ...]]:
         """Compute the least value of some cells, and the centroid of its cell."""

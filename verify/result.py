@@ -714,7 +714,7 @@ class StabilityStanding:
     blown_up : int
         Solved, but as far off as a body that does not move, or not finite.
     inside_out : int
-        Solves whose notes tell of elements turned inside out.
+        Solves at finite rotation whose field turns cells inside out.
     lost : float
         Share of the solves not refused that failed, ran out of time or memory, or blew up.
     regularisations : dict of str to int

@@ -32,8 +32,8 @@ from verify.solution_checks import (
 )
 
 __all__ = [
-    "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution", "checked_solution",
-    "read_solution", "write_solution",
+    "INTO_CELL", "SCHEMA_VERSION", "ContactPressure", "Regularisation", "Solution",
+    "checked_solution", "read_solution", "write_solution",
 ]  # fmt: skip
 
 SCHEMA_VERSION = 1
@@ -51,6 +51,9 @@ _OPTIONAL = (
     "cell_dimension", "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings",
     "iterations", "regularisations", "notes", "mass", "contact",
 )  # fmt: skip
+# A node on the cut has no side, a point this share of the way to the centre of one of its cells
+# has. The direction to the centre of a slender cell is no help: it runs along the cut.
+INTO_CELL = 0.01
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
 
 

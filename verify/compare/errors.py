@@ -35,7 +35,7 @@ from verify.errors import InputError
 from verify.files import whole_file
 from verify.result import CutRecord
 from verify.scene import Scene
-from verify.solution import Solution
+from verify.solution import INTO_CELL, Solution
 
 Array = NDArray[np.float64]
 
@@ -309,9 +309,6 @@ def error_history(
 
 Truth = Callable[[float], Field]  # the reference or exact field at an output time, s
 
-# A node on the cut has no side, a point this share of the way into one of its cells has. The
-# direction to the centre of a slender cell is no help: it runs along the cut.
-_INTO_CELL = 0.01
 _SAME_TIME = 1e-9  # of the last output time
 
 
@@ -380,7 +377,7 @@ def nodal_differences(
     owner[cells[order].ravel()] = np.repeat(order, cells.shape[1])
     used = owner >= 0
     centre = shape.corners.mean(axis=1)[owner[used]]
-    inside = points[used] + _INTO_CELL * (centre - points[used])
+    inside = points[used] + INTO_CELL * (centre - points[used])
     field = SolutionField(solution)
     if body is not None:
         field = field_of(solution, body, continued=continued_where(solution, body, cut))

@@ -208,7 +208,8 @@ def _row(asked: PartQuantity, count: int) -> int:
 
 
 MISMATCH = "ledger_mismatch"
-_ENERGIES = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump", MISMATCH)
+OF_ENERGY = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump")
+_ENERGIES = (*OF_ENERGY, MISMATCH)
 _MOMENTA = ("linear_momentum_drift", "angular_momentum_drift")
 ACCOUNT = (*_ENERGIES, *_MOMENTA, *PART_METRICS, "released_mismatch")
 _NAMED = 1e-6  # of the energy in play: what a ledger of single precision is off by

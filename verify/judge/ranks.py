@@ -5,10 +5,11 @@ from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
-from verify.compare.part_account import ACCOUNT
+from verify.compare.part_account import ACCOUNT, OF_ENERGY
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.cost import why_times_are_no_sample
 from verify.judge.intervals import ERROR_METRICS, Interval, number_on_finest
+from verify.judge.notices import INSIDE_OUT
 from verify.judge.pairs import coverage_of, groups_of, not_told, pairs_of
 from verify.result import (
     REFERENCE,
@@ -94,9 +95,6 @@ def _uncompared(result: CaseResult) -> str:
     return f"no error is measured: {said or 'no reason given'}"
 
 
-_OF_ENERGY = ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump")
-
-
 def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
     """Compare what is kept on the finest level of each case; the worst case counts.
 
@@ -111,7 +109,7 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
             for result in results
             if any(s.metric(metric) for s in result.solves if s.solver in solvers)
             and not ("momentum" in metric and _acted_on(result))
-            and not (metric in _OF_ENERGY and any(s.energy_taker for s in result.solves))
+            and not (metric in OF_ENERGY and any(s.energy_taker for s in result.solves))
         ]
         if (found := _by_worst(metric, solvers, cases)) is not None:
             comparisons.append(found)
@@ -187,7 +185,7 @@ def stability_standings(
                 asked=len(solves),
                 **{status.value: ended.count(status) for status in Status},
                 blown_up=sum(map(_blown_up, solves)),
-                inside_out=sum(map(_inside_out, solves)),
+                inside_out=sum(INSIDE_OUT in solve.notes for solve in solves),
                 lost=share,
                 regularisations=counts,
             )
@@ -208,15 +206,3 @@ def _blown_up(solve: SolveRecord) -> bool:
         not isfinite(m.value) or (m.value >= _BLOWN_UP and m.uncertainty < 0.5 * m.value)
         for m in found
     )
-
-
-def _inside_out(solve: SolveRecord) -> bool:
-    """Whether a note such as ``pieces inside out`` holds anything but zero, or nowhere."""
-    for name, said in solve.notes.items():
-        if name.endswith("inside out") and said != "nowhere":
-            try:
-                if float(said) != 0.0:
-                    return True
-            except ValueError:
-                return True
-    return False

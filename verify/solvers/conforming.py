@@ -258,10 +258,6 @@ def _equilibrium(
         "linear solver": finite.method,
         "smallest det F": f"{state.least:.3g}",
         "smallest det F at": place_text(state.place),
-        "area inside out": f"{state.share:.1e}",
-        "inside out": f"up to {state.reach:.2g} m from a tip, a corner or the end of a support"
-        if state.share
-        else "nowhere",
         "steps taken again": "; ".join(finite.refused_steps) or "none",
         "load steps by": "linear elements on the same mesh" if finite.nested else "these elements",
         "stability": _stability(finite),

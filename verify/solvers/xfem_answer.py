@@ -18,7 +18,7 @@ from verify.xfem.clip import ROUND_OFF_SHARE
 from verify.xfem.closing import solve_closed
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.internal_force import InternalForce, inverted_cells
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import Kernels
 from verify.xfem.loads_and_supports import check_bodies
 from verify.xfem.phantom import PhantomMesh
@@ -227,7 +227,6 @@ def solve_equilibrium(
     record.notes |= {
         "linear solver": " and ".join(_solver_text(one, kernels) for one in sorted(found.solvers)),
         **_path_notes(found),
-        "pieces inside out": _inverted(force, found.displacement),
     }
     record.regularisations += [_dismissed(found.check.dismissed), springs_left_out(force)]
     return at_rest(found.displacement, found.energy)
@@ -258,10 +257,3 @@ def _dismissed(energies: Sequence[float]) -> Regularisation:
     """Report equilibria that were found and left for one of less energy."""
     kind = "equilibrium left for one of less potential energy"
     return Regularisation(kind, len(energies), max(energies, default=0.0), "J")
-
-
-def _inverted(force: InternalForce, displacement: NDArray[np.float64]) -> str:
-    mesh = force.phantom.mesh
-    if mesh.is_membrane:
-        return "not defined for a membrane"
-    return str(len(inverted_cells(force, displacement)))

@@ -18,7 +18,7 @@ from verify.methods.mass_variants import (
 )
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene
 from verify.scene.physics import factor_at, first_factor
-from verify.solution import ContactPressure
+from verify.solution import INTO_CELL, ContactPressure
 from verify.solvers.body_of_scene import cuts_of, density_of, material_of
 from verify.solvers.boundary_conditions import (
     forces_of,
@@ -250,9 +250,6 @@ def _always(forces: _Floats) -> Callable[[float], _Floats]:
     return lambda _time: forces
 
 
-_INTO_PIECE = 0.01  # of the way to its centroid; a node on the cut itself is on the piece's side
-
-
 def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
     """Return the state of a body at the time 0, before what opens then.
 
@@ -269,7 +266,7 @@ def initial_state(scene: Scene, body: DynamicBody, exact: Any) -> MotionState:
         # a node that no cut has doubled is on its own side: its largest piece may be on the other
         points, beside = phantom.node_points, phantom.node_piece_points
         alone = np.bincount(phantom.node_parent)[phantom.node_parent] == 1
-        share = np.where(alone, _INTO_PIECE, 1.0)[:, None]
+        share = np.where(alone, INTO_CELL, 1.0)[:, None]
         u, v = initial.state(points, points + share * (beside - points), exact)
         state.displacement[free], state.velocity[free] = u[free], v[free]
     elif isinstance(initial, Equilibrium):
