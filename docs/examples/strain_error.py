@@ -8,7 +8,8 @@ import numpy as np
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.compare.error_norm import ErrorNorm, integrate_norm, rules
+from verify.compare.body_rule import rules
+from verify.compare.errors import ErrorNorm, integrate_norm
 from verify.compare.hooke import hooke
 from verify.compare.realised import field_of
 from verify.scene import restore_scene

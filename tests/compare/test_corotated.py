@@ -6,7 +6,7 @@ from cut_meshes import grid, quadratic, solution
 from solid_meshes import cube_grid
 
 from verify.compare.body_rule import Rule
-from verify.compare.error_norm import energy_error
+from verify.compare.errors import energy_error
 from verify.compare.hooke import Corotated, NeoHookean, corotated, hooke, strain_energy
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import points_in

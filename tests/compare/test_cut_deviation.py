@@ -9,7 +9,7 @@ from solid_meshes import cube_grid, solid_scene
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut
-from verify.compare.error_norm import cut_rule_of
+from verify.compare.cut_rule import cut_rule_of
 
 SEEDS = range(3)
 

@@ -8,8 +8,7 @@ import pytest
 from cut_meshes import scene
 
 from verify.compare.body import body_of
-from verify.compare.error_norm import spread_of
-from verify.compare.errors import Rules, error_history
+from verify.compare.errors import Rules, error_history, spread_of
 from verify.compare.hooke import law_of
 from verify.compare.motion import ExactMotion
 from verify.geometry.planar import inside_polygon

@@ -3,7 +3,8 @@ import pytest
 from cut_meshes import grid, quadratic, scene, solution
 
 from verify.compare.body import body_of
-from verify.compare.error_norm import displacement_error, energy_error, integrate_norm, rules
+from verify.compare.body_rule import rules
+from verify.compare.errors import displacement_error, energy_error, integrate_norm
 from verify.compare.hooke import hooke
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices

@@ -8,7 +8,7 @@ from membrane_meshes import bowl, flat, halved, layers, membrane, roof, upright
 
 from verify.compare.body_rule import body_rule
 from verify.compare.cut_rule import membrane_cut_rule
-from verify.compare.error_norm import (
+from verify.compare.errors import (
     displacement_error,
     displacement_jump,
     jump_error,

@@ -5,7 +5,7 @@ from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
 from verify.compare.body import body_of
 from verify.compare.body_rule import area_rule
 from verify.compare.cut_rule import cut_rule
-from verify.compare.error_norm import energy_error, jump_error
+from verify.compare.errors import energy_error, jump_error
 from verify.compare.hooke import hooke, strain_energy
 from verify.compare.locate import SolutionField
 from verify.scene import Material

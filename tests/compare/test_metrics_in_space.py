@@ -5,16 +5,15 @@ import pytest
 from halves_in_space import Cube, Sheet
 from membrane_meshes import flat, roof
 
-from verify.compare.body_rule import body_rule
+from verify.compare.body_rule import body_rule, rules
 from verify.compare.cut_profile import opening
-from verify.compare.error_norm import (
+from verify.compare.errors import (
     displacement_error,
     displacement_squares,
     energy_error,
     integrate_norm,
     jump_error,
     opening_squares,
-    rules,
 )
 from verify.compare.simplices import points_in
 

@@ -9,7 +9,7 @@ from verify.compare.body import body_of
 from verify.compare.body_rule import area_rule
 from verify.compare.cut_profile import profile_lines
 from verify.compare.cut_rule import cut_rule
-from verify.compare.error_norm import displacement_error, displacement_jump
+from verify.compare.errors import displacement_error, displacement_jump
 from verify.compare.locate import SolutionField
 from verify.compare.realised import SidedField, cut_deviation, field_of
 

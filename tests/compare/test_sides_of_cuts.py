@@ -6,8 +6,9 @@ from cut_meshes import scene as plane_scene
 from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, random_square
 
 from verify.compare.body import body_of
-from verify.compare.error_norm import cut_rule_of, displacement_jump, rules
-from verify.compare.errors import nodal_error
+from verify.compare.body_rule import rules
+from verify.compare.cut_rule import cut_rule_of
+from verify.compare.errors import displacement_jump, nodal_error
 from verify.compare.realised import cut_deviation, field_of
 from verify.scene import load_scene
 

@@ -7,8 +7,7 @@ from reference.exact import exact_solution
 from verify.compare.body import body_of
 from verify.compare.body_rule import area_rule
 from verify.compare.cut_rule import cut_rule
-from verify.compare.error_norm import displacement_error, energy_error, jump_error
-from verify.compare.errors import Rules
+from verify.compare.errors import Rules, displacement_error, energy_error, jump_error
 from verify.compare.hooke import hooke
 from verify.judge.quantities import Measured
 from verify.judge.reference import conforming_reference, exact_reference

@@ -7,7 +7,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut
-from verify.compare.error_norm import cut_rule_of
+from verify.compare.cut_rule import cut_rule_of
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver

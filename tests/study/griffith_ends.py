@@ -8,7 +8,7 @@ from tip_advance import tip_advances
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.compare.error_norm import rules
+from verify.compare.body_rule import rules
 from verify.compare.hooke import law_of
 from verify.compare.realised import field_of
 from verify.judge.quantities import Measured

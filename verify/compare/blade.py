@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody, body_of
 from verify.compare.cut_profile import cut_place
-from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import cut_rule_of, displacement_jump
+from verify.compare.cut_rule import CutRule, cut_rule_of
+from verify.compare.errors import displacement_jump
 from verify.compare.hooke import Law, difference_energy, short_wave_energy
 from verify.compare.locate import Field
 from verify.compare.mass import density_of

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
-from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import cut_rule_of
+from verify.compare.cut_rule import CutRule, cut_rule_of
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, deep_inside

@@ -21,7 +21,7 @@ from verify.compare.cut_rule import (
     nearest_on_membrane_cut,
     place_on_cut,
 )
-from verify.compare.error_norm import displacement_jump
+from verify.compare.errors import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.simplex_bodies import MembraneBody, SolidBody
 from verify.geometry.patches import (

@@ -9,8 +9,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.body import Body
-from verify.compare.body_rule import graded_breaks
+from verify.compare.body import AnyBody, Body
+from verify.compare.body_rule import FAMILY, graded_breaks
 from verify.compare.cell_tree import morton_order
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
@@ -205,6 +205,16 @@ def surface_rule(body: SolidBody, spacing: float, depth: float = 1 / 16) -> CutR
         found.append(CutRule.beside(points, weights, patch.normal(uv), away))
     rule = CutRule.joined(found, 3)
     return rule.reordered(morton_order(rule.points)) if len(rule.points) else rule
+
+
+def cut_rule_of(body: AnyBody, size: float, k: int = 0) -> CutRule:
+    """Make the rule `k` on the cuts for fields on elements of size `size` m; the finest is 0."""
+    factor = FAMILY[k]
+    if isinstance(body, Body):
+        return cut_rule(body, factor * size / 8)
+    if isinstance(body, MembraneBody):
+        return membrane_cut_rule(body, factor * size / 8)
+    return surface_rule(body, factor * size / 3)
 
 
 def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:

@@ -21,7 +21,7 @@ import numpy as np
 
 from verify.compare.body import body_of
 from verify.compare.cut_deviation import realised_cut, welded
-from verify.compare.error_norm import cut_rule_of
+from verify.compare.cut_rule import cut_rule_of
 from verify.compare.hooke import cell_strain_energies, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import simplices

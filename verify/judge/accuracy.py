@@ -13,17 +13,19 @@ import numpy as np
 
 from verify.compare.blade import blade_forces, released_metrics
 from verify.compare.body import AnyBody, body_of
-from verify.compare.error_norm import ErrorNorm, MeasuredNorm, spread_of
 from verify.compare.errors import (
     COARSER,
     ERROR_NAMES,
     ERRORS,
     FINEST,
+    ErrorNorm,
     History,
+    MeasuredNorm,
     Rules,
     base_of,
     compared_times,
     error_history,
+    spread_of,
 )
 from verify.compare.hooke import Law, law_of
 from verify.compare.locate import ROUND_OFF

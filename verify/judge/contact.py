@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import displacement_jump
-from verify.compare.errors import CONTACT_ERRORS
+from verify.compare.errors import CONTACT_ERRORS, displacement_jump
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import field_at

@@ -21,7 +21,7 @@ from verify.compare.body import AnyBody, body_of
 from verify.compare.cut_deviation import continued_where
 from verify.compare.cut_profile import ProfileLine, profile_lines
 from verify.compare.cut_rule import CutRule
-from verify.compare.error_norm import displacement_jump
+from verify.compare.errors import displacement_jump
 from verify.compare.hooke import law_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch

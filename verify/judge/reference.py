@@ -10,12 +10,12 @@ import numpy as np
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import Rule, area_rule, body_rule, slab_angles
-from verify.compare.error_norm import ErrorNorm
 from verify.compare.errors import (
     COARSER,
     ERROR_NAMES,
     ERRORS,
     NEAR,
+    ErrorNorm,
     History,
     Rules,
     base_of,
@@ -372,7 +372,7 @@ def _round_off(asked: Quantity, measured: Measured) -> float:
     """Bound what round-off of the displacement makes of a quantity that is zero.
 
     Displacements are known to 1e-13 of the largest, as their differences; strains to 1e-10 of that
-    over the size of the body (`verify.compare.error_norm`); nothing is claimed of other quantities.
+    over the size of the body (`verify.compare.errors`); nothing is claimed of other quantities.
     """
     u, points = measured.motion.nodal(getattr(asked, "time", None)), measured.solution.points
     moved = float(np.abs(u).max(initial=0.0))

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
-from verify.compare.error_norm import ErrorNorm, displacement_error, energy_error, rules
-from verify.compare.errors import mean_over
+from verify.compare.body_rule import rules
+from verify.compare.errors import ErrorNorm, displacement_error, energy_error, mean_over
 from verify.compare.hooke import Hooke, Law
 from verify.compare.locate import Field
 from verify.compare.motion import Motion

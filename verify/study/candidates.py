@@ -8,7 +8,8 @@ from statistics import median
 from typing import Any
 
 from verify.compare.body import AnyBody
-from verify.compare.error_norm import ErrorNorm, rules, spread_of
+from verify.compare.body_rule import rules
+from verify.compare.errors import ErrorNorm, spread_of
 from verify.compare.hooke import Law, hooke, law_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.errors import InputError, UnsupportedSceneError
