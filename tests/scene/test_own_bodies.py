@@ -11,7 +11,7 @@ from independent_p1 import energy, energy_of_field
 from scipy.spatial import cKDTree
 
 from verify.cli import main
-from verify.compare.load_work import nodes_held
+from verify.compare.outer_work import nodes_held
 from verify.errors import InputError
 from verify.exchange import export_case, problem_of
 from verify.geometry.simplices import measures

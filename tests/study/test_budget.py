@@ -9,8 +9,8 @@ from verify.compare.hooke import hooke
 from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
-from verify.study.budget_parts import Answer, error_budget
-from verify.study.candidates import Candidate, cheapest_adequate
+from verify.study.budget import Candidate, cheapest_adequate
+from verify.study.budget_chain import Answer, error_budget
 
 
 class Affine:

@@ -23,8 +23,14 @@ from verify.result import (
 )
 from verify.scene import load_scene
 from verify.study import study
-from verify.study.calibration import Trial, binomial_tail, calibration_findings, trials
-from verify.study.calibration_families import families, series_families
+from verify.study.calibration import (
+    Trial,
+    binomial_tail,
+    calibration_findings,
+    families,
+    series_families,
+    trials,
+)
 from verify.study.calibration_scenes import released, stretched
 from verify.study.cost import cost_study, growing_scenes
 

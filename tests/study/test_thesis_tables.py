@@ -18,7 +18,7 @@ from verify.simulator.thesis import (
     step_times,
     with_other_frames,
 )
-from verify.study.thesis_verdicts import Measured, verdicts
+from verify.study.thesis import Measured, verdicts
 
 _HOLD = (
     "Table 4.3, its law",

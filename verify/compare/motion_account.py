@@ -3,7 +3,7 @@
 Energies are measured on the fields of the solver, each with its interval. Strain energy follows
 from displacements; kinetic energy from velocities with the declared mass (`verify.compare.mass`),
 which gravity pulls at. Work of dead loads follows from displacements. Work of moving supports
-follows from momenta and stresses (`verify.compare.support_work`), damping from its rate at the
+follows from momenta and stresses (`verify.compare.outer_work`), damping from its rate at the
 output times. The solver's own ledger is kept beside them, to be compared. It is taken alone only
 where no field shows the work: of loads that change in place, and of supports that jump or follow an
 exact field.
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from verify.compare.hooke import Law, cell_dissipation, cell_strain_energies
-from verify.compare.load_work import load_work
 from verify.compare.locate import SolutionField
 from verify.compare.mass import (
     Inertia,
@@ -28,7 +27,7 @@ from verify.compare.mass import (
     kinetic,
     separated_parts,
 )
-from verify.compare.support_work import support_work
+from verify.compare.outer_work import load_work, support_work
 from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Scene, Traction, is_uniform
 from verify.scene.physics import Support

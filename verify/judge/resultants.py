@@ -22,17 +22,17 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from verify.compare.hooke import Corotated, Law, stress_power, viscous_power
-from verify.compare.load_work import (
+from verify.compare.locate import ROUND_OFF, Field, SolutionField
+from verify.compare.mass import consistent_mass, density_of, inertia_of, kinetic, separated_parts
+from verify.compare.motion import step_at
+from verify.compare.outer_work import (
     PrescribedNodes,
     nodal_forces,
     nodes_held,
     prescribed_nodes,
     spread,
+    taken_up,
 )
-from verify.compare.locate import ROUND_OFF, Field, SolutionField
-from verify.compare.mass import consistent_mass, density_of, inertia_of, kinetic, separated_parts
-from verify.compare.motion import step_at
-from verify.compare.support_work import taken_up
 from verify.errors import InputError, UnsupportedSceneError
 from verify.geometry.simplices import measures
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction

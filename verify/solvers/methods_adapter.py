@@ -35,8 +35,16 @@ from verify.solvers.interface import check_choices, refused_contact
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration, OpeningBody
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_answer import Law, solution_on, solve_equilibrium, springs_left_out
-from verify.solvers.xfem_system import EXPLICIT, SCHEMES, elasticity_of, system_of
+from verify.solvers.xfem_system import (
+    EXPLICIT,
+    SCHEMES,
+    Law,
+    elasticity_of,
+    solution_on,
+    solve_equilibrium,
+    springs_left_out,
+    system_of,
+)
 from verify.system import System
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState

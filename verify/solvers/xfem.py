@@ -28,8 +28,18 @@ from verify.solvers.boundary_conditions import motion_of_supports, supports_of
 from verify.solvers.interface import check_choices, refused_contact
 from verify.solvers.motion_of_scene import CutMotion, Fade, Integration, OpeningBody
 from verify.solvers.runs import OPENINGS, Record, check_steps, repeated
-from verify.solvers.xfem_answer import joined, penalised, solution_on, solve_equilibrium, treated
-from verify.solvers.xfem_system import MASSES, SCHEMES, elasticity_of, mass_of, system_of
+from verify.solvers.xfem_system import (
+    MASSES,
+    SCHEMES,
+    elasticity_of,
+    joined,
+    mass_of,
+    penalised,
+    solution_on,
+    solve_equilibrium,
+    system_of,
+    treated,
+)
 from verify.system import System
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState

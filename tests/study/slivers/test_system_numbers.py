@@ -16,8 +16,7 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.study.measured_scenes import Measurement
-from verify.study.sliver_systems import step_by_running
-from verify.study.slivers import findings, growth
+from verify.study.slivers import findings, growth, step_by_running
 from verify.system import System, checked_system, condition_numbers, critical_step, lowest_frequency
 
 SIZES = [0.5, 1e-1, *(10.0**-k for k in range(2, 13)), 0.0]
