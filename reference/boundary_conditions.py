@@ -183,28 +183,13 @@ class RigidMotions:
 def best_rotation(now: Array, wanted: Array) -> Array:
     """Compute the rotation (d, d) of centred points (k, d) that brings them nearest to others.
 
-    In space the eigenvector of Horn's matrix (B. K. P. Horn, J. Opt. Soc. Am. A 4, 1987, 629).
+    By the singular values of their covariance (W. Kabsch, Acta Cryst. A 32, 1976, 922).
     """
-    d = now.shape[1]
     S = now.T @ wanted
-    S += _OPEN * float(np.linalg.norm(now) * np.linalg.norm(wanted)) * np.eye(d)
-    if d == 2:
-        angle = np.arctan2(S[0, 1] - S[1, 0], S[0, 0] + S[1, 1])
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s], [s, c]])
-    axial = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
-    N = np.empty((4, 4))
-    N[0, 0] = np.trace(S)
-    N[0, 1:] = N[1:, 0] = axial
-    N[1:, 1:] = S + S.T - np.trace(S) * np.eye(3)
-    w, x, y, z = np.linalg.eigh(N)[1][:, -1]
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    S += _OPEN * float(np.linalg.norm(now) * np.linalg.norm(wanted)) * np.eye(len(S))
+    left, _, right = np.linalg.svd(S)
+    left[:, -1] *= np.sign(np.linalg.det(left @ right))
+    return np.asarray((left @ right).T)
 
 
 class CutFacets(NamedTuple):

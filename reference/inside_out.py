@@ -234,11 +234,11 @@ def _weak_place(
     around = (space.cell_nodes == node).any(axis=1)
     corners = space.mesh.points[space.mesh.cells[around]]
     longest = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).max()
-    place = ", ".join(f"{x:.4g}" for x in space.node_points[node])
     return InputError(
-        f"geometry: the material around ({place}), in cells of {longest:.2g} m, is held so weakly "
-        f"that its displacement is lost in round-off ({error.size:.1e} of the whole is not "
-        "known): a needle or strip this slender between cuts, or between a cut and the boundary, "
-        "cannot be solved for; move them apart, or let them meet",
+        f"geometry: the material around {place_text(space.node_points[node])}, in cells of "
+        f"{longest:.2g} m, is held so weakly that its displacement is lost in round-off "
+        f"({error.size:.1e} of the whole is not known): a needle or strip this slender "
+        "between cuts, or between a cut and the boundary, cannot be solved for; move them apart, "
+        "or let them meet",
         str(scene.file or ""),
     )

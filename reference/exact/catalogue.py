@@ -167,20 +167,20 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         If the name or a parameter is unknown, missing or has the wrong form, or the code of
         another package fails.
     """
+    given = Parameters(name, parameters)
+    solution = _made(name, given, material)
+    given.close()
+    return solution
+
+
+def _made(name: str, given: Parameters, material: Material) -> ExactSolution:
     law = hooke(material)
     if name == "layers" and law.dimension == 2:
-        given = Parameters(name, parameters)
-        layers = Layers(material, given)
-        given.close()
-        return layers
+        return Layers(material, given)
     if not material.is_uniform:
         raise InputError(f"exact solution '{name}' is of one material; there are material.regions")
     if name not in _CATALOGUE:
-        given = Parameters(name, parameters)
-        solution = _from_entry_point(name, law, given)
-        given.close()
-        return solution
-    make, _ = _CATALOGUE[name]
+        return _from_entry_point(name, law, given)
     if material.model != "hooke" and name not in _AT_ANY_STRAIN:
         raise InputError(
             f"exact solution '{name}' is of Hooke's law; material.model = '{material.model}' "
@@ -192,10 +192,7 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         )
     if law.dimension == 2 and name in _IN_SPACE and name not in _IN_BOTH:
         raise InputError(f"exact solution '{name}' is one of space; this scene is plane")
-    given = Parameters(name, parameters)
-    solution = make(law, given)
-    given.close()
-    return solution
+    return _CATALOGUE[name][0](law, given)
 
 
 def _from_entry_point(name: str, law: Hooke, given: Parameters) -> ExactSolution:

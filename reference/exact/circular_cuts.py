@@ -13,6 +13,7 @@ from reference.exact.solution import (
     Hooke,
     Parameters,
     box_of,
+    complex_gradient,
     matrices,
     plane_axes,
 )
@@ -124,11 +125,7 @@ class ArcCrack(ExactSolution):
         with np.errstate(invalid="ignore"):  # at a tip ∞ − ∞: the limit depends on the way there
             dz = self.law.kolosov * f.phi_1 - f.phi_1.conj()
             dz_bar = -z * f.phi_2.conj() - f.psi_1.conj()
-        along_x = (dz + dz_bar) / (2 * self.law.shear)
-        along_y = 1j * (dz - dz_bar) / (2 * self.law.shear)
-        rows = [along_x.real, along_y.real, along_x.imag, along_y.imag]
-        turned: Array = self._axes.T @ np.stack(rows, axis=1).reshape(-1, 2, 2) @ self._axes
-        return turned
+        return complex_gradient(dz, dz_bar, self.law.shear, self._axes)
 
     def kinks(self, start: Array, end: Array) -> list[float]:
         """Find where a segment crosses the crack; see `ExactSolution`."""

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from reference.exact.solution import Array, ExactSolution, Hooke, Parameters, Plane
 from verify.errors import InputError
-from verify.scene import Scene
 
 Complex = NDArray[np.complex128]
 
@@ -55,18 +54,6 @@ class BladeStrip(ExactSolution):
     def energy_release_rate(self) -> float:
         """Return G = K_III²/(2μg) = μ w₀²/b, J/m² of new cut, whatever the speed."""
         return float(self.law.shear * self._w**2 / self._b)
-
-    def strain_energy(self, body: Array | Scene) -> float:
-        """Compute the strain energy of a body around the strip at rest, J; see `ExactSolution`.
-
-        Raises
-        ------
-        InputError
-            If the field moves: the tractions on the surface do not say it.
-        """
-        if self.moves:
-            raise InputError("the strain energy of a moving field is no work on the surface")
-        return super().strain_energy(body)
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement (n, 3), m; see `ExactSolution`."""
@@ -172,10 +159,6 @@ class ReleasedBar(ExactSolution):
         front = length - np.abs(run % (2 * length) - length)
         return np.asarray(np.abs(far - front) > reach)
 
-    def strain_energy(self, body: Array | Scene) -> float:
-        """Refuse: the tractions on the surface do not say it."""
-        raise InputError("the strain energy of a moving field is no work on the surface")
-
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement (n, d), m; see `ExactSolution`."""
         side, far, length = self._local(points, near)
@@ -244,10 +227,6 @@ class Impact(ExactSolution):
         """Tell whether no front of a wave is within a distance of points; see `ExactField`."""
         _, far = self._local(points, None)
         return np.asarray(np.abs(far - self._front()[0]) > reach)
-
-    def strain_energy(self, body: Array | Scene) -> float:
-        """Refuse: the tractions on the surface do not say it."""
-        raise InputError("the strain energy of a moving field is no work on the surface")
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement (n, d), m; see `ExactSolution`."""

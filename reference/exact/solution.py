@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.planar import polygon_area
 from verify.scene import Box, Material, Polygon, Rectangle, Scene
 from verify.scene.strict import nearest
 
@@ -275,7 +276,14 @@ class ExactSolution(ExactField):
         body : array or Scene
             In the plane: corners (k, 2) in order, or a scene whose geometry is a rectangle or
             polygon. In space: both corners (2, 3) of a box, or a scene with one.
+
+        Raises
+        ------
+        InputError
+            If the field moves: the tractions on the surface do not say it.
         """
+        if self.moves:
+            raise InputError("the strain energy of a moving field is no work on the surface")
         if self.dimension == 2:
             outline = outline_of(body)
             facets = list(np.stack([outline, np.roll(outline, -1, axis=0)], axis=1))
@@ -304,8 +312,7 @@ def outline_of(body: Array | Scene) -> Array:
             )
         body = body.geometry.outline()
     corners = np.asarray(body, dtype=float)
-    x, y = (corners - corners[0]).T
-    return corners if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0 else corners[::-1]
+    return corners if polygon_area(corners) > 0 else corners[::-1]
 
 
 def box_of(body: Array | Scene) -> Array:
@@ -621,3 +628,15 @@ def side(pair: Array, above: Above) -> Array:
 def matrices(rows: list[list[Array]]) -> Array:
     """Compute matrices (n, d, d) from rows of entries (n,)."""
     return np.moveaxis(np.array(rows), 2, 0)
+
+
+def complex_gradient(
+    dz: NDArray[np.complex128], dz_bar: NDArray[np.complex128], shear: float, axes: Array
+) -> Array:
+    """Compute gradients (n, 2, 2) of u_x + i u_y from 2μ times its derivatives by z and z̄ (n,).
+
+    `axes` (2, 2) are those of z, as rows.
+    """
+    along_x, along_y = (dz + dz_bar) / (2 * shear), 1j * (dz - dz_bar) / (2 * shear)
+    rows = matrices([[along_x.real, along_y.real], [along_x.imag, along_y.imag]])
+    return np.asarray(axes.T @ rows @ axes)

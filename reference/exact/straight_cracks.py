@@ -13,7 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.solution import Array, ExactSolution, Hooke, Parameters, outline_of, plane_axes
+from reference.exact.solution import (
+    Array,
+    ExactSolution,
+    Hooke,
+    Parameters,
+    complex_gradient,
+    outline_of,
+    plane_axes,
+)
 from verify.errors import InputError
 from verify.geometry.planar import inner_parts
 from verify.scene import Scene
@@ -75,11 +83,7 @@ class ComplexCrack(ExactSolution):
         with np.errstate(invalid="ignore"):  # at a tip ∞ − ∞: the limit depends on the way there
             dz = self.law.kolosov * f.phi_1 - f.phi_1.conj()
             dz_bar = -f.omega_1 + f.phi_1.conj() - (z - z.conj()) * f.phi_2.conj()
-        along_x = (dz + dz_bar) / (2 * self.law.shear)
-        along_y = 1j * (dz - dz_bar) / (2 * self.law.shear)
-        rows = [along_x.real, along_y.real, along_x.imag, along_y.imag]
-        turned: Array = self._axes.T @ np.stack(rows, axis=1).reshape(-1, 2, 2) @ self._axes
-        return turned
+        return complex_gradient(dz, dz_bar, self.law.shear, self._axes)
 
     def kinks(self, start: Array, end: Array) -> list[float]:
         """Find where the segment from `start` to `end` meets the crack."""

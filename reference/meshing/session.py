@@ -22,7 +22,7 @@ from reference.meshing.features import (
     supported_edges,
 )
 from reference.meshing.inner_lines import plane_interfaces
-from verify.geometry.planar import inside_polygon
+from verify.geometry.planar import inside_polygon, polygon_area
 from verify.geometry.simplices import distance_to_outline, oriented
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import FractureQuantity
@@ -213,7 +213,7 @@ def _corners(scene: Scene) -> Array:
     before = np.roll(following, 1, axis=0)
     turn = before[:, 0] * following[:, 1] - before[:, 1] * following[:, 0]
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(following, axis=1)
-    reentrant = turn * _orientation(corners) < -1e-9 * sizes
+    reentrant = turn * np.sign(polygon_area(corners)) < -1e-9 * sizes
     free = ~held & ~np.roll(held, 1)
     return corners[(held != np.roll(held, 1)) | reentrant | (free & load_jumps(scene, corners))]
 
@@ -244,11 +244,6 @@ def _interface_points(scene: Scene, cuts: list[Feature], outline: Array) -> Arra
     points = np.concatenate([lone, *met, _junctions(interfaces)])
     on_outline = distance_to_outline(points, outline) <= _SAME * scale
     return points[inside_polygon(points, outline) | on_outline]
-
-
-def _orientation(outline: Array) -> float:
-    x, y = (outline - outline[0]).T
-    return float(np.sign(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
 @contextmanager

@@ -119,3 +119,9 @@ def test_the_best_rotation_is_the_one_that_was_made(degrees) -> None:
         points = random.normal(size=(7, len(rotation)))
         points -= points.mean(axis=0)
         assert best_rotation(points, points @ rotation.T) == pytest.approx(rotation, abs=1e-11)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_piece_that_is_held_at_one_node_alone_is_not_turned(d) -> None:
+    """Its node is its own centre: nothing says by which rotation it went."""
+    assert best_rotation(np.zeros((1, d)), np.zeros((1, d))) == pytest.approx(np.eye(d))

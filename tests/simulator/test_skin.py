@@ -4,9 +4,9 @@ import meshio
 import numpy as np
 import pytest
 
+from verify.geometry.simplices import boundary_loops
 from verify.scene import Skin
 from verify.simulator.skin_mesh import (
-    border_loops,
     closed_shell,
     plane_mesh,
     procedural_face,
@@ -28,13 +28,13 @@ def test_the_triangles_of_a_domain_cover_it_and_leave_its_holes() -> None:
     # both borders have corners at the resampled points: 80 and 16 of them divide the sides
     np.testing.assert_allclose(area.sum(), 1.0 - 0.04, rtol=1e-12)
     assert rim == 80
-    assert len(border_loops(triangles)) == 2
+    assert len(boundary_loops(triangles)) == 2
 
 
 def test_the_face_has_openings_for_eyes_and_mouth_and_the_nodes_of_the_thesis() -> None:
     points, triangles, rim = procedural_face().triangulate(7550)
     assert abs(len(points) / 3913 - 1.0) < 0.02
-    loops = border_loops(triangles)
+    loops = boundary_loops(triangles)
     assert len(loops) == 4
     middles = [points[loop].mean(axis=0)[:2] for loop in loops if loop.min() >= rim]
     expected = {(0.031, 0.0265), (-0.031, 0.0265), (0.0, -0.045)}
@@ -69,7 +69,7 @@ def test_a_plane_sheet_thickened_has_its_volume_and_a_closed_shell(layers) -> No
     sides = len(facets) - 2 * len(triangles)
     assert len(solid.boundary_facets) == 2 * len(triangles) + layers * sides
     np.testing.assert_allclose(np.linalg.det(shell[facets]).sum() / 6.0, 0.96 * 0.05, rtol=1e-12)
-    assert len(border_loops(facets)) == 0
+    assert len(boundary_loops(facets)) == 0
 
 
 @pytest.mark.parametrize("suffix", ["stl", "vtu"])

@@ -11,7 +11,7 @@ from verify.compare.simplices import places_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
 from verify.geometry.planar import inside_polygon, polygon_area
-from verify.geometry.simplices import distance_to_outline
+from verify.geometry.simplices import boundary_loops, distance_to_outline
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 
 Array = NDArray[np.float64]
@@ -154,31 +154,6 @@ def _loops(scene: Scene) -> tuple[Array, ...]:
         )
     points, cells = read_mesh(scene)
     return tuple(points[loop] for loop in boundary_loops(cells))
-
-
-def boundary_loops(cells: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Find the nodes of the closed curves that bound triangles (m, 3) of positive orientation."""
-    edges = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    following: dict[int, list[int]] = {}
-    for start, end in edges[first[count == 1]].tolist():
-        following.setdefault(start, []).append(end)
-    loops = []
-    while following:
-        start = node = next(iter(following))
-        loop = []
-        while True:
-            loop.append(node)
-            ends = following[node]
-            node, at = ends.pop(), node
-            if not ends:
-                del following[at]
-            if node == start:
-                break
-        loops.append(np.array(loop, dtype=np.int64))
-    return loops
 
 
 def _kinks(loop: Array) -> Array:

@@ -453,9 +453,7 @@ class History:
 
 def mean_over(times: Sequence[float], values: Array) -> Array:
     """Time average of values (t, …) that are linear between the times."""
-    step = np.diff(np.asarray(times))
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.asarray(np.tensordot(step, middle, axes=1) / step.sum())
+    return np.asarray(np.trapezoid(values, times, axis=0) / (times[-1] - times[0]))
 
 
 def compared_times(scene: Scene, solution: Solution) -> list[float | None]:

@@ -126,19 +126,8 @@ def _evaluate_quadratic(points, found, origins, first, bends, slopes, axes, acro
 
 def squares(values: Floats) -> Floats:
     """Sum (n,) of the squares of the entries of each of `values` (n, ...)."""
-    if not COMPILED:
-        return np.asarray((values**2).reshape(len(values), -1).sum(axis=1))
-    found = np.empty(len(values))
-    _squares(np.ascontiguousarray(values).reshape(len(values), -1), found)
-    return found
-
-
-@njit(cache=True)
-def _squares(values, found):
-    for i in range(values.shape[0]):
-        found[i] = 0.0
-        for c in range(values.shape[1]):
-            found[i] += values[i, c] ** 2
+    flat = values.reshape(len(values), -1)
+    return np.asarray(np.einsum("nk,nk->n", flat, flat))
 
 
 def difference_squares(found: Floats, expected: Floats) -> Floats:
@@ -284,29 +273,22 @@ class SolutionField:
         """
         if self._across is not None:
             return self._on_surface(points, near)[0]
-        points = np.ascontiguousarray(points, dtype=float)
-        directions = np.zeros((0, points.shape[1])) if near is None else near - points
-        return find_cells(
-            points,
-            np.ascontiguousarray(directions),
-            self._wanted(points, near),
-            self._searched,
-            self._sides,
-            ROUND_OFF * self.scale,
-        )
+        asked = self._asked(points, near)
+        return find_cells(*asked, self._searched, self._sides, ROUND_OFF * self.scale)
 
     def _on_surface(
         self, points: Array, near: Array | None = None
     ) -> tuple[NDArray[np.int64], Array]:
         """Find the triangle (n,) nearest to each of `points` (n, 3), and its distance (n,)."""
-        points = np.ascontiguousarray(points, dtype=float)
-        directions = np.zeros((0, 3)) if near is None else near - points
         assert self._across is not None
-        found: tuple[NDArray[np.int64], Array] = nearest_triangles(
-            points, np.ascontiguousarray(directions), self._wanted(points, near),
-            self._searched, self._across, self._sides, ROUND_OFF * self.scale,
-        )  # fmt: skip
-        return found
+        among = self._searched, self._across, self._sides
+        return nearest_triangles(*self._asked(points, near), *among, ROUND_OFF * self.scale)
+
+    def _asked(self, points: Array, near: Array | None) -> tuple[Array, Array, NDArray[np.int8]]:
+        """Return points, the ways (n, d) or (0, d) to `near`, and the wanted sides of cuts."""
+        points = np.ascontiguousarray(points, dtype=float)
+        directions = np.zeros((0, points.shape[1])) if near is None else near - points
+        return points, np.ascontiguousarray(directions), self._wanted(points, near)
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
         """Return the wanted sides (n, 0) of cuts: no cut is known here."""

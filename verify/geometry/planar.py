@@ -22,9 +22,7 @@ def polygon_defect(corners: Array) -> str | None:
     defect = _segments_defect(closed, closed=True)
     if defect:
         return f"the polygon {defect}"
-    x, y = corners.T
-    area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
-    if abs(area) <= 1e-12 * np.ptp(corners, axis=0).max() ** 2:
+    if abs(polygon_area(corners)) <= 1e-12 * np.ptp(corners, axis=0).max() ** 2:
         return "the polygon has no area"
     return None
 

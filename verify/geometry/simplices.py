@@ -72,6 +72,31 @@ def boundary_facets(cells: Ints) -> tuple[Ints, Ints, Ints]:
     return facets[alone], alone % count, alone // count
 
 
+def boundary_loops(cells: Ints) -> list[Ints]:
+    """Find the nodes of the closed curves that bound triangles (m, 3) of positive orientation."""
+    edges = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    following: dict[int, list[int]] = {}
+    for start, end in edges[first[count == 1]].tolist():
+        following.setdefault(start, []).append(end)
+    loops = []
+    while following:
+        start = node = next(iter(following))
+        loop = []
+        while True:
+            loop.append(node)
+            ends = following[node]
+            node, at = ends.pop(), node
+            if not ends:
+                del following[at]
+            if node == start:
+                break
+        loops.append(np.array(loop, dtype=np.int64))
+    return loops
+
+
 def unit_normals(simplices: Array) -> Array:
     """Return unit normals (m, d) of segments (m, 2, 2), to the left, or of triangles (m, 3, 3).
 

@@ -22,6 +22,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, isfinite, log
 
+from scipy.optimize import brentq
+
 from verify.compare.body import AnyBody
 from verify.compare.realised import cut_deviation
 from verify.errors import InputError
@@ -173,7 +175,7 @@ def place_uncertainty(
 def observed_order(first: float, last: float, sizes: Sequence[float]) -> float | None:
     """Find the order p with first / last = (h₀ᵖ − h₁ᵖ) / (h₁ᵖ − h₂ᵖ), or None if there is none.
 
-    The refinement ratios may differ; the right side grows with p, so that bisection finds it.
+    The refinement ratios may differ; the right side grows with p.
     """
     if first <= 0.0 or last <= 0.0:
         return None
@@ -188,10 +190,7 @@ def observed_order(first: float, last: float, sizes: Sequence[float]) -> float |
         return None  # the differences do not shrink as any positive order would make them
     if excess(high) < 0:
         return inf
-    while high - low > 1e-10:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    return 0.5 * (low + high)
+    return float(brentq(excess, low, high, xtol=1e-10))
 
 
 def _counted(formal: float, falls: float, sizes: Sequence[float]) -> float:

@@ -29,7 +29,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.contact import Pressure, exact_pressure, stated_pressure
 from verify.judge.convergence import place_uncertainty
 from verify.judge.reference import size_of
-from verify.printable import one_line
+from verify.printable import one_line, place_text
 from verify.result import (
     COMPARISON_FAILED,
     REFERENCE,
@@ -422,11 +422,7 @@ def _place(found: _Found) -> str:
     assert material is not None
     assert deformed is not None
     when = "" if found.time is None else f", at {found.time:.4g} s"
-    return f"{_point(material)} m, deformed {_point(deformed)} m{when}"
-
-
-def _point(place: Any) -> str:
-    return "(" + ", ".join(f"{c:.4g}" for c in place) + ")"
+    return f"{place_text(material)} m, deformed {place_text(deformed)} m{when}"
 
 
 def _finest_mesh(solutions: Mapping[str, Mapping[int, Solution]]) -> Solution | None:

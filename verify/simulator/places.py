@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from verify.compare.cell_tree import morton_order
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.mesh import SimplexMesh
 
-_BITS = 10  # of each coordinate on the curve
 _DEEP = 128  # deeper than any heap: twice its height is what a depth-first stack needs
 _REACH = 1e-9  # of the mesh's extent: a place so near to a box is in it
 _TIE = 1e-9  # barycentric coordinates: closer than that to a face is on it
@@ -42,7 +42,7 @@ class BoundingTree:
     def __init__(self, points: Floats, simplices: Ints) -> None:
         corners, count = points[simplices], len(simplices)
         self.floor, self.ceiling = corners.min(axis=1), corners.max(axis=1)
-        self._order = np.argsort(_places_on_curve(self.floor + self.ceiling), kind="stable")
+        self._order = morton_order(self.floor + self.ceiling)
         self._low, self._high = (
             np.concatenate([np.empty_like(box), box[self._order]])
             for box in (self.floor, self.ceiling)
@@ -60,17 +60,6 @@ class BoundingTree:
         Returns the first of each box (q + 1,), and all of them one after the other.
         """
         return _meeting(self._low, self._high, self._order, floor, ceiling)
-
-
-def _places_on_curve(centres: Floats) -> Ints:
-    """Find places (n,) on the Z-order curve of the box around all centres (n, s)."""
-    low, widest = centres.min(axis=0), float(np.ptp(centres, axis=0).max())
-    places = ((centres - low) * ((2**_BITS - 1) / widest if widest > 0.0 else 0.0)).astype(int)
-    codes, space = np.zeros(len(centres), dtype=np.int64), centres.shape[1]
-    for bit in range(_BITS):
-        for i in range(space):
-            codes |= ((places[:, i] >> bit) & 1) << (space * bit + i)
-    return codes
 
 
 @njit(cache=True)

@@ -21,8 +21,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import Delaunay, cKDTree
 
 from verify.errors import InputError
-from verify.geometry.planar import inside_polygon
-from verify.geometry.simplices import boundary_facets, refine_uniformly
+from verify.geometry.planar import inside_polygon, polygon_area
+from verify.geometry.simplices import boundary_facets, boundary_loops, refine_uniformly
 from verify.read_mesh import read_with_meshio
 from verify.scene import Skin
 from verify.xfem.arrays import Bools, Floats, Ints
@@ -133,7 +133,7 @@ def plane_mesh(outline: Floats, holes: list[Floats], size: float) -> tuple[Float
 
 def mesh_of_about(outline: Floats, holes: list[Floats], triangles: int) -> tuple[Floats, Ints, int]:
     """Triangulate a domain with about so many triangles; returns what `plane_mesh` does."""
-    area = _area(outline) - sum(_area(hole) for hole in holes)
+    area = abs(polygon_area(outline)) - sum(abs(polygon_area(hole)) for hole in holes)
     size = float(np.sqrt(area / triangles * 4.0 / np.sqrt(3.0)))
     for _ in range(3):
         mesh, size = _next_finer(outline, holes, size)
@@ -221,11 +221,6 @@ def _check_formula(points: Floats, triangles: Ints, rings: list[Floats], size: f
     border, used = boundary_facets(triangles)[0], len(np.unique(triangles))
     if not np.array_equal(border, wanted) or used != len(points):
         raise InputError(f"an element size of {size:.3g} m is too coarse for the outline")
-
-
-def _area(ring: Floats) -> float:
-    x, y = ring.T
-    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
 def procedural_face() -> Patch:
@@ -389,24 +384,10 @@ def read_surface(path: Path) -> tuple[Floats, Ints]:
     return points, triangles
 
 
-def border_loops(triangles: Ints) -> list[Ints]:
-    """Find points along each border of a surface, in the direction of its triangles."""
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    inner = {(int(b), int(a)) for a, b in edges}
-    follows = {int(a): int(b) for a, b in edges if (int(a), int(b)) not in inner}
-    loops = []
-    while follows:
-        loop = [next(iter(follows))]
-        while (after := follows.pop(loop[-1], None)) is not None and after != loop[0]:
-            loop.append(after)
-        loops.append(np.array(loop, dtype=np.int64))
-    return loops
-
-
 def outer_border(points: Floats, triangles: Ints) -> Bools:
     """Mark the points (n,) of the longest border; none of a closed surface."""
     rim = np.zeros(len(points), dtype=bool)
-    loops = border_loops(triangles)
+    loops = boundary_loops(triangles)
     if loops:
         lengths = [
             np.linalg.norm(points[np.roll(loop, -1)] - points[loop], axis=1).sum() for loop in loops
