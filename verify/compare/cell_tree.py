@@ -16,7 +16,8 @@ from scipy.spatial import cKDTree
 from verify.compiled import COMPILED, njit
 
 LEAF = 4  # cells per leaf
-_AT_ONCE, _BESIDE = 1 << 15, 8  # points: that numpy takes, and of which it tries one first
+# In numpy: points at once, centres of cells that are tried, share of points that is worth a tree
+_AT_ONCE, _TRIED, _WORTH = 1 << 15, 4, 0.125
 # Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
 _SPREAD = {
     2: (
@@ -360,38 +361,40 @@ def _holding_in_numpy(
     searched: SearchedCells, sides: NDArray[np.int8], tolerance: float, found: Ints,
 ) -> None:  # fmt: skip
     """Do as `_containing` for all points at once, first for some: others share their cells."""
-    _, _, _, corners, normals, centres = searched
+    _, _, cells, corners, normals, centres = searched
     offsets = np.einsum("mka,mka->mk", normals, np.roll(corners, -1, axis=1))
 
     def fitting(rows: Ints, held: Ints) -> tuple[Floats, NDArray[np.bool_]]:
         """Give depths (n,) of points in cells, and whether the cells are on their sides."""
-        along = np.einsum("nka,na->nk", normals[held], points[rows])
-        agreed: NDArray[np.bool_] = (wanted[rows] * sides[held] >= 0).all(axis=1)
-        return (along - offsets[held]).min(axis=1), agreed
+        depth, agreed = np.full(len(rows), np.inf), np.ones(len(rows), dtype=bool)
+        for k in range(offsets.shape[1]):  # facet by facet: three times as fast
+            along = np.einsum("na,na->n", normals[held, k], points[rows])
+            np.minimum(depth, along - offsets[held, k], out=depth)
+        for c in range(wanted.shape[1]):
+            agreed &= wanted[rows, c] * sides[held, c] >= 0
+        return depth, agreed
 
-    every = np.arange(len(points))
-    for rows in (every[::_BESIDE], every):
-        if rows is every:
-            for ahead in (0, 1):
-                tried = (every // _BESIDE + ahead) * _BESIDE
-                before = found[np.minimum(tried, (len(points) - 1) // _BESIDE * _BESIDE)]
-                rows = every[(found < 0) & (before >= 0)]
-                depth, agreed = fitting(rows, before[rows])
-                same = rows[agreed & (depth > tolerance)]
-                found[same] = before[same]
-            rows = every[found < 0]
-        near = near_points(points, tolerance)
-        for row, cell in pairs_met(searched, corners, rows, near):
-            depth, there = fitting(row, cell)
-            there &= depth >= -tolerance
-            row, cell, depth = row[there], cell[there], depth[there]
-            inside = depth > tolerance
-            on_side = inside
-            if sided:
-                towards = (directions[row] * (centres[cell] - points[row])).sum(axis=1)
-                on_side = inside | (towards > 0.0)
-            order = np.lexsort((depth, on_side, inside))
-            found[row[order]] = cell[order]  # the last of each point stays
+    kept = cells[cells >= 0]
+    if len(points) > _WORTH * len(kept) > 0:
+        beside = cKDTree(centres[kept], balanced_tree=False, compact_nodes=False)
+        for nearest in range(1, min(_TRIED, len(kept)) + 1):
+            rows = np.flatnonzero(found < 0)
+            cell = kept[beside.query(points[rows], [nearest])[1][:, 0]]
+            depth, agreed = fitting(rows, cell)
+            there = agreed & (depth > tolerance)
+            found[rows[there]] = cell[there]
+    near = near_points(points, tolerance)
+    for row, cell in pairs_met(searched, corners, np.flatnonzero(found < 0), near):
+        depth, there = fitting(row, cell)
+        there &= depth >= -tolerance
+        row, cell, depth = row[there], cell[there], depth[there]
+        inside = depth > tolerance
+        on_side = inside
+        if sided:
+            towards = (directions[row] * (centres[cell] - points[row])).sum(axis=1)
+            on_side = inside | (towards > 0.0)
+        order = np.lexsort((depth, on_side, inside))
+        found[row[order]] = cell[order]  # the last of each point stays
 
 
 Meets = Callable[[Ints, Floats, Floats, Ints], NDArray[np.bool_]]
@@ -405,7 +408,10 @@ def pairs_met(
     `corners` (m, k, d) belong to the cells. ``meets(row, low, high, box)`` tells of n rows
     whether they meet the boxes of these numbers (n,), from ``low[box]`` to ``high[box]``.
     """
-    leaves, boxes = len(tree.lower) // 2, (corners.min(axis=1), corners.max(axis=1))
+    leaves = len(tree.lower) // 2
+    low, high = corners[:, 0], corners[:, 0]
+    for k in range(1, corners.shape[1]):  # corner by corner: ten times as fast
+        low, high = np.minimum(low, corners[:, k]), np.maximum(high, corners[:, k])
     for begin in range(0, len(rows), _AT_ONCE):
         row = rows[begin : begin + _AT_ONCE]
         node = np.ones(len(row), dtype=np.int64)
@@ -418,7 +424,7 @@ def pairs_met(
         cell = tree.cells.reshape(leaves, -1)[node - leaves]
         row, cell = row.repeat(cell.shape[1]), cell.ravel()
         row, cell = row[cell >= 0], cell[cell >= 0]
-        met = meets(row, *boxes, cell)
+        met = meets(row, low, high, cell)
         yield row[met], cell[met]
 
 

@@ -89,14 +89,29 @@ def evaluate_quadratic(
     """
     n, d = points.shape
     if not COMPILED:
-        place = np.einsum("nka,na->nk", slopes[found], points - origins[found])
-        linear, bend = bends[found, ..., 0], np.einsum("nckl,nl->nck", bends[found, ..., 1:], place)
-        u = first[found] + np.einsum("nck,nk->nc", linear + 0.5 * bend, place)
-        return u, np.einsum("nck,nka->nca", linear + bend, slopes[found])
+        parts = [slice(start, start + _AT_ONCE) for start in range(0, n, _AT_ONCE)]
+        given = [(points[s] - origins[found[s]], found[s]) for s in parts]
+        both = [_quadratic_in_numpy(x, first[cell], bends[cell], slopes[cell]) for x, cell in given]
+        u, grad = zip(*both, strict=True) if both else ([points], [np.empty((0, d, d))])
+        return np.concatenate(u), np.concatenate(grad)
     u, grad = np.empty((n, d)), np.empty((n, d, d))
     across = axes_of(slopes.shape[1])  # of a triangle in space there are two
     _evaluate_quadratic(points, found, origins, first, bends, slopes, axes_of(d), across, u, grad)
     return u, grad
+
+
+def _quadratic_in_numpy(
+    x: Floats, first: Floats, bends: Floats, slopes: Floats
+) -> tuple[Floats, Floats]:
+    """Evaluate as `evaluate_quadratic` at `x` (n, d) from first corners, each in its own cell.
+
+    With points as the last axis: four times as fast as with it first.
+    """
+    slopes, bends = (np.ascontiguousarray(np.moveaxis(one, 0, -1)) for one in (slopes, bends))
+    place = np.einsum("kan,na->kn", slopes, x)
+    linear, bend = bends[:, :, 0], np.einsum("ckln,ln->ckn", bends[:, :, 1:], place)
+    u = first + np.einsum("ckn,kn->nc", linear + 0.5 * bend, place)
+    return u, np.einsum("ckn,kan->nca", linear + bend, slopes)
 
 
 @njit(cache=True)
@@ -167,6 +182,7 @@ def _difference_squares(found, expected, axes, rows):
 
 
 Array = NDArray[np.float64]
+_AT_ONCE = 1 << 13  # points that numpy evaluates: what it makes of them stays in the cache
 
 # Relative to the body's size: mesh generators and files move points by up to this much.
 ROUND_OFF = 1e-10

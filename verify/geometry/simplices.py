@@ -235,7 +235,7 @@ def _polygon_area(polygon: Array) -> float:
     return 0.5 * float(np.linalg.norm(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0)))
 
 
-_AT_ONCE = 2**20  # pairs of a point and a part
+_AT_ONCE = 2**14  # pairs of a point and a part: what is made of them stays in the cache
 
 
 def shares(points: Array, starts: Array, ends: Array) -> Array:
@@ -244,8 +244,16 @@ def shares(points: Array, starts: Array, ends: Array) -> Array:
     The arrays (..., d) are broadcast against each other; a segment may have no length.
     """
     along = ends - starts
-    square = np.maximum(np.sum(along**2, axis=-1), np.finfo(float).tiny)
-    found: Array = np.clip(np.sum((points - starts) * along, axis=-1) / square, 0.0, 1.0)
+    square = np.maximum(_products(along, along), np.finfo(float).tiny)
+    found: Array = np.clip(_products(points - starts, along) / square, 0.0, 1.0)
+    return found
+
+
+def _products(one: Array, other: Array) -> Array:
+    """Inner products (...,) of vectors (..., d): by column, five times as fast as along them."""
+    found: Array = one[..., 0] * other[..., 0]
+    for axis in range(1, one.shape[-1]):
+        found = found + one[..., axis] * other[..., axis]
     return found
 
 
@@ -326,15 +334,16 @@ def distances(points: Array, parts: Array) -> Array:
     edges = [(0, 1)] if parts.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]
     away: Array = np.asarray(np.inf)
     for i, j in edges:
-        foot = feet(points, parts[:, i], parts[:, j])
-        away = np.minimum(away, np.linalg.norm(points - foot, axis=-1))
+        off = points - feet(points, parts[:, i], parts[:, j])
+        away = np.minimum(away, _products(off, off))
+    away = np.sqrt(away)
     if len(edges) == 3:
         normal = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
         above = np.ones(away.shape, dtype=bool)
         for i, j in edges:
             inward = np.cross(normal, parts[:, j] - parts[:, i])
-            above &= np.sum((points - parts[:, i]) * inward, axis=-1) >= 0.0
-        height = np.abs(np.sum((points - parts[:, 0]) * normal, axis=-1))
+            above &= _products(points - parts[:, i], inward) >= 0.0
+        height = np.abs(_products(points - parts[:, 0], normal))
         height /= np.linalg.norm(normal, axis=1)
         away = np.where(above, np.minimum(away, height), away)
     return away
@@ -350,8 +359,8 @@ def on_simplices(points: Array, corners: Array, tolerance: float) -> NDArray[np.
     rates = np.linalg.pinv(edges) if edges.shape[1] else np.swapaxes(edges, 1, 2)
     middle = corners.mean(axis=1)
     reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1.0 + 1e-12)
-    for begin in range(0, len(points), _AT_ONCE // 16):
-        some = points[begin : begin + _AT_ONCE // 16]
+    for begin in range(0, len(points), 4 * _AT_ONCE):
+        some = points[begin : begin + 4 * _AT_ONCE]
         near = cKDTree(some).query_ball_point(middle, reach + tolerance)
         which = np.repeat(np.arange(len(near)), [len(one) for one in near])
         point = np.concatenate([*near, []]).astype(np.int64)
