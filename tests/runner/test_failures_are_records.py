@@ -33,6 +33,7 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
     assert 20e6 < well["peak_memory"] < 1e9  # an interpreter with numpy
     assert well["notes"]["threads"] == "1"
     assert well["notes"]["timing"].startswith("contended")
+    assert "calibration" in well["notes"]
     # the log keeps the output of the solver
     log = verify.folder / "out/cases/square/fake_solvers_Raising-0/log.txt"
     assert "Traceback" in log.read_text()

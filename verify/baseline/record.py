@@ -210,8 +210,6 @@ def speed_of(solve: SolveRecord, cpu: str, origin: dict[str, Any]) -> Speed | st
     kernel = seconds_of_note(solve.notes.get("calibration", ""))
     if solve.status is not Status.SOLVED:
         return f"{solve.status}: {solve.reason}"
-    if kernel is None:
-        return "the calibration kernel was not timed beside it"
     own = {name: times for name, times in solve.timings.items() if name != HANDED_OVER}
     totals = repeated_totals(own)
     if not totals:
@@ -220,6 +218,8 @@ def speed_of(solve: SolveRecord, cpu: str, origin: dict[str, Any]) -> Speed | st
         return solve.notes["timing"]
     if len(totals) < 3:
         return f"{len(totals)} repetitions; a spread needs 3"
+    if kernel is None:
+        return "the calibration kernel was not timed beside it"
     if not median(totals) > 0.0:
         return "its times are zero"
     spread, ratio = _half_width(totals) + _half_width(kernel), median(totals) / median(kernel)

@@ -22,6 +22,7 @@ from verify.runner.ranks import give_up, world
 
 _WORTH_SAYING = 0.5  # seconds of compilation
 _LONGEST = 400  # characters of a reason
+_SAMPLE = 3  # repetitions: fewer have no spread
 _LARGE = 30_000  # unknowns from which an eigenvalue takes longer than many a motion
 
 
@@ -53,7 +54,8 @@ def solve_job(
 ) -> dict[str, Any]:
     """Solve and `store`; every way to fail is an outcome with its reason.
 
-    Only a solve that is `timed` has the machine timed beside it, and its critical step asked for.
+    Only a solve that is `timed` has its critical step asked for and, if repeated often enough that
+    anybody states its speed, the machine timed beside it.
     """
     try:
         return _solved(job, folder, store, timed)
@@ -112,6 +114,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     if store:
         _without_links(folder)
         write_solution(solution, folder / "solution")
+    sampled = max(map(len, solution.timings.values()), default=0) >= _SAMPLE
     return {
         "status": Status.SOLVED,
         "reason": "",
@@ -124,7 +127,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
         "peak_memory": peak_memory(),  # of the solve: eigenvalues come after it
         "notes": {
             **solution.notes,
-            **({"calibration": calibration_note()} if timed else {}),
+            **({"calibration": calibration_note()} if timed and sampled else {}),
             **(_critical_step(solver, scene, job, solution.unknowns or 0) if timed else {}),
             **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
