@@ -7,7 +7,7 @@ arithmetic and a few functions are accepted; nothing is ever evaluated as Python
 import ast
 import operator
 from collections.abc import Callable, Mapping
-from functools import reduce
+from functools import lru_cache, reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -64,6 +64,7 @@ _MEANING = (
 _FORMULA = "a formula in {variables} such as '{example}' (+ - * / **, abs sqrt sin cos hypot, pi)"
 
 
+@lru_cache(maxsize=1024)  # a motion asks for the same ones in every step
 def parse_region(text: str, dimension: int) -> Region:
     """Turn an inequality into a function of points.
 
@@ -215,6 +216,7 @@ class Expression:
         return found
 
 
+@lru_cache(maxsize=1024)
 def parse_expression(text: str, dimension: int, timed: bool = False) -> Expression:
     """Read a formula of the field of a body; see `Expression`."""
     return Expression(text, dimension, timed)
