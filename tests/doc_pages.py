@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from unittest.mock import patch
 
-from command_line import forking, run_here
+from command_line import forking, run_here, run_script_here
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -28,28 +28,22 @@ def commands(page):
 def run_line(line, folder, path=None):
     """Run a command line in a folder, where `path` (default the folder) is on the search path.
 
-    `verify` runs in this process, unless it is to find a package that is installed in the folder;
-    guests that it finds there run in processes forked from its server.
+    `verify` and scripts run in this process; guests that it finds in the folder run in processes
+    forked from its server.
     """
     path = path or folder
     command, _, target = line.partition(" > ")
     first, *words = shlex.split(command)
     environment = {"PYTHONPATH": os.pathsep.join([str(path), str(ROOT), *_given()])}
-    if first == "verify" and not list(folder.glob("*.dist-info")):
-        with patch.object(sys, "path", [str(path), *sys.path]), forking(lambda _: True):
+    with patch.object(sys, "path", [str(path), *sys.path]), forking(lambda _: True):
+        if first == "verify":
             done = run_here(words, folder, environment)
-        for name in {file.stem for file in path.glob("*.py")}:
-            sys.modules.pop(name, None)
-    else:
-        own = {"verify": [sys.executable, "-m", "verify"], "python": [sys.executable]}
-        done = subprocess.run(
-            [*own.get(first, [first]), *words],
-            cwd=folder,
-            env={**os.environ, **environment},
-            capture_output=True,
-            text=True,
-            timeout=300,
-        )
+        elif first == "python":
+            done = run_script_here(words[0], words[1:], folder, environment)
+        else:
+            done = subprocess.run([first, *words], cwd=folder, capture_output=True, text=True)
+    for name in {file.stem for file in path.glob("*.py")}:
+        sys.modules.pop(name, None)
     if target:
         (folder / target.strip()).write_text(done.stdout, encoding="utf-8")
     return done

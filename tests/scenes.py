@@ -14,6 +14,12 @@ def catalogue():
 
 
 @cache
+def every_row():
+    """Scenes of the project by their names, of families each row."""
+    return {scene.name: scene for rows in catalogue().values() for scene in rows}
+
+
+@cache
 def _rows_of_files():
     return {path: catalogue()[name] for name, path in list_cases().items()}
 

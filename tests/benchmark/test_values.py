@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 import second_routes
+from scenes import every_row
 
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.judge.reference import exact_reference
 from verify.result import read_result
-from verify.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 VALUES = tomllib.loads((ROOT / "cases/benchmark/values.toml").read_text("utf-8"))
@@ -44,7 +44,7 @@ def size_of(name, values):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_both_routes_agree_and_are_as_narrow_as_asked(scene):
-    loaded = load_scene(f"benchmark/{scene}")
+    loaded = every_row()[f"benchmark/{scene}"]
     kind = "motion" if loaded.analysis.kind == "dynamic" else loaded.dimension
     for name, (first, second) in SCENES[scene].items():
         (one, narrow), (two, wide) = parsed(first), parsed(second)
@@ -68,11 +68,11 @@ def test_the_page_states_the_values(scene):
 
 
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("scene", [s for s in SCENES if load_scene(f"benchmark/{s}").exact])
+@pytest.mark.parametrize("scene", [s for s in SCENES if every_row()[f"benchmark/{s}"].exact])
 def test_closed_forms_are_those_of_the_judge(scene):
     from reference.exact import exact_of
 
-    loaded = load_scene(f"benchmark/{scene}")
+    loaded = every_row()[f"benchmark/{scene}"]
     exact = exact_of(loaded)
     judged = exact_reference(loaded, exact, body_of(loaded), law_of(loaded)).quantities
     for name, (first, _) in SCENES[scene].items():

@@ -3,8 +3,7 @@
 import re
 
 from doc_pages import ROOT
-
-from verify.scene import list_cases, load_scenes
+from scenes import catalogue
 
 TEXT = (ROOT / "README.md").read_text("utf-8")
 
@@ -24,7 +23,7 @@ def test_its_counts_are_those_of_the_repository() -> None:
     assert count(r"\[(\d+) scenes\]\(docs/benchmark/index\.md\)") == len(listed) > 0
     shipped = {path.stem.split("_")[0].upper() for path in (ROOT / "cases/benchmark").glob("c*")}
     assert shipped == set(listed)
-    shown = [path for path in list_cases().values() if "demo" in load_scenes(path)[0].tags]
+    shown = [rows for rows in catalogue().values() if "demo" in rows[0].tags]
     assert count(r"solves (\d+) small scenes") == len(shown)
     arena = (ROOT / "docs/results/arena/index.md").read_text("utf-8").splitlines()[0]
     assert re.search(r"\d+ solvers on \d+ scenes", TEXT)[0] in arena

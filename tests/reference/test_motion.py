@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from large_bodies import space_of
-from ranks_of_tests import on_one_rank_and_two
 from reference_scenes import needs_fenicsx, polyline, square
 from scipy.sparse.linalg import eigsh
 
@@ -140,68 +139,6 @@ def test_both_solvers_find_the_same_motion(kinematics, rho):
     lost = [one.ledger["algorithmic"][-1] for one in (ours, theirs)]
     assert lost[0] == pytest.approx(lost[1], rel=1e-5)
     assert lost[0] > 0.0
-
-
-_MOTIONS = """
-import test_motion
-from verify.compare.locate import SolutionField
-from verify.solvers import find_solver
-
-def plane(kinematics):
-    "A square that is pulled, turned and damped: one cut open before, one at 0, one on the way."
-    cuts = [test_motion.polyline("before", [-0.1, 0.8], [0.3, 0.8]),
-            test_motion.polyline("slanted", [0.4, 0.75], [1.1, 0.65]),
-            {**test_motion.MIDDLE, "opens_at": 0.025}]
-    scene = test_motion.moving(
-        cuts, kinematics, duration=0.05, outputs=3,
-        supports=[{"where": "bottom", "displacement": [0.1, 0.0],
-                   "history": [[0.0, 0.0], [0.03, 1.0]]},
-                  {"where": "left", "displacement": [0.0], "components": ["x"]}],
-        loads=[{"kind": "gravity", "acceleration": [0, -0.98]},
-               {"kind": "traction", "where": "top", "traction": [100.0, 200.0],
-                "history": [[0.0, 1.0], [0.02, 0.0]]}],
-        initial={"kind": "equilibrium", "cuts": "closed"})
-    damped = scene.analysis.model_copy(update={"damping": (1.0, 1e-3)})
-    return scene.model_copy(update={"analysis": damped})
-
-def squeezed():
-    "A nearly incompressible block with a slit that opens on the way."
-    slit = {**test_motion.polyline("slit", [0.5, 0.4], [0.5, 1.1]), "opens_at": 0.02}
-    return test_motion.moving(
-        [slit], duration=0.04, outputs=3, reference={"size": 0.5},
-        material={"young": 1e4, "poisson": 0.4999, "plane": "strain", "density": 1000.0},
-        supports=[{"where": "bottom", "displacement": [0, 0]}],
-        loads=[{"kind": "traction", "where": "top", "traction": [50.0, -200.0]}])
-
-answer = {}
-for name, scene, solver, given in [
-    ("linear", plane("linear"), "conforming", {"scheme": "generalised_alpha", "degree": 2}),
-    ("turning", plane("corotational"), "conforming", {"scheme": "energy_momentum"}),
-    ("pressure", squeezed(), "reference", {}),
-]:
-    points = np.random.default_rng(1).random((300, scene.dimension))
-    found = find_solver(solver).solve(scene, 0, 0, **given)
-    fields = [SolutionField(found, t).displacement(points) for t in range(len(found.times))]
-    # on all ranks alike: they need no talk to take the same steps
-    sums = world.allgather(float(np.sum(found.displacement)))
-    assert len(set(sums)) == 1
-    assert ("pressure" in found.notes["unknowns"]) == (name == "pressure")
-    answer[name] = found.ledger, np.array(fields), found.iterations
-"""
-
-
-def test_two_ranks_move_every_point_as_one_does_and_keep_the_account(tmp_path):
-    one, two = on_one_rank_and_two(_MOTIONS, tmp_path)
-    assert len(one) == 3
-    for motion, (ledger, fields, iterations) in one.items():
-        assert np.abs(fields[-1] - fields[0]).max() > 1e-3, motion
-        # Newton's residual is 1e-11 of the forces, and most steps end far below it
-        assert two[motion][1] == pytest.approx(fields, abs=1e-10 * np.abs(fields).max()), motion
-        assert two[motion][2] == iterations, motion
-        energy = max(np.abs(ledger[name]).max() for name in ("kinetic", "strain", "gravity"))
-        for name, column in ledger.items():
-            size = np.abs(column).max() if "momentum" in name else energy
-            assert two[motion][0][name] == pytest.approx(column, abs=1e-10 * size), (motion, name)
 
 
 def pressed(by, time_step, cells=16):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from large_bodies import space_of, turn
-from ranks_of_tests import on_one_rank_and_two
 from reference_scenes import energy_of, needs_fenicsx
 from solid_scenes import EXACT, SHAPES, cube, disc, polygon
 
@@ -232,35 +231,3 @@ def test_linear_elements_equal_another_code_at_finite_rotation():
         for name in ("conforming", "xfem")
     )
     assert mine.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-9)
-
-
-_PARALLEL = """
-import reference.large_strain
-from test_solid_elasticity import answer_on, hanging
-from reference.boundary_conditions import constrained_values, load_forces
-from reference.large_strain import solve_large_strain
-from reference.space import conforming_space
-from verify.solvers.conforming_meshes import peer_mesh
-
-if world.size > 1:
-    reference.large_strain._MOST_DIRECT = 0
-scene = hanging([])
-space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, world)
-turned = solve_large_strain(
-    scene.material, space, constrained_values(scene, space, None)[0],
-    lambda factor: constrained_values(scene, space, None, factor)[1],
-    load_forces(scene, space, None))
-answer = [
-    answer_on(world, 1, "direct", 0.3), answer_on(world, 2, "multigrid", 0.4),
-    answer_on(world, 2, "multigrid", 0.6, pressure=True),
-    [turned.strain_energy, turned.orientation.least, float(np.linalg.norm(turned.displacement))],
-]
-"""
-
-
-def test_two_ranks_give_the_answer_of_one(tmp_path):
-    """At finite rotation by multigrid on two ranks, and by a factorisation on one."""
-    one, two = on_one_rank_and_two(_PARALLEL, tmp_path)
-    # multigrid leaves a residual of 1e-10, of which the energy is off by less; Newton 1e-11
-    for alone, shared, tolerance in zip(one, two, (1e-10, 1e-10, 1e-8, 1e-9), strict=True):
-        assert shared == pytest.approx(alone, rel=tolerance)

@@ -33,6 +33,15 @@ def case_text() -> str:
     return CASE
 
 
+def _quick(arguments):
+    """Add to a run that it makes no report and, unless told otherwise, solves once."""
+    words = list(map(str, arguments))
+    if words[0] == "run":
+        told = any(word.startswith("--repetitions") for word in words)
+        words += ["--no-report", *([] if told else ["--repetitions=1"])]
+    return words
+
+
 @dataclass
 class CommandLine:
     """Runs ``verify`` in a folder."""
@@ -41,10 +50,8 @@ class CommandLine:
     environment: dict[str, str]
 
     def start(self, *arguments, **environment):
-        if arguments[0] == "run":
-            arguments = (*arguments, "--no-report")
         return subprocess.Popen(
-            [sys.executable, "-m", "verify", *map(str, arguments)],
+            [sys.executable, "-m", "verify", *_quick(arguments)],
             cwd=self.folder,
             env={**self.environment, **environment},
             stdout=subprocess.PIPE,
@@ -61,10 +68,8 @@ class CommandLine:
             process = self.start(*arguments, **environment)
             out, err = process.communicate(timeout=300)
             return subprocess.CompletedProcess(arguments, process.returncode, out, err)
-        if arguments[0] == "run":
-            arguments = (*arguments, "--no-report")
         with forking(HARMLESS.__contains__):
-            return run_here(arguments, self.folder, {**self.environment, **environment})
+            return run_here(_quick(arguments), self.folder, {**self.environment, **environment})
 
     def records(self, out="out"):
         """Records of all solves, by (solver, level)."""

@@ -8,11 +8,11 @@ import tomllib
 
 import numpy as np
 import pytest
-from scenes import box, check_refusal, soft
+from scenes import box, catalogue, check_refusal, soft
 
 from verify.errors import InputError
 from verify.runner.checking import check_scene
-from verify.scene import Scene, case_folder, list_cases, load_scenes
+from verify.scene import Scene, case_folder
 
 _HELD = [{"where": "boundary", "displacement": "exact"}]
 
@@ -182,7 +182,7 @@ def test_a_field_in_motion_is_held_against_its_beginning_its_blade_and_histories
 
 def test_no_case_of_the_project_contradicts_its_exact_solution():
     """One row of each family; a case that does is refused, and with it every run that it is in."""
-    judged = [load_scenes(path)[0] for path in list_cases().values()]
+    judged = [rows[0] for rows in catalogue().values()]
     exact = [scene for scene in judged if scene.exact is not None]
     assert exact
     for scene in exact:

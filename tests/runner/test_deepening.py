@@ -21,7 +21,7 @@ CASE = (
         "A slit under its weight",
         "It shall open.",
         [1.0, 1.0],
-        [[48, 48]],
+        [[24, 24]],
         young="1.0e4",
         density="1000.0",
     )

@@ -5,13 +5,12 @@ import json
 import meshio
 import numpy as np
 import pytest
+from scenes import catalogue
 from test_case_file_faults import WHOLE, load
 
 from verify.errors import InputError
 from verify.scene import (
     Scene,
-    list_cases,
-    load_scenes,
     parse_region,
     read_mesh,
     restore_scene,
@@ -24,10 +23,9 @@ TRIANGLES = [[0, 1, 2], [0, 3, 2]]  # the second is turned the wrong way
 
 
 def test_every_case_of_the_project_is_valid():
-    cases = list_cases()
-    assert cases
-    for name, path in cases.items():
-        for scene in load_scenes(path):
+    assert catalogue()
+    for name, rows in catalogue().items():
+        for scene in rows:
             assert scene.name == name + (scene.row.label if scene.row else "")
 
 
