@@ -50,9 +50,6 @@ def forked():
         yield
 
 
-AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it can fail
-
-
 @pytest.mark.parametrize(
     "solver, check, said",
     [
@@ -71,11 +68,9 @@ AGAIN = pytest.mark.heavy  # another fault of the check shows quickly that it ca
         ("TurnsALittle", "finite-rotation-2d", "displacement off by"),
         ("IgnoresTheCut", "parted-3d", "displacement off by"),
         ("LumpsAsTheThesis", "free-fall", "does not stay as it is"),
-        pytest.param("ForgetsOutputs", "free-fall", "output times", marks=AGAIN),
         ("SaysTooFast", "energy-in-motion", "not the rates of its displacements"),
         ("KnowsOnlyUpright", "mirrored-cut", "discretisation"),
         ("DependsOnNumbers", "renumbering", ""),
-        pytest.param("LosesAPiece", "cut-patch", "do not cover the body", marks=AGAIN),
         ("AnswersAnything", "free-piece", "nothing holds a piece"),
         ("RaisesInSpace", "refusals", "unusual-space: IndexError: index 2 is out of bounds"),
     ],

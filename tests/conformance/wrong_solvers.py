@@ -220,21 +220,6 @@ class SaysTooFast(XfemSolver):
         return replace(solution, velocity=1.1 * solution.velocity)
 
 
-class ForgetsOutputs(XfemSolver):
-    def solve(self, scene, level, repetitions=1):
-        solution = super().solve(scene, level, repetitions)
-        if scene.analysis.kind == "static":
-            return solution
-        return replace(
-            solution,
-            times=solution.times[-1:],
-            displacement=solution.displacement[-1:],
-            velocity=None,
-            acceleration=None,
-            ledger={},
-        )
-
-
 class KnowsOnlyUpright(XfemSolver):
     """Loses the horizontal part of tractions."""
 
@@ -264,12 +249,6 @@ class Noisy(XfemSolver):
         solution = super().solve(scene, level, repetitions)
         noise = 1e-9 * np.random.default_rng().standard_normal(solution.displacement.shape)
         return replace(solution, displacement=solution.displacement + noise)
-
-
-class LosesAPiece(XfemSolver):
-    def solve(self, scene, level, repetitions=1):
-        solution = super().solve(scene, level, repetitions)
-        return replace(solution, cells=solution.cells[:-1], cell_sides=None)
 
 
 class CrashesOnCuts(XfemSolver):

@@ -1,8 +1,8 @@
 """The program for SOFA, where SOFA is not: a stand-in moves the graph that the program builds.
 
-The stand-in integrates with the compact solver's own scheme, which moves the beams of SOFA's record
-to 1e-12 (`tests/xfem/test_time_sofa.py`). What is tested is the program: mesh, material, mass,
-forces, supports and steps that it hands to SOFA, and the answer that it writes.
+The stand-in integrates with the scheme of the compact solver, and is held against where SOFA had
+the beam. What is tested is the program: mesh, material, mass, forces, supports and steps that it
+hands to SOFA, and the answer that it writes.
 """
 
 import importlib.util

@@ -337,11 +337,6 @@ def test_a_section_that_means_nothing_is_refused(asked, reason):
         (stress([0.5, 0.9], 0.2), "not in the body"),
         (stress([0.31, 0.6], 0.1), r"is 0.0932\d* m away from cut 'cut'; expected more"),
         (stress([0.7, 0.2], 0.1), "materials differ"),
-        (stress([0.7, 0.2], 0.1, "xz"), "z in a 2D scene"),
-        (reaction("R", "bottom", "x"), "no support holds 'bottom'; those of the case: left, right"),
-        (reaction("R", "left", "x", of="moment"), "centre: it belongs to a moment"),
-        (reaction("R", "left", "z"), "the force of a 2D scene has no such"),
-        (section("s", [0.1, 0.2], [0.0, 0.0], "x"), "normal: is zero"),
     ],
 )
 def test_what_no_solution_can_have_is_refused_beforehand(asked, reason):

@@ -60,13 +60,6 @@ def test_the_reference_begins_when_one_solver_has_not_refused(plan):
     assert plan.count == 8
 
 
-def test_where_all_refuse_nothing_is_solved_for_the_reference(plan):
-    assert ends(plan, "two", Status.REFUSED) == []
-    assert ends(plan, "one", Status.REFUSED) == []
-    assert [job.solver for job in plan.jobs] == ["one", "two"]
-    assert (plan.held, plan.models, plan.count) == ([], [], 2)
-
-
 def test_a_case_that_all_refuse_ends_without_a_reference(verify):
     (verify.folder / "hanging.toml").write_text(HANGING)
     done = verify("run", "hanging.toml", "--solver=fake_solvers:Refusing", "--out", "out")

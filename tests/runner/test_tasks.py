@@ -1,9 +1,6 @@
 """Tasks: every call is answered once, within its limits, whatever becomes of those who asked."""
 
 import os
-import signal
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,12 +24,6 @@ def product(a: int, b: int, log: str) -> list[Product]:
     with open(log, "a", encoding="utf-8") as file:
         file.write(f"{a}\n")
     return [Product(float("inf") if a == 0 else a * b, (a, b))]
-
-
-def slow(a: int, log: str) -> float:
-    product(a, 1, log)
-    time.sleep(0.0 if a < 3 or Path(log).with_name("go").exists() else 600.0)
-    return 0.1 * a
 
 
 def stuck(log: str) -> float:
@@ -69,7 +60,17 @@ def guest(monkeypatch, found_by_name):
 
 
 def test_every_call_is_answered_in_order_and_made_once(tmp_path, guest, monkeypatch):
+    """What was broken off goes on with what is missing."""
     log, said = tmp_path / "log", []
+
+    def stop(text):
+        said.append(text)
+        if len(said) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        made(products(log), tmp_path / "kept", stop)
+    assert asked(log)[:2] == [2, 0]
     found = made(products(log), tmp_path / "kept", said.append, Limits(2))
     inf = float("inf")
     assert found == [[Product(6, (2, 3))], [Product(inf, (0, 3))], [Product(15, (5, 3))]]
@@ -101,37 +102,6 @@ def test_what_fails_says_why_and_costs_the_others_nothing(tmp_path, guest):
     assert well == [Product(6.0, (2, 3))]
     with pytest.raises(ChildProcessError, match="raises: ValueError: not x"):
         made(four[:1], tmp_path / "kept")
-
-
-RUN = """
-from pathlib import Path
-import sys
-import test_tasks as t
-from verify.runner import tasks
-from verify.runner.child import watch_all
-tasks.code_digest = lambda *modules: "this code"
-tasks.code_of_solver = tasks.find_solver = lambda name: name
-folder = Path(sys.argv[1])
-log = str(folder / "log")
-calls = [t.Task(str(a), t.slow, {"a": a, "log": log}, ("a:Guest",)) for a in (1, 2, 3, 4)]
-print(t.made(calls, folder / "kept"))
-"""
-
-
-def test_what_was_killed_goes_on_with_what_is_missing(tmp_path, guest):
-    """Killed by signal 9 in the third of four parts."""
-    command = [sys.executable, "-c", RUN, str(tmp_path)]
-    first = subprocess.Popen(command, stdout=subprocess.PIPE)
-    log, start = tmp_path / "log", time.monotonic()
-    while not (log.exists() and asked(log)[-1:] == [3]):
-        assert time.monotonic() - start < 120.0
-        time.sleep(0.05)
-    first.send_signal(signal.SIGKILL)
-    first.wait()
-    (tmp_path / "go").touch()
-    again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert eval(again.stdout) == [0.1, 0.2, 0.1 * 3, 0.4]
-    assert asked(log) == [1, 2, 3, 3, 4]
 
 
 class Waiting:

@@ -48,12 +48,3 @@ def test_what_stands_still_has_no_rate_where_its_slope_is_infinite():
 
 
 MOTION = {"material": scenes.soft(density=1.0), "analysis": {"kind": "dynamic", "duration": 1.0}}
-
-
-def test_the_time_belongs_to_a_dynamic_analysis():
-    swung = [{"where": "left", "displacement": ["0.1*y*sin(t)", 0.0]}]
-    assert scenes.scene(**MOTION, supports=swung).supports[0].timed
-    with pytest.raises(
-        ValueError, match=r"supports\[0\].displacement: 't' in .* a formula in x, y"
-    ):
-        scenes.scene(supports=swung)

@@ -69,15 +69,3 @@ def test_every_free_piece_has_its_rigid_motions_as_modes_without_energy_and_no_o
     modes, next_value = zero_modes(phantom)
     assert modes == (3 if name in PLANAR else 6) * pieces
     assert next_value > 1e-6  # nothing between a zero mode and an elastic one
-
-
-def test_the_area_inside_a_circular_cut_converges_at_second_order():
-    angle = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
-    circle = Polyline(0.5 + 0.3 * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
-    errors = []
-    for n in (16, 32, 64):
-        phantom = cut_mesh(rectangle_mesh((n, n)), [circle])
-        inside = phantom.piece_side[:, 0] > 0
-        errors.append(abs(phantom.volumes[inside].sum() - np.pi * 0.09))
-    # |error| ≤ length · h²·2/8 · curvature / …: a factor of four per halving, within a third
-    assert errors[0] / errors[2] == pytest.approx(16.0, rel=1 / 3)
