@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import asdict
+from types import SimpleNamespace
 
 from verify.report.which import baseline, which_view
 from verify.result import Comparison, LeftOut, Pair, Ranking, Standing
@@ -49,6 +50,18 @@ def test_one_discretisation_has_one_row_and_counts_once_against_the_others():
     assert lead[1:] == [("1", ""), ("9, 3, 1", ""), ("8 of 9", "twin 6 of 9")]
     assert none[1:] == [("–", "no scene in common"), ("–", ""), ("0 of 9", "")]
     assert view["scenes"] == "9 scenes at rest and 2 scenes in motion"
+
+
+def test_who_misses_a_part_of_the_body_is_marked():
+    """Less material is softer, linear elements are stiffer: together the error looks small."""
+    whole, part = ({}, {"coverage": "the cells of the solution cover 0.98 of the body"})
+    solves = [
+        SimpleNamespace(solver=s, metrics=[1], notes=n) for s, n in (("a", whole), ("b", part))
+    ]
+    (table,) = which_view(ranking(), [SimpleNamespace(solves=solves)])["errors"]
+    names = {row[0] for row in rows(table)}
+    assert ("b†", "a part of the body is missing") in names
+    assert ("a", "") in names
 
 
 def test_times_of_one_discretisation_stay_apart():

@@ -223,7 +223,7 @@ def page_view(
     except Exception as error:
         notes = [*notes, f"the families of scenes cannot be shown: {words_of(error)}."]
     try:
-        ranking = which_view(run.ranking)
+        ranking = which_view(run.ranking, run.results)
     except Exception as error:
         notes = [*notes, f"the ranking cannot be shown: {words_of(error)}."]
     started = run.record.get("started")

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from verify.report.answers import BASELINE
+from verify.report.evidence import MISSING, misses_material
 from verify.report.notation import Cell, Table, metric_title, number, solver_title, with_interval
+from verify.result import CaseResult
 
 _KINDS = {"rest": "at rest", "motion": "in motion"}
 _TITLES = {
@@ -16,11 +18,17 @@ _TITLES = {
 }
 
 
-def which_view(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Return a ranking with its tables; None for a run of one solver, or without a ranking."""
+def which_view(
+    ranking: dict[str, Any] | None, results: Sequence[CaseResult] = ()
+) -> dict[str, Any] | None:
+    """Return a ranking with its tables; None for a run of one solver, or without a ranking.
+
+    By the results of its cases, solvers that miss a part of a body are marked.
+    """
     if not ranking or len(ranking["solvers"]) < 2:
         return None
     beside = baseline(ranking)
+    missing = {name for name in ranking["solvers"] if misses_material(results, name)}
     asked = {kind: max(own[kind][1] for own in ranking["coverage"].values()) for kind in _KINDS}
     scenes = [
         f"{count} scene{'s' * (count != 1)} {_KINDS[k]}" for k, count in asked.items() if count
@@ -29,8 +37,8 @@ def which_view(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
         **ranking,
         "scenes": " and ".join(scenes) or "no scene",
         "beside": solver_title(beside),
-        "errors": [t for m in _TITLES if m != "time" for t in _tables(ranking, m, beside)],
-        "times": _tables(ranking, "time", beside),
+        "errors": [t for m in _TITLES if m != "time" for t in _tables(ranking, m, beside, missing)],
+        "times": _tables(ranking, "time", beside, missing),
         "energy_tables": _energy(ranking),
     }
 
@@ -45,7 +53,7 @@ def _answered(ranking: Mapping[str, Any], solver: str) -> int:
     return sum(answered for answered, _ in ranking["coverage"][solver].values())
 
 
-def _tables(ranking: Mapping[str, Any], metric: str, beside: str) -> list[Table]:
+def _tables(ranking: Mapping[str, Any], metric: str, beside: str, missing: set[str]) -> list[Table]:
     """Return a table for each kind of scene in which two solvers have the metric."""
     # programs of one discretisation share their errors, but not their times
     groups = [] if metric == "time" else ranking["groups"]
@@ -68,7 +76,7 @@ def _tables(ranking: Mapping[str, Any], metric: str, beside: str) -> list[Table]
         ]  # fmt: skip
         body = [
             [
-                ", ".join(map(solver_title, members)),
+                _named(members, missing),
                 _ratio(pairs.get((members[0], beside)), beside in members),
                 _won([pairs.get((members[0], rival)) for rival in leads]),
                 _coverage(ranking, members, kind),
@@ -78,6 +86,13 @@ def _tables(ranking: Mapping[str, Any], metric: str, beside: str) -> list[Table]
         caption = f"{_TITLES[metric]}, scenes {words}"
         found.append(Table(caption, head, body, "pairs", named=True))
     return found
+
+
+def _named(members: Sequence[str], missing: set[str]) -> Cell:
+    """Name the members of a row, and say if their numbers are of a smaller body."""
+    gone = bool(missing.intersection(members))
+    names = ", ".join(map(solver_title, members))
+    return Cell(names + MISSING * gone, "a part of the body is missing" if gone else "")
 
 
 def _place(pair: Mapping[str, Any] | None, is_beside: bool) -> tuple[bool, float]:
