@@ -166,6 +166,23 @@ def test_only_what_is_missing_changed_or_damaged_is_solved_again(verify):
     assert contents(out) == kept
 
 
+def test_a_solve_that_was_refused_is_not_asked_for_again_by_the_same_code(verify):
+    """Else every case with a refusal is compared anew, too."""
+    case, command = (
+        verify.folder / "square.toml",
+        [*RUN, "out", "--solver=fake_solvers:RefusingLate"],
+    )
+    assert ": refused" in verify(*command).stderr
+    record = verify.folder / "out/cases/square/fake_solvers_RefusingLate-0/record.json"
+    result, before = verify.folder / "out/cases/square/result.json", record.read_bytes()
+    judged = result.read_bytes()
+    again = verify(*command).stderr
+    assert "RefusingLate · level 0: reused" in again
+    assert (record.read_bytes(), result.read_bytes()) == (before, judged)
+    case.write_text(case.read_text().replace("young = 1.0", "young = 2.0"))
+    assert "RefusingLate · level 0: refused" in verify(*command).stderr
+
+
 def test_a_directory_on_a_disk_that_is_read_only_is_bad_input(tmp_path, monkeypatch):
     """Nothing has begun: nothing is finished, and the same command would not resume it."""
 

@@ -218,15 +218,18 @@ def check_files(folder: Path) -> None:
 
 
 def stored_record(job: Job) -> SolveRecord | None:
-    """Return the record of an earlier, solved run of this very job whose files are whole."""
+    """Return the record of an earlier run of this very job: solved, its files whole, or refused.
+
+    The same code refuses the same scene again. What died or ran out of time may do better.
+    """
     try:
         content = read_json(job.folder / "record.json")
         record = _stored(content, job.folder)
         check_files(job.folder)
     except InputError:
         return None
-    own = content.get("key") == job.key and record.status is Status.SOLVED
-    return record if own and content.get("files") else None
+    whole = record.status is Status.REFUSED or (record.status is Status.SOLVED and content["files"])
+    return record if content.get("key") == job.key and whole else None
 
 
 def solution_files(folder: Path) -> list[Path]:
