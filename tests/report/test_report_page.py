@@ -146,17 +146,10 @@ def test_a_mesh_that_conforms_to_the_cut_is_part_of_the_time_that_is_compared(pl
     assert float(conforming["seconds_median"]) == pytest.approx(paid, rel=1e-12)
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    root = make_run(tmp_path_factory.mktemp("markdown") / "run")
+def test_every_table_has_rows_of_one_width_and_holds_the_numbers_of_the_page(pictured_run):
+    root = pictured_run
     text = render(root, "markdown").read_text(encoding="utf-8")
     render(root, "summary")
-    render(root)
-    return root, text
-
-
-def test_every_table_has_rows_of_one_width_and_holds_the_numbers_of_the_page(written):
-    root, text = written
     page = parsed((root / "report.html").read_text(encoding="utf-8"))
     tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
     assert len(tables) == len(page.all("table"))
@@ -278,7 +271,7 @@ def test_a_damaged_result_is_a_row_with_its_reason(root, content, reason):
 
 
 def test_cases_that_processes_draw_side_by_side_make_the_same_page(plain_run, monkeypatch):
-    alone = render(plain_run).read_bytes()
+    alone = (plain_run / "report.html").read_bytes()
     monkeypatch.setattr(rendering, "_FEWEST", 1)
 
     def not_here(*arguments):
