@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import nnls
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from reference.nodal_algebra import facing_nodes, sides_of_cut
 from reference.space import ConformingSpace
-from verify.geometry.simplices import measures, unit_normals
+from verify.geometry.simplices import connected, measures, unit_normals
 
 Array = NDArray[np.float64]
 _BLOCK = 64  # right sides that are solved for at once
@@ -123,7 +122,7 @@ class FaceContact:
         return found, np.asarray(self.gaps.T @ found)
 
 
-def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int32]:
+def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int64]:
     """Return the smooth face (f,) of each facet; `pairs` (f, q, 2) say which facets touch."""
     count, of_each, _ = pairs.shape
     _, at = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
@@ -131,9 +130,7 @@ def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int32]:
     touch = coo_array((np.ones(at.size), (facets, at.ravel()))).tocsr()
     one, other = (touch @ touch.T).nonzero()
     smooth = np.abs(np.sum(normals[one] * normals[other], axis=1)) > _SMOOTH
-    ends = one[smooth], other[smooth]
-    joined = coo_array((np.ones(len(ends[0])), ends), shape=(count, count))
-    return np.asarray(connected_components(joined, directed=False)[1])
+    return connected(count, one[smooth], other[smooth])
 
 
 def _shares(

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from reference.linear_solvers import IllConditionedError
 from reference.space import ConformingSpace, Unknowns
 from verify.errors import InputError
+from verify.geometry.simplices import boundary_facets
 from verify.scene import Scene
 
 Array = NDArray[np.float64]
@@ -144,9 +145,7 @@ def singular_nodes(space: ConformingSpace, unknowns: NDArray[np.int32]) -> Ints:
     cells, points = space.cell_nodes[:, : d + 1], space.node_points
     held = np.zeros(points.shape, dtype=bool)
     held.ravel()[unknowns] = True
-    sides = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(d + 1)]), axis=1)
-    facets, count = np.unique(sides, axis=0, return_counts=True)
-    facets = facets[count == 1]
+    facets = boundary_facets(cells)[0]
     is_held = held.any(axis=1)[facets].all(axis=1)
     ends = np.intersect1d(_hinges(facets[is_held], d), _hinges(facets[~is_held], d))
     hinges, angles = _angles(cells, points, d)

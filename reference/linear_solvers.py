@@ -304,8 +304,8 @@ class Cycle:
     def set(self, solver: Any) -> None:
         """Let the cycle precondition a PETSc KSP, with the norm of the true residual."""
         if not self._entries:
-            set_multigrid(solver)
-            return
+            with options(solver, "reference_", _MULTIGRID):
+                return
         conditioner: Any = solver.getPC()
         solver.setOptionsPrefix("reference_")
         conditioner.setType("mg")
@@ -495,12 +495,6 @@ def _round_off(matrix: Any, x: Any, work: Any) -> float:
     matrix.getDiagonal(work)
     work.pointwiseMult(work, x)
     return float(np.finfo(float).eps * work.norm())
-
-
-def set_multigrid(solver: Any) -> None:
-    """Let GAMG precondition a PETSc KSP, with the norm of the true residual."""
-    with options(solver, "reference_", _MULTIGRID):
-        pass
 
 
 @contextmanager

@@ -27,8 +27,9 @@ from reference.linear_solvers import (
     solve_directly,
 )
 from reference.meshing import ConformingMesh
-from reference.meshing.opening import cell_facets, interior_facets
+from reference.meshing.opening import interior_facets
 from reference.space import ConformingSpace, TiedUnknowns, Unknowns
+from verify.geometry.simplices import cell_facets
 
 Array = NDArray[np.float64]
 _MOST = 10_000  # iterations

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, eye_array, kron
-from scipy.sparse.csgraph import connected_components
 
 from reference.installation import create_simplex_mesh
 from reference.meshing import ConformingMesh
-from verify.geometry.simplices import measures, mesh_edges
+from verify.geometry.simplices import connected, measures, mesh_edges
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -127,8 +126,7 @@ class TiedUnknowns(Unknowns):
     def tie(self, pairs: Numbers) -> None:
         """Tie the nodes of pairs (p, 2), and no others."""
         (count, d), whole = self.shape, self._whole
-        link = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
-        _, group = connected_components(link.tocsr(), directed=False)
+        group = connected(count, *pairs.T)
         self.leader = np.unique(group, return_index=True)[1][group]
         self.followers = np.flatnonzero(self.leader != np.arange(count))
         led = np.append(np.repeat(self.leader != np.arange(count), d), False)[whole.nodal]

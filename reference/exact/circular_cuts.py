@@ -18,6 +18,7 @@ from reference.exact.solution import (
     plane_axes,
 )
 from verify.errors import InputError
+from verify.geometry.simplices import unit_rule
 from verify.scene import Scene
 
 Complex = NDArray[np.complex128]
@@ -25,7 +26,7 @@ Complex = NDArray[np.complex128]
 # whose closed forms lose digits there like the inverse of the distance.
 _NEAR_CENTRE = 0.2
 _TERMS = 64
-_GAUSS = np.polynomial.legendre.leggauss(40)
+_POINTS, _WEIGHTS = unit_rule(40)
 _AXIS = 1e-9  # of the radius: closer to the axis a point is on it
 
 
@@ -310,10 +311,10 @@ def _over_rectangle(
         edge = end - start
         moment = start[0] * edge[1] - start[1] * edge[0]
         for low, high in _smooth_parts(start, edge, height, radius):
-            share = low + (high - low) * 0.5 * (_GAUSS[0] + 1.0)
+            share = low + (high - low) * _POINTS
             squared = np.sum((start + share[:, None] * edge) ** 2, axis=1)
             value = primitive(np.sqrt(squared + height**2)) - inner
-            found += moment * 0.5 * (high - low) * float(value / squared @ _GAUSS[1])
+            found += moment * (high - low) * float(value / squared @ _WEIGHTS)
     return found
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 from verify.geometry.planar import polygon_area
+from verify.geometry.simplices import frame, unit_rule
 from verify.scene import Box, Material, Polygon, Rectangle, Scene
 from verify.scene.strict import nearest
 
@@ -35,7 +36,6 @@ _Part = tuple[Array, Array | None]  # of a facet: corners (k, d), and the way (d
 _Density = Callable[[Array], Array]
 _ORDERS = (12, 20, 32, 48, 80)
 _AGREE = 1e-11  # of the energy: two orders
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _TOLERANCE = 1e-13  # of ∫ |t| |u|
 _HALVINGS = 60
 _MOST_PANELS = 20000
@@ -410,7 +410,7 @@ def _work_on_faces(field: ExactField, faces: list[Array]) -> float:
     """Half the work of the tractions on the faces of a box, J, where the field is smooth there."""
 
     def work(order: int) -> float:
-        x, w = _unit_rule(order)
+        x, w = unit_rule(order)
         total = 0.0
         for quad in faces:
             u, v = quad[1] - quad[0], quad[3] - quad[0]
@@ -435,18 +435,12 @@ def _settled(integral: Callable[[int], float], where: str, hint: str = "") -> fl
     raise InputError(text)
 
 
-def _unit_rule(order: int) -> tuple[Array, Array]:
-    """Compute Gauss points and weights (k,) on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(order)
-    return 0.5 * (nodes + 1), 0.5 * weights
-
-
 def _simplex_rule(order: int, d: int) -> tuple[Array, Array]:
     """Compute barycentric points (k, d) of all corners but first, and weights (k,), of volume 1/d!.
 
     The cube collapsed onto the simplex.
     """
-    x, w = _unit_rule(order)
+    x, w = unit_rule(order)
     steps = np.cumprod([g.ravel() for g in np.meshgrid(*[x] * d, indexing="ij")], axis=0)
     weights = np.meshgrid(*[w * x ** (d - 1 - i) for i in range(d)], indexing="ij")
     shares = steps - np.vstack([steps[1:], np.zeros(steps.shape[1])])
@@ -522,9 +516,9 @@ def _adaptive(density: _Density, panels: Array, tolerance: float) -> float:
 
 
 def _gauss(density: _Density, starts: Array, ends: Array) -> Array:
-    half = 0.5 * (ends - starts)
-    t = 0.5 * (starts + ends)[:, None] + half[:, None] * _NODES
-    values: Array = density(t.ravel()).reshape(t.shape) @ _WEIGHTS * half
+    nodes, weights = unit_rule(16)
+    t = starts[:, None] + (ends - starts)[:, None] * nodes
+    values: Array = density(t.ravel()).reshape(t.shape) @ weights * (ends - starts)
     return values
 
 
@@ -550,14 +544,10 @@ def plane_axes(parameters: Parameters) -> Array:
     size = float(np.linalg.norm(normal))
     if size == 0.0:
         raise InputError("parameters.normal is zero; expected a direction")
-    normal = normal / size
-    guide = np.eye(3)[np.argmin(np.abs(normal))]
-    first = parameters.take("axis", (3,), default=guide)
-    first = first - (first @ normal) * normal
-    if float(np.linalg.norm(first)) <= 1e-9:
+    axis = parameters.take("axis", (3,), default=frame(normal)[0])
+    if float(np.linalg.norm(np.cross(normal / size, axis))) <= 1e-9:
         raise InputError("parameters.axis is zero or parallel to the normal")
-    first = first / np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first), normal])
+    return frame(normal, axis)
 
 
 class TwoSidedSolution(ExactSolution):

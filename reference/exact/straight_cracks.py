@@ -24,6 +24,7 @@ from reference.exact.solution import (
 )
 from verify.errors import InputError
 from verify.geometry.planar import inner_parts
+from verify.geometry.simplices import unit_rule
 from verify.scene import Scene
 
 Complex = NDArray[np.complex128]
@@ -202,18 +203,18 @@ class Griffith(ComplexCrack):
         if self._pressure == 0.0:
             return energy
         # the opening is an ellipse: smooth in the angle of x = a sin θ
-        nodes, weights = np.polynomial.legendre.leggauss(64)
+        nodes, weights = unit_rule(64)
         for start, end in inner_parts(self.singular_points, outline_of(body)):
             ends = (np.array([start, end]) - self._origin) @ self._axes[0] / self._a
             low, high = np.arcsin(np.clip(ends, -1.0, 1.0))
-            angle = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+            angle = low + (high - low) * nodes
             points = self._origin + np.outer(self._a * np.sin(angle), self._axes[0])
             above, below = (
                 self.displacement(points, points + side * self._a * self._axes[1])
                 for side in (1.0, -1.0)
             )
             opening = (above - below) @ self._axes[1]
-            length = 0.5 * (high - low) * self._a * np.cos(angle) * weights
+            length = (high - low) * self._a * np.cos(angle) * weights
             energy += 0.5 * self._pressure * float(opening @ length)
         return energy
 

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import cg
 
 from reference.exact.solution import Hooke
 from verify.errors import InputError
+from verify.geometry.simplices import unit_rule
 from verify.scene import Material
 from verify.solution import Solution
 
@@ -96,8 +97,7 @@ def cell_gradients(
 
 def _rule(dimension: int, order: int) -> tuple[Array, Array]:
     """Compute Gauss points of the square or cube collapsed onto the unit simplex."""
-    nodes, weights = np.polynomial.legendre.leggauss(order)
-    s, w = 0.5 * (nodes + 1), 0.5 * weights
+    s, w = unit_rule(order)
     grids = np.meshgrid(*[s] * dimension, indexing="ij")
     total = np.ones_like(grids[0])
     for k, factor in enumerate(np.meshgrid(*[w] * dimension, indexing="ij")):

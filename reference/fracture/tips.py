@@ -18,7 +18,7 @@ from reference.meshing.inner_lines import plane_interfaces
 from reference.meshing.session import singular_points
 from verify.errors import InputError
 from verify.geometry.planar import inside_polygon
-from verify.geometry.simplices import distance_to_outline
+from verify.geometry.simplices import distance_to_outline, frame
 from verify.scene import (
     ArcCut,
     Box,
@@ -369,14 +369,7 @@ class CircularFront:
 
     def _axes(self) -> Array:
         """Give unit vectors (3, 3): to where the arc length starts, across that, the normal."""
-        normal = np.asarray(self.normal, dtype=float)
-        normal = normal / np.linalg.norm(normal)
-        first = np.eye(3)[np.argmin(np.abs(normal))]
-        if self.towards is not None:
-            first = np.asarray(self.towards, dtype=float)
-        first = first - (first @ normal) * normal
-        first /= np.linalg.norm(first)
-        return np.array([first, np.cross(normal, first), normal])
+        return frame(self.normal, self.towards)
 
 
 @dataclass(frozen=True)

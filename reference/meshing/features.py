@@ -23,11 +23,9 @@ def divided_outline(scene: Scene) -> Array:
     """Find corners (k, 2) of the body, and the points of its edges where such a part ends."""
     outline = _outline(scene)
     size = float(np.ptp(outline, axis=0).max())
-    where = {s.where for s in scene.supports}
-    where |= {load.where for load in scene.loads if isinstance(load, Traction)}
     following = np.roll(outline, -1, axis=0)
     edges = np.stack([outline, following], axis=1)
-    stops = [stop for text in sorted(where) for stop in _ends(scene, text, edges)]
+    stops = [stop for text in formulas_of_parts(scene) for stop in _ends(scene, text, edges)]
     found = []
     for i, (a, b) in enumerate(zip(outline, following, strict=True)):
         length = float(np.linalg.norm(b - a))
@@ -37,6 +35,13 @@ def divided_outline(scene: Scene) -> Array:
                 kept.append(stop)
         found.append(a + np.array(kept)[:, None] * (b - a))
     return np.concatenate(found)
+
+
+def formulas_of_parts(scene: Scene) -> list[str]:
+    """List the inequalities that say where a support or traction acts, each once."""
+    where = {s.where for s in scene.supports}
+    where |= {load.where for load in scene.loads if isinstance(load, Traction)}
+    return [one for one in sorted(where - {"boundary"}) if not scene.geometry.is_part(one)]
 
 
 def supported_edges(scene: Scene, corners: Array) -> NDArray[np.bool_]:

@@ -16,15 +16,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from reference.meshing.edge_splitting import barycentric, loosen_front, split_edges
-from reference.meshing.opening import cell_facets, inner_facets
+from reference.meshing.opening import inner_facets
 from verify.errors import InputError
 from verify.geometry.planar import inside_polygon
-from verify.geometry.simplices import distance_to_outline, measures, mesh_edges, oriented
+from verify.geometry.simplices import (
+    cell_facets,
+    connected,
+    distance_to_outline,
+    measures,
+    mesh_edges,
+    oriented,
+    places_of,
+)
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
@@ -431,11 +436,8 @@ def _within_cells(points: Array, cells: Cells, facets: Array) -> bool:
 def _merged(corners: Array) -> tuple[Array, Cells]:
     """Find corners that are not the same place, and the number of each among them."""
     size = float(np.ptp(corners, axis=0).max())
-    pairs = cKDTree(corners).query_pairs(_SAME * size, output_type="ndarray")
-    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(corners),) * 2)
-    _, number = connected_components(link.tocsr(), directed=False)
-    _, first = np.unique(number, return_index=True)
-    return corners[first], number.astype(np.int64)
+    number = places_of(corners, _SAME * size)
+    return corners[np.unique(number, return_index=True)[1]], number
 
 
 def _inserted(mesh: Mesh, corners: Array) -> tuple[Mesh, Cells]:
@@ -551,5 +553,4 @@ def _flat_groups(points: Array, triangles: Cells) -> NDArray[np.int64]:
     size = np.linalg.norm(normal, axis=1)
     away = np.einsum("nij,nj->ni", corner[two] - corner[one, :1], normal[one]) / size[one, None]
     flat = np.abs(away).max(axis=1) <= _FLAT * np.sqrt(size[one])
-    link = coo_array((np.ones(flat.sum()), (one[flat], two[flat])), shape=(len(triangles),) * 2)
-    return connected_components(link.tocsr(), directed=False)[1].astype(np.int64)
+    return connected(len(triangles), one[flat], two[flat])

@@ -14,12 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import split_edges
-from reference.meshing.features import Feature
-from reference.meshing.opening import cell_facets, doubled_nodes
+from reference.meshing.features import Feature, formulas_of_parts
+from reference.meshing.opening import doubled_nodes
 from verify.errors import UnsupportedSceneError
 from verify.geometry.planar import inside_polygon
-from verify.geometry.simplices import distance_to_outline, unit_normals
-from verify.scene import Box, Polygon, Rectangle, Scene, Traction
+from verify.geometry.simplices import (
+    boundary_facets,
+    cell_facets,
+    distance_to_outline,
+    frame,
+    unit_normals,
+)
+from verify.scene import Box, Polygon, Rectangle, Scene
 from verify.scene.parts import on_part, pieces_on_part, size_of
 from verify.scene.regions import Region, Side, comparisons, is_affine, parse_region
 
@@ -77,22 +83,18 @@ def solid_interfaces(scene: Scene) -> list[Array]:
     """Plane interfaces of a box, each as the corners (4, 3) of a square that reaches beyond it."""
     if scene.material.is_uniform:
         return []
-    assert isinstance(scene.geometry, Box)
-    lower, upper = np.array(scene.geometry.lower), np.array(scene.geometry.upper)
+    lower, upper = _corners(scene)
     centre, reach = 0.5 * (lower + upper), float(np.linalg.norm(upper - lower))
     squares = []
     for normal, offset, middle in _level_sets(scene, centre, reach):
         if middle is not None:  # a sphere
             continue
         foot = centre + (offset - normal @ centre) * normal
-        first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-        first /= np.linalg.norm(first)
-        second = np.cross(normal, first)
-        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * reach
-        square = foot + signs @ np.stack([first, second])
+        across = frame(normal)[:2]
+        square = foot + reach * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across
         share = np.linspace(-1.0, 1.0, 65) * reach
         grid = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2)
-        points = foot + grid @ np.stack([first, second])
+        points = foot + grid @ across
         inside = ((points > lower) & (points < upper)).all(axis=1)
         if _differs(scene, points[inside], normal, reach).any():
             squares.append(square)
@@ -214,11 +216,9 @@ def part_lines(scene: Scene) -> Array:
         If a support ends along a line that is not parallel to an edge of the box.
     """
     lower, upper = _corners(scene)
-    names = (*scene.geometry.parts(), "boundary")
     supported = {s.where for s in scene.supports}
-    places = supported | {load.where for load in scene.loads if isinstance(load, Traction)}
     found = []
-    for text in sorted(places - set(names)):
+    for text in formulas_of_parts(scene):
         region = parse_region(text, 3)
         for axis, side in product(range(3), (0, 1)):
             for across in (axis - 1, axis - 2):
@@ -332,13 +332,9 @@ def split_at_part_ends(
     facets : (f, k) array
         Marked facets; they are split with the cells.
     """
-    names = (*scene.geometry.parts(), "boundary")
-    parts = {s.where for s in scene.supports}
-    parts |= {load.where for load in scene.loads if isinstance(load, Traction)}
-    formulas = [one for one in sorted(parts - set(names)) if not scene.geometry.is_part(one)]
-    formulas = [one for one in formulas if is_affine(one)]
+    formulas = [one for one in formulas_of_parts(scene) if is_affine(one)]
     for _ in range(_MOST_PASSES):
-        edges, places = _ends_in_facets(scene, formulas, points, _boundary(cells))
+        edges, places = _ends_in_facets(scene, formulas, points, boundary_facets(cells)[0])
         if not len(edges):
             break
         points, cells, facets = split_edges(points, cells, facets, edges, places)
@@ -360,17 +356,17 @@ def singular_lines(scene: Scene, points: Array, cells: Cells, facets: Cells) -> 
         Of the cuts.
     """
     d = points.shape[1]
-    rims, times = np.unique(_rims(facets), axis=0, return_counts=True)
+    rims = boundary_facets(facets)[0]
     opened = np.isin(rims, doubled_nodes(cells, facets)) if len(facets) else rims == -1
-    found = [rims[(times == 1) & ~opened.any(axis=1)]]
+    found = [rims[~opened.any(axis=1)]]
     if not any(support.displacement == "exact" for support in scene.supports):
-        boundary = _boundary(cells)
+        boundary = boundary_facets(cells)[0]
         held = np.zeros(len(boundary), dtype=bool)
         for support in scene.supports:
             held[pieces_on_part(scene.geometry, support.where, points[boundary]).facet] = True
-        rims, place = np.unique(_rims(boundary), axis=0, return_inverse=True)
+        rims, place = np.unique(cell_facets(boundary), axis=0, return_inverse=True)
         count = np.bincount(place.ravel())
-        holding = np.bincount(place.ravel(), np.tile(held, d))
+        holding = np.bincount(place.ravel(), np.repeat(held, d))
         found.append(rims[(holding > 0) & (holding < count)])
         found.append(_turned_in(points, cells))
     return points[np.concatenate(found)[:, [0, -1]]]
@@ -379,31 +375,18 @@ def singular_lines(scene: Scene, points: Array, cells: Cells, facets: Cells) -> 
 def _turned_in(points: Array, cells: Cells) -> Cells:
     """Find edges (r, 2) of boundary, in the plane nodes (r, 1), at which it turns into the body."""
     d = points.shape[1]
-    facets, first, count = np.unique(
-        cell_facets(cells), axis=0, return_index=True, return_counts=True
-    )
-    facets, first = facets[count == 1], first[count == 1]
+    facets, cell, opposite = boundary_facets(cells)
     middles, normals = points[facets].mean(axis=1), unit_normals(points[facets])
-    away = middles - points[cells[first // (d + 1), first % (d + 1)]]  # cells are on the other side
+    away = middles - points[cells[cell, opposite]]  # cells are on the other side
     normals *= np.sign(np.sum(normals * away, axis=1))[:, None]
-    rims, place, count = np.unique(_rims(facets), axis=0, return_inverse=True, return_counts=True)
+    rims, place, count = np.unique(
+        cell_facets(facets), axis=0, return_inverse=True, return_counts=True
+    )
     paired = np.argsort(place.ravel(), kind="stable")[np.repeat(count, count) == 2]
-    one, other = (paired % len(facets)).reshape(-1, 2).T
+    one, other = (paired // d).reshape(-1, 2).T
     inwards = np.sum((middles[other] - middles[one]) * normals[one], axis=1) > 0.0
     turned = np.sum(normals[one] * normals[other], axis=1) < np.cos(_TURN[d])
     return rims[count == 2][inwards & turned]
-
-
-def _rims(facets: Cells) -> Cells:
-    """Find edges of triangles, or ends of segments (f, k), of all facets in turn."""
-    k = facets.shape[1]
-    return np.sort(np.concatenate([np.delete(facets, i, axis=1) for i in range(k)]), axis=1)
-
-
-def _boundary(cells: Cells) -> Cells:
-    """Find nodes (b, k) of the facets of one cell only."""
-    facets, count = np.unique(cell_facets(cells), axis=0, return_counts=True)
-    return np.asarray(facets[count == 1])
 
 
 def _ends_in_facets(

@@ -5,11 +5,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import cell_facets, connected, measures
 
 _TINY = 1e-4  # of the body's size: an inner part less than that across stays joined
 
@@ -58,8 +56,7 @@ class ConformingMesh:
     def pieces(self) -> NDArray[np.int64]:
         """(m,) number of the connected piece of material that each cell belongs to."""
         first, second = _links_of_corners(self.cells)
-        link = coo_array((np.ones(len(first)), (first, second)), shape=(len(self.points),) * 2)
-        _, label = connected_components(link.tocsr(), directed=False)
+        label = connected(len(self.points), first, second)
         # numbered by their first cells
         _, start, of_cell = np.unique(
             label[self.cells[:, 0]], return_index=True, return_inverse=True
@@ -85,12 +82,6 @@ class ConformingMesh:
         k, d = self.cell_dimension, self.dimension
         corners: NDArray[np.float64] = self.points[first[self.cut_facets]].reshape(-1, k, d)
         return corners
-
-
-def cell_facets(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Find nodes (m · (d + 1), d), ascending, of the facets; a facet lies opposite its corner."""
-    corners = [[c for c in range(cells.shape[1]) if c != k] for k in range(cells.shape[1])]
-    return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
 
 
 def interior_facets(
@@ -188,10 +179,8 @@ def _without_tiny_parts(
     first, second, is_cut, outer = found
     k = cells.shape[1] - 1
     one, other = first // (k + 1), second // (k + 1)
-    link = coo_array(
-        (np.ones(int((~is_cut).sum())), (one[~is_cut], other[~is_cut])), shape=(len(cells),) * 2
-    )
-    count, part = connected_components(link.tocsr(), directed=False)
+    part = connected(len(cells), one[~is_cut], other[~is_cut])
+    count = int(part.max()) + 1
     if count == 1:
         return is_cut, np.zeros(0)
     size = np.bincount(part, measures(points[cells]), count)
@@ -230,8 +219,7 @@ def _opened(
     """
     # a slot is (cell, corner); the slots of one node are joined across every facet not cut
     slot_a, slot_b = _facing_slots(cells, first, second)
-    link = coo_array((np.ones(len(slot_a)), (slot_a, slot_b)), shape=(cells.size, cells.size))
-    _, group = connected_components(link.tocsr(), directed=False)
+    group = connected(cells.size, slot_a, slot_b)
     _, start, label = np.unique(group, return_index=True, return_inverse=True)
     parent = cells.ravel()[start]
     # number the groups by their old node, so that nodes off the cut keep their order

@@ -12,9 +12,8 @@ from reference.meshing import (
     open_cut,
     structured_tetrahedra,
 )
-from reference.meshing.opening import cell_facets
 from verify.errors import InputError, UnsupportedSceneError
-from verify.geometry.simplices import refine_uniformly
+from verify.geometry.simplices import cell_facets, refine_uniformly
 
 UNIFORM = Grading(0.15, np.zeros((0, 3)))
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
+from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, points_along
 from verify.geometry.simplices import distance_to_outline
 from verify.scene import Rotation, Support, ToolPathCut, load_scene
 from verify.scene.physics import factor_at, first_factor, jumps, slope_at
@@ -213,7 +213,7 @@ def test_overlap_is_the_shared_length_and_a_crossing_has_none():
     # 1/3 + 1/3 + … is a unit of the last place beyond, as sums are
     one = np.array([[0.1, 0.5], [0.30000000000000004, 0.5]])
     assert overlap_length(one, np.array([[0.3, 0.5], [0.7, 0.5]])) == 0.0
-    np.testing.assert_allclose(point_along(NOTCHED[:3], 0.5), [2.5, 0.0], atol=1e-15)
+    np.testing.assert_allclose(points_along(NOTCHED[:3], 0.5), [2.5, 0.0], atol=1e-15)
 
 
 def test_the_top_speed_is_of_either_end_of_a_blade():

@@ -132,11 +132,6 @@ class NearlySymmetric(LinearSolver):
     pattern : BlockPattern
     block : int
         Size of the blocks.
-
-    Attributes
-    ----------
-    pivoted : int
-        Factorisations so far that needed the LU.
     """
 
     def __init__(self, pattern: BlockPattern, block: int) -> None:
@@ -146,7 +141,6 @@ class NearlySymmetric(LinearSolver):
         self._blocks: Floats | None = None
         self._is_general = False
         self._respite = 0
-        self.pivoted = 0
 
     def factorize(self, blocks: Floats) -> None:
         """Factorise; see `LinearSolver`."""
@@ -167,7 +161,6 @@ class NearlySymmetric(LinearSolver):
         assert self._blocks is not None
         self._general.factorize(self._blocks)
         self._is_general = True
-        self.pivoted += 1
 
     def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`."""

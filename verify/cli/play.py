@@ -1,7 +1,5 @@
 """``verify play``: a cutting scene step by step, drawn off-screen or shown in a window."""
 
-import csv
-import io
 import os
 import shutil
 from dataclasses import replace
@@ -12,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from verify.cli.signatures import Arg, Case, positive
 from verify.cli.streams import print_answer
 from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import csv_text
 
 _QUALITY = (
     "volume_error", "loose_edges", "inverted_elements", "inverted_facets", "stray_facets",
     "largest_stretch",
 )  # fmt: skip
+_ACCOUNT = ("kinetic", "strain", "potential", "work", "dissipated", "contacts")
 _FORCES = ("driving_force", "resistance")  # on blades, as Session.blade_forces gives them
 
 if TYPE_CHECKING:
@@ -213,24 +213,18 @@ def _largest(forces: "Floats") -> float | None:
 
 def _table(records: "list[StepRecord]", blades: "dict[str, tuple[Floats, Floats]]") -> str:
     """Return what every step cost and did as CSV, with the forces on each blade."""
-    from verify.simulator import PHASES
-
-    text = io.StringIO()
-    table = csv.writer(text)
-    table.writerow(
-        ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
-         "potential", "work", "dissipated", "contacts",
-         *(f"{what}_{name}" for name in blades for what in ("cut_work", *_FORCES))]
-    )  # fmt: skip
-    for row, r in enumerate(records):
-        delay = r.delay.mean() if len(r.delay) else ""
-        table.writerow(
-            [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic, r.strain,
-             r.potential, r.work, r.dissipated, r.contacts,
-             *(value for k, forces in enumerate(blades.values())
-               for value in (r.cut_work[k], *("" if x[row] != x[row] else x[row] for x in forces)))]
-        )  # fmt: skip
-    return text.getvalue()
+    rows = []
+    for step, r in enumerate(records):
+        row: dict[str, Any] = {"step": r.step, "time": r.time, **r.seconds}
+        row |= {"split": r.split, "unknowns": r.unknowns}
+        row["mean_delay"] = r.delay.mean() if len(r.delay) else ""
+        row |= {name: getattr(r, name) for name in _ACCOUNT}
+        for k, (name, forces) in enumerate(blades.items()):
+            row[f"cut_work_{name}"] = r.cut_work[k]
+            for what, force in zip(_FORCES, forces, strict=True):
+                row[f"{what}_{name}"] = force[step] if force[step] == force[step] else ""  # NaN
+        rows.append(row)
+    return csv_text(list(rows[0]), rows)
 
 
 def _words(summary: dict[str, Any]) -> list[str]:

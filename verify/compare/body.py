@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from verify.compare.sides import distance_to_cut, distance_to_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, membrane_of, solid_of
-from verify.compare.simplices import places_of
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
 from verify.geometry.planar import inside_polygon, polygon_area
-from verify.geometry.simplices import boundary_loops, distance_to_outline
+from verify.geometry.simplices import boundary_loops, distance_to_outline, places_of
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 
 Array = NDArray[np.float64]

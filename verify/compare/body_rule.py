@@ -15,7 +15,7 @@ to the evaluated field; the rest is in the integration error.
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 from math import factorial
 
@@ -30,7 +30,7 @@ from verify.compare.simplices import KUHN, bisect, heights, in_frames, points_in
 from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import measures, unit_rule
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ def area_rule(
     xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
     strips = _strips(rows, ys, xs, ROUND_OFF * body.size)
-    points, weights = _in_strips(rows, ys, xs, strips, *_gauss(order), *_gauss(max(order, 6)))
+    points, weights = _in_strips(rows, ys, xs, strips, *unit_rule(order), *unit_rule(max(order, 6)))
     return Rule(points @ turn, weights)
 
 
@@ -294,12 +294,6 @@ def _in_strips(curves, ys, columns, strips, u, wu, v, wv):
             weights[n:end] = (high - low) * shares[i] * width * parts
             n = end
     return points, weights
-
-
-@cache
-def _gauss(n: int) -> tuple[Array, Array]:
-    x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1), 0.5 * w
 
 
 # Kuhn's tetrahedra keep their orientation as long as no node moves by a sixth of the spacing.

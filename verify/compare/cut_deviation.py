@@ -19,8 +19,9 @@ from verify.compare.cut_rule import CutRule, cut_rule_of
 from verify.compare.locate import ROUND_OFF, nearest_of_triangles
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, deep_inside
-from verify.compare.simplices import cells_of, heights, places_of, points_in
+from verify.compare.simplices import cells_of, heights, points_in
 from verify.geometry.curves import Arc
+from verify.geometry.simplices import boundary_facets, places_of
 from verify.result import CutRecord
 from verify.solution import Solution
 
@@ -187,9 +188,7 @@ def _ends_aside(facets: Array, body: AnyBody, cut: str, limit: float, same: floa
 def _free_faces(facets: Array, body: AnyBody, same: float) -> Array:
     """Find ends (e, 1, d) or edges (e, 2, 3) inside a body that one facet alone has."""
     corners, number = welded(facets, same)
-    faces = np.concatenate([np.delete(number, k, axis=1) for k in range(number.shape[1])])
-    distinct, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
-    free = corners[distinct[count == 1]]
+    free = corners[boundary_facets(number)[0]]
     if isinstance(body, MembraneBody):
         return np.asarray(free)
     return np.asarray(free[deep_inside(free.mean(axis=1), body.inside, _STEP * body.size)])

@@ -31,6 +31,7 @@ from verify.geometry.patches import (
     PlanePatch,
     SpherePatch,
 )
+from verify.geometry.planar import arc_lengths
 
 Array = NDArray[np.float64]
 
@@ -133,7 +134,7 @@ def _on_surface(body: SolidBody, cut: str) -> ProfileLine:
     normals = np.concatenate([p.normal(uv) for p, uv in zip(patches, parameters, strict=True)])
     inside = body.inside(points)
     points, normals = points[inside], normals[inside]
-    return _line(body, cut, where, _lengths(points), points, normals)
+    return _line(body, cut, where, arc_lengths(points), points, normals)
 
 
 def _line_of(patches: Sequence[Patch]) -> tuple[str, list[Array]]:
@@ -212,10 +213,3 @@ def _line(
 def _towards_ends() -> Array:
     """Choose shares (n,) of a line, inside its ends."""
     return 0.5 * (1.0 - np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS))
-
-
-def _lengths(points: Array) -> Array:
-    if not len(points):
-        return np.zeros(0)
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])

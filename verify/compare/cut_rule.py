@@ -16,7 +16,7 @@ from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
 from verify.compare.simplices import divide, points_in, split_at_level
 from verify.geometry.patches import Patch, PlanePatch
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import measures, unit_rule
 
 Array = NDArray[np.float64]
 
@@ -110,12 +110,12 @@ def along_cut(
     parameters, weights, away : (n,) arrays
         The last is how far from the cut a point beside it shall be, m.
     """
-    x, w = np.polynomial.legendre.leggauss(_ORDER)
+    x, w = unit_rule(_ORDER)
     stops = ends * length
     breaks = graded_breaks(stops, stops[special], spacing, _DEPTH * spacing) / length
     step = np.diff(breaks)
-    t = (breaks[:-1, None] + step[:, None] * 0.5 * (x + 1)).ravel()
-    weights = (step[:, None] * length * 0.5 * w).ravel()
+    t = (breaks[:-1, None] + step[:, None] * x).ravel()
+    weights = (step[:, None] * length * w).ravel()
     return t, weights, np.repeat(np.maximum(1e-3 * step * length, AWAY * size), _ORDER)
 
 

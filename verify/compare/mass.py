@@ -11,14 +11,14 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array, issparse
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array, diags_array, issparse
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import EDGES, cells_of, kept_with, nodes_of_facets, simplex_rule
 from verify.errors import InputError
 from verify.geometry.simplices import boundary_facets as alone
+from verify.geometry.simplices import connected_cells
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.solution_checks import CONSISTENT
@@ -303,12 +303,7 @@ def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
 def _connected(solution: Solution) -> list[Ints]:
     """Find cells of each part."""
     cells = solution.cells[:, : solution.cell_dimension + 1]
-    count, k = cells.shape
-    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in range(k)]), axis=1)
-    _, number = np.unique(facets, axis=0, return_inverse=True)
-    cell = np.tile(np.arange(count), k)
-    link = coo_array((np.ones(len(cell), dtype=np.int8), (cell, number.ravel()))).tocsr()
-    _, label = connected_components(link @ link.T, directed=False)
+    label = connected_cells(cells)
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 

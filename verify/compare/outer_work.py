@@ -40,9 +40,9 @@ from scipy.sparse.linalg import cg, splu
 from verify.compare.hooke import Law, stress_power, viscous_power
 from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.mass import assembled, boundary_facets, shape_functions
-from verify.compare.simplices import EDGES, cells_of, nodes_of_facets, places_of, simplex_rule
+from verify.compare.simplices import EDGES, cells_of, nodes_of_facets, simplex_rule
 from verify.errors import InputError
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import measures, places_of
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.parts import Pieces, held_nodes, pieces_on_part
 from verify.scene.physics import PrescribedMotion, factor_at, jumps

@@ -15,9 +15,6 @@ from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
@@ -230,15 +227,6 @@ def simplex_rule(k: int, order: int) -> tuple[Array, Array]:
 KUHN = np.array(
     [np.cumsum([np.zeros(3), *np.eye(3)[list(path)]], axis=0) for path in permutations(range(3))]
 )
-
-
-def places_of(points: Array, reach: float) -> NDArray[np.int64]:
-    """Give each of points (n, d) the number (n,) of its place: one within a `reach`, m."""
-    if not len(points):
-        return np.zeros(0, dtype=np.int64)
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    return np.asarray(connected_components(link.tocsr(), directed=False)[1], dtype=np.int64)
 
 
 def points_in(corners: Array, order: int) -> tuple[Array, Array]:

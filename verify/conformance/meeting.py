@@ -41,6 +41,7 @@ from verify.conformance.scenes import (
     unit_scene,
 )
 from verify.conformance.trials import Trial
+from verify.geometry.simplices import cell_facets
 from verify.result import CutRecord
 from verify.scene import Scene
 from verify.scene.parts import on_part
@@ -248,7 +249,7 @@ def _parting_facets(solution: Solution) -> Array:
     """Facets (f, d, d) inside a unit body at which the displacement jumps, or that one cell has."""
     d, moved = solution.dimension, solution.displacement[-1]
     cells = solution.cells[:, : d + 1]
-    facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(d + 1)])
+    facets = cell_facets(cells)
     _, place = welded(solution.points[facets], _SAME)
     order = np.argsort(place, axis=1)
     facets, place = (np.take_along_axis(rows, order, axis=1) for rows in (facets, place))

@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from reference.exact import ExactSolution, exact_of
 from verify.compare.hooke import hooke
 from verify.errors import UnsupportedSceneError
-from verify.geometry.simplices import measures, nearest_cut
+from verify.geometry.simplices import connected, measures, nearest_cut
 from verify.scene import (
     Box,
     CutFaces,
@@ -173,10 +171,8 @@ class Problem:
         components has no static answer, and direct solvers do not always notice. On a background
         mesh the body is one piece, whatever the cuts.
         """
-        m, corners = self.cells.shape
-        cell = np.repeat(np.arange(m), corners)
-        link = coo_array((np.ones(m * corners), (cell, self.cells.ravel())))
-        _, node_piece = connected_components(link.T @ link, directed=False)
+        starts = np.repeat(self.cells[:, 0], self.cells.shape[1])
+        node_piece = connected(len(self.points), starts, self.cells.ravel())
         held = np.bincount(node_piece, self.prescribed()[0].sum(axis=1))
         loose = np.flatnonzero(held < (3 if self.points.shape[1] == 2 else 6))
         cell_piece, middle = node_piece[self.cells[:, 0]], self.points[self.cells].mean(axis=1)

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from verify.geometry.simplices import distance_to_outline
 
@@ -48,11 +48,17 @@ def inside_polygon(points: Array, corners: Array) -> NDArray[np.bool_]:
     return winding != 0
 
 
-def point_along(vertices: Array, fraction: float) -> Array:
-    """Find the point (2,) at `fraction` of the length of the polyline `vertices` (k, 2)."""
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1))])
-    where = fraction * lengths[-1]
-    return np.array([np.interp(where, lengths, vertices[:, c]) for c in range(2)])
+def arc_lengths(points: Array) -> Array:
+    """Measure the way (k,) along a polyline (k, d) up to each of its points."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([np.zeros(min(len(points), 1)), np.cumsum(steps)])
+
+
+def points_along(vertices: Array, fractions: ArrayLike) -> Array:
+    """Find the points (..., d) at `fractions` (...) of the length of the polyline (k, d)."""
+    lengths = arc_lengths(vertices)
+    where = np.asarray(fractions) * lengths[-1]
+    return np.stack([np.interp(where, lengths, column) for column in vertices.T], axis=-1)
 
 
 def inner_parts(vertices: Array, corners: Array) -> list[tuple[Array, Array]]:

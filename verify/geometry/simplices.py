@@ -6,6 +6,7 @@ shapes, on any level (Bey, Tetrahedral grid refinement, Computing 55, 1995).
 """
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 from math import factorial
 from typing import Protocol
@@ -56,20 +57,58 @@ def measures(simplices: Array) -> Array:
     return np.asarray(size / factorial(count))
 
 
+@cache
+def unit_rule(order: int) -> tuple[Array, Array]:
+    """Gauss points and weights (order,) on [0, 1]."""
+    points, weights = np.polynomial.legendre.leggauss(order)
+    return 0.5 * (points + 1.0), 0.5 * weights
+
+
+def cell_facets(cells: Ints) -> Ints:
+    """Nodes (m · c, c − 1), ascending, of the facets of cells (m, c), opposite each corner."""
+    corners = [[c for c in range(cells.shape[1]) if c != k] for k in range(cells.shape[1])]
+    return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
+
+
+def connected(count: int, first: Ints, second: Ints) -> Ints:
+    """Label the components (count,) of a graph with edges from `first` (q,) to `second` (q,)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    link = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    number: Ints = connected_components(link, directed=False)[1].astype(np.int64)
+    return number
+
+
+def connected_cells(cells: Ints) -> Ints:
+    """Label (m,) the pieces of a body by its cells (m, c); facets join the cells of a piece."""
+    facets, number = np.unique(cell_facets(cells), axis=0, return_inverse=True)
+    cell = np.repeat(np.arange(len(cells)), cells.shape[1])
+    return connected(len(cells) + len(facets), cell, len(cells) + number.ravel())[: len(cells)]
+
+
+def places_of(points: Array, reach: float) -> Ints:
+    """Give each of points (n, d) the number (n,) of its place: one within a `reach`, m."""
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
+    return connected(len(points), *cKDTree(points).query_pairs(reach, output_type="ndarray").T)
+
+
 def boundary_facets(cells: Ints) -> tuple[Ints, Ints, Ints]:
     """Facets (f, c − 1) that one cell (m, c) alone has; that cell (f,), the opposite corner (f,).
 
     Nodes ascend in each facet, and facets are in lexicographic order. Corners are 0 … c − 1.
     """
-    count, corners = cells.shape
-    facets = np.sort(np.concatenate([np.delete(cells, k, axis=1) for k in range(corners)]))
+    facets = cell_facets(cells)
     key = facets[:, 0]
     for column in facets.T[1:]:
         key = key * (int(cells.max(initial=0)) + 1) + column
     order = np.argsort(key, kind="stable")
     first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
     alone = order[first[np.diff(np.append(first, len(key))) == 1]]
-    return facets[alone], alone % count, alone // count
+    return facets[alone], *np.divmod(alone, cells.shape[1])
 
 
 def boundary_loops(cells: Ints) -> list[Ints]:
@@ -177,9 +216,7 @@ def length_inside(edges: Array, lower: Array, upper: Array) -> float:
 def rim_edges(surface: tuple[Array, Ints]) -> Array:
     """Edges (r, 2, 3) that belong to one triangle only."""
     points, triangles = surface
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    distinct, count = np.unique(edges, axis=0, return_counts=True)
-    return points[distinct[count == 1]]
+    return np.asarray(points[boundary_facets(triangles)[0]])
 
 
 def overlap_area(one: tuple[Array, Ints], other: tuple[Array, Ints]) -> float:
@@ -188,8 +225,7 @@ def overlap_area(one: tuple[Array, Ints], other: tuple[Array, Ints]) -> float:
     scale = float(np.ptp(np.vstack([one[0], other[0]]), axis=0).max())
     tolerance = _TOLERANCE * scale
     total = 0.0
-    normals = np.cross(second[:, 1] - second[:, 0], second[:, 2] - second[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals = unit_normals(second)
     for triangle in first:
         off = np.abs(np.einsum("tij,tj->ti", triangle - second[:, :1], normals)).max(axis=1)
         apart = (triangle.min(axis=0) > second.max(axis=1) + tolerance) | (

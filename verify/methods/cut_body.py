@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array, eye_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array, eye_array
 
 from verify.xfem.arrays import Floats, Ints
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.element import Material
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.phantom import PhantomMesh, SubCells, cut_mesh
 from verify.xfem.subdivision import Subdivision, subdivide
 
@@ -252,10 +251,8 @@ def seams_of(phantom: PhantomMesh) -> Seams:
 
 def welded(phantom: PhantomMesh, seams: Seams, closed: NDArray[np.bool_]) -> PhantomMesh:
     """Join pairs of nodes (k, d) of the seams that are closed; cells stay as they are."""
-    count = phantom.node_count
     first, second = seams.one[closed].ravel(), seams.other[closed].ravel()
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
-    group = connected_components(graph, directed=False)[1]
+    group = connected(phantom.node_count, first, second)
     _, node = np.unique(group, return_index=True)
     mesh = phantom.mesh
     joined = OpenedMesh(phantom.node_points[node], group[phantom.cells], mesh.boundary_facets)

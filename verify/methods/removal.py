@@ -17,8 +17,6 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from verify.methods.cut_body import (
     Change,
@@ -34,7 +32,7 @@ from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.contacts import face_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 
@@ -248,9 +246,7 @@ def _longest_edges(mesh: SimplexMesh) -> Floats:
 def _debris(phantom: PhantomMesh, bodies: Ints, touched: Bools) -> Bools:
     """(p,) cells that only the removed ones joined to their body and that all lie at the gap."""
     first, second = face_contacts(phantom)
-    count = len(phantom.cells)
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
-    part = connected_components(graph, directed=False)[1]
+    part = connected(len(phantom.cells), first, second)
     at_gap = np.zeros(len(phantom.mesh.points), dtype=bool)
     at_gap[phantom.mesh.cells[touched]] = True
     beside = at_gap[phantom.mesh.cells[phantom.parent]].any(axis=1)
@@ -269,10 +265,8 @@ def _without_hinges(phantom: PhantomMesh) -> tuple[Ints, Ints]:
     corners = phantom.cells.shape[1]
     first, second = face_contacts(phantom)
     pair, a, b = np.nonzero(phantom.cells[first][:, :, None] == phantom.cells[second][:, None, :])
-    size = phantom.cells.size
     rows, columns = first[pair] * corners + a, second[pair] * corners + b
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(size, size))
-    group = connected_components(graph, directed=False)[1]
+    group = connected(phantom.cells.size, rows, columns)
     old = np.zeros(group.max() + 1, dtype=np.int64)
     old[group] = phantom.cells.ravel()
     order = np.argsort(old, kind="stable")

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from verify.compare.hooke import law_of
 from verify.errors import InputError
-from verify.geometry.simplices import distance_to_pieces, measures, on_simplices, unit_normals
+from verify.geometry.simplices import (
+    distance_to_pieces,
+    measures,
+    on_simplices,
+    unit_normals,
+    unit_rule,
+)
 from verify.printable import place_text as _place
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.parts import on_part
@@ -154,7 +160,6 @@ _BALANCED, _STEP, _OFF = 1e-4, 3e-4, 0.02
 _DISTANCES = np.geomspace(1e-5, 0.1, 12)  # from cuts and their ends, of the body
 _FLIGHT = 1e-9  # of momenta over the step of the differences: round-off, where nothing is strained
 _FOURTH_ORDER = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 def check_exact_fits(scene: Scene, exact: Any, mesh: SimplexMesh) -> None:
@@ -344,7 +349,7 @@ class _Fit:
         free = holds(self._mesh, a) & holds(self._mesh, b)
         a, b = a[free], b[free]
         along = np.zeros_like(a)
-        for node, weight in zip(0.5 * (_GAUSS + 1.0), 0.5 * _WEIGHTS, strict=True):
+        for node, weight in zip(*unit_rule(10), strict=True):
             gradient = field.gradient(a + node * (b - a))
             along += weight * np.einsum("nij,nj->ni", gradient, b - a)
         start, end = field.displacement(a), field.displacement(b)

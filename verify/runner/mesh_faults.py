@@ -7,12 +7,17 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from verify.errors import InputError
-from verify.geometry.simplices import boundary_facets, feet, inner_range, measures
+from verify.geometry.simplices import (
+    boundary_facets,
+    connected_cells,
+    feet,
+    inner_range,
+    measures,
+    unit_normals,
+)
 from verify.printable import place_text as _at
 from verify.result import Notice, NoticeKind
 from verify.scene import Gravity, MeshFile, Scene, Traction, read_mesh
@@ -111,17 +116,13 @@ def mesh_warnings(scene: Scene) -> list[str]:
 def _pieces(scene: Scene, body: MeshFile) -> str:
     """Warn of a body in pieces that share no facet, or say ""."""
     points, cells = read_mesh(scene)
-    facets = np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
-    _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
-    cell = np.tile(np.arange(len(cells)), cells.shape[1])
-    link = coo_array((np.ones(len(cell)), (cell, facet.ravel()))).tocsr()
-    count, piece = connected_components(link @ link.T, directed=False)
-    if count == 1:
+    piece = connected_cells(cells)
+    count = np.bincount(piece)
+    if len(count) == 1:
         return ""
-    least = np.bincount(piece).argmin()
-    own = cells[piece == least]
+    own = cells[piece == count.argmin()]
     return (
-        f"'{body.file}' is in {count} pieces that share no facet, "
+        f"'{body.file}' is in {len(count)} pieces that share no facet, "
         f"the least of {len(own)} cells around {_at(points[own].mean(axis=(0, 1)))}"
     )
 
@@ -327,8 +328,7 @@ class _Skin:
             normals.append(way)
             offsets.append(np.sum(way * facet[:, 0], axis=1) + _CLOSE * self.size)
         if self.membrane:
-            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            across /= np.linalg.norm(across, axis=1, keepdims=True)
+            across = unit_normals(corners)
             height = np.sum(across * corners[:, 0], axis=1)
             normals += [across, -across]
             offsets += [sign * height - _FLAT * self.size for sign in (1.0, -1.0)]
@@ -344,8 +344,7 @@ def _feet(points: Array, facets: Array, bounded: bool = True) -> Array:
         along = end - start
         share = np.sum((points - start) * along, axis=1) / np.sum(along**2, axis=1)
         return np.asarray(start + share[:, None] * along)
-    normal = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit_normals(facets)
     height = np.sum((points - facets[:, 0]) * normal, axis=1)
     foot = points - height[:, None] * normal
     if not bounded:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import boundary_facets, on_simplices, oriented
+from verify.geometry.simplices import boundary_facets, on_simplices, oriented, places_of
 from verify.printable import place_text
 from verify.read_mesh import RawMesh, base_of, dimension_of, read_raw
 from verify.scene.strict import nearest
@@ -246,16 +246,9 @@ def _welded(
     points: Array, rows: list[tuple[Ints, Ints]], k: int, weld: float, where: str
 ) -> tuple[Array, list[tuple[Ints, Ints]], int]:
     """Join nodes closer than `weld`; refuse it where a cell would lose a corner."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     if not np.isfinite(points).all():
         raise InputError("has coordinates that are not finite", where)
-    pairs = cKDTree(points).query_pairs(weld, output_type="ndarray")
-    link = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    count, label = connected_components(link, directed=False)
-    _, first = np.unique(label, return_index=True)
+    _, first, label = np.unique(places_of(points, weld), return_index=True, return_inverse=True)
     target = first[label]
     joined = [(target[simplices], parent) for simplices, parent in rows]
     for simplices, _ in joined:
@@ -263,7 +256,7 @@ def _welded(
         if simplices.shape[1] == k + 1 and lost.size:
             text = f"geometry.weld: {weld:g} m joins corners of one cell ({lost.size} cells)"
             raise InputError(f"{text}; expected less than the shortest edge", where)
-    return points, joined, len(points) - count
+    return points, joined, len(points) - len(first)
 
 
 def _members(raw: RawMesh, rows: list[tuple[Ints, Ints]], own: list[int]) -> dict[str, Ints]:

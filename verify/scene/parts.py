@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import feet, measures, nearest_parts
+from verify.geometry.simplices import feet, measures, nearest_parts, unit_normals
 from verify.result import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.regions import Side, comparisons, is_affine, parse_region
@@ -279,19 +279,13 @@ def _off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
 def _ridges(boundary: Array) -> Array:
     """Where facets (b, k, d) of different directions meet: points (e, 1, d), segments (e, 2, d)."""
     count, k, d = boundary.shape
-    if k == 2:
-        directions = boundary[:, 1] - boundary[:, 0]
-        ends = boundary[:, :, None]
-    else:
-        directions = np.cross(boundary[:, 1] - boundary[:, 0], boundary[:, 2] - boundary[:, 0])
-        ends = boundary[:, [[0, 1], [0, 2], [1, 2]]]
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    ends = ends.reshape(-1, k - 1, d)
+    normals = unit_normals(boundary)
+    ends = boundary[:, list(combinations(range(k), k - 1))].reshape(-1, k - 1, d)
     _, node = np.unique(ends.reshape(-1, d), axis=0, return_inverse=True)
     keys = np.sort(node.reshape(-1, k - 1), axis=1)
     _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     facet = np.repeat(np.arange(count), k)
-    turn = 1.0 - np.abs(np.sum(directions[facet] * directions[facet[first[place.ravel()]]], axis=1))
+    turn = 1.0 - np.abs(np.sum(normals[facet] * normals[facet[first[place.ravel()]]], axis=1))
     return ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, point_along
+from verify.geometry.planar import inner_parts, inside_polygon, overlap_length, points_along
 from verify.geometry.simplices import (
     area_inside,
     boundary_facets,
@@ -317,7 +317,7 @@ def misplaced_point(
         if asked.kind == "opening" and scene.dimension == 2:
             cut = next(cut for cut in _known(scene) if cut.name == asked.cut)
             place = f"quantities[{i}].at: {asked.at} of cut '{asked.cut}' is at"
-            point = point_along(cut.vertices(), asked.at or 0.0)
+            point = points_along(cut.vertices(), asked.at or 0.0)
         if point is None or isinstance(asked, FractureQuantity | SectionQuantity):
             continue
         at = np.array(point, dtype=float)

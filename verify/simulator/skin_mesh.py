@@ -21,8 +21,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import Delaunay, cKDTree
 
 from verify.errors import InputError
-from verify.geometry.planar import inside_polygon, polygon_area
-from verify.geometry.simplices import boundary_facets, boundary_loops, refine_uniformly
+from verify.geometry.planar import arc_lengths, inside_polygon, points_along, polygon_area
+from verify.geometry.simplices import boundary_facets, boundary_loops, measures, refine_uniformly
 from verify.read_mesh import read_with_meshio
 from verify.scene import Skin
 from verify.xfem.arrays import Bools, Floats, Ints
@@ -168,11 +168,9 @@ def _inside(points: Floats, rings: list[Floats]) -> Bools:
 
 def _resampled(ring: Floats, size: float) -> Floats:
     closed = np.concatenate([ring, ring[:1]])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     # a hole keeps a shape however coarse the mesh
-    count = max(6, round(along[-1] / size))
-    places = np.arange(count) * along[-1] / count
-    return np.column_stack([np.interp(places, along, closed[:, axis]) for axis in range(2)])
+    count = max(6, round(float(arc_lengths(closed)[-1]) / size))
+    return points_along(closed, np.arange(count) / count)
 
 
 def _lattice(rings: list[Floats], border: Floats, size: float) -> Floats:
@@ -407,9 +405,7 @@ def _welded(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
 def _check_closed(points: Floats, triangles: Ints, where: str) -> None:
     corners = points[triangles]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = 2.0 * measures(corners)
     longest = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1)
     if (flat := area <= 1e-12 * longest**2).any():
         raise InputError(

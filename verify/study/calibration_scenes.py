@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from reference.exact.moving_cracks import sudden_intensity, wave
 from reference.exact.solution import hooke
+from verify.geometry.simplices import frame
 from verify.scene import Material
 
 Array = NDArray[np.float64]
@@ -235,12 +236,9 @@ def _arc(
 def solid_smooth(random: Random) -> Content:
     """Return sinusoids with a body force on both sides of a plane through the unit cube."""
     point, normal = random.uniform(0.4, 0.6, 3), random.normal(size=3)
-    normal /= np.linalg.norm(normal)
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    second = np.cross(normal, first)
+    across, first, normal = frame(normal)
     corners = [
-        point + 2.0 * (s * first + t * second) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        point + 2.0 * (s * first - t * across) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))
     ]
     sides = _sinusoids(random, 3, (-2.0, 2.0), (3, 2))
     while True:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.planar import arc_lengths, points_along
 from verify.judge import cost
 from verify.judge.cost import WorkPoint, pareto_front, time_at, work_points
 from verify.judge.models import changed
@@ -197,10 +198,6 @@ def _beginning(points: NDArray[np.float64], share: float) -> list[list[float]]:
     """Return the polyline's first part, by length."""
     if share >= 1.0:
         return [list(map(float, point)) for point in points]
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    reached = np.concatenate([[0.0], np.cumsum(lengths)])
-    end = share * reached[-1]
-    whole = int(np.searchsorted(reached, end, side="left"))
-    part = (end - reached[whole - 1]) / lengths[whole - 1]
-    tip = points[whole - 1] + part * (points[whole] - points[whole - 1])
-    return [list(map(float, point)) for point in [*points[:whole], tip]]
+    lengths = arc_lengths(points)
+    whole = points[lengths < share * lengths[-1]]
+    return [list(map(float, point)) for point in [*whole, points_along(points, share)]]
