@@ -457,8 +457,7 @@ class ShortWaves:
         if len(velocities) < 4:
             return {}
         space, energy = self.body.space, 0.0
-        part = np.zeros(len(space.node_points), dtype=np.int64)
-        part[space.cell_nodes] = space.mesh.pieces[:, None]
+        part = space.piece_of_node
         mass = np.bincount(part, (self.body.mass @ np.ones_like(velocities[0]))[:: space.dimension])
         for fast in velocities - velocities.mean(axis=0):
             momenta = self.body.mass @ fast

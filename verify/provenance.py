@@ -41,7 +41,6 @@ DISTRIBUTIONS = {
     "numpy": ["numpy"],
     "scipy": ["scipy"],
     "numba": ["numba"],
-    "qdldl": ["qdldl"],
     "dolfinx": ["dolfinx-solver-real", "dolfinx-solver", "fenics-dolfinx"],
     "petsc": ["petsc4py", "petsc"],
     "gmsh": ["gmsh"],

@@ -5,12 +5,14 @@ too close to each other to be meshed apart are refused.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, pairwise, permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.geometry.curves import Arc, Piece, Segment
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene, Traction
 from verify.scene.parts import pieces_on_part
 
@@ -123,36 +125,26 @@ class Feature:
     radius: float = 0.0
     sweep: float = 0.0
 
+    @cached_property
+    def piece(self) -> Piece:
+        """The curve; its ends are `start` and `end` to round-off."""
+        if self.centre is None:
+            return Segment(self.start, self.end)
+        first = float(np.arctan2(*(self.start - self.centre)[::-1]))
+        return Arc(self.centre, self.radius, first, self.sweep)
+
     def distance(self, points: Array) -> Array:
         """Compute the distance (n,) of each of `points` (n, 2) to this feature, m."""
-        if self.centre is None:
-            along = self.end - self.start
-            share = np.clip((points - self.start) @ along / (along @ along), 0.0, 1.0)
-            away = points - self.start - share[:, None] * along
-            return np.asarray(np.linalg.norm(away, axis=1))
-        spoke = points - self.centre
-        first = np.arctan2(*(self.start - self.centre)[::-1])
-        angle = np.mod(np.arctan2(spoke[:, 1], spoke[:, 0]) - first, 2 * np.pi)
-        ends = np.stack([self.start, self.end])
-        nearest = np.linalg.norm(points[:, None] - ends, axis=2).min(axis=1)
-        to_circle = np.abs(np.linalg.norm(spoke, axis=1) - self.radius)
-        return np.where(angle <= self.sweep, to_circle, nearest)
+        return np.asarray(np.linalg.norm(points - self.piece.foot(points), axis=1))
 
     def samples(self, count: int = _SAMPLES) -> Array:
         """Find points (n, 2) along the feature, both ends included."""
-        t = np.linspace(0.0, 1.0, count)
-        if self.centre is None:
-            return np.asarray(self.start + t[:, None] * (self.end - self.start))
-        first = np.arctan2(*(self.start - self.centre)[::-1])
-        angle = first + t * self.sweep
-        return self.centre + self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        return self.piece.point(np.linspace(0.0, 1.0, count))
 
     @property
     def length(self) -> float:
         """Its length, m."""
-        if self.centre is None:
-            return float(np.linalg.norm(self.end - self.start))
-        return self.radius * self.sweep
+        return self.piece.length
 
     def gap(self, other: "Feature") -> float:
         """Compute the smallest distance to another feature, m; 0 where they cross."""

@@ -17,6 +17,7 @@ from reference.meshing.edge_splitting import split_edges
 from reference.meshing.features import Feature, formulas_of_parts
 from reference.meshing.opening import doubled_nodes
 from verify.errors import UnsupportedSceneError
+from verify.geometry.curves import Arc, Segment
 from verify.geometry.planar import inside_polygon
 from verify.geometry.simplices import (
     boundary_facets,
@@ -64,9 +65,9 @@ def plane_interfaces(scene: Scene) -> list[Feature]:
         if middle is None:
             foot = centre + (offset - normal @ centre) * normal
             along = np.array([-normal[1], normal[0]])
-            curve = _line(foot - reach * along, 2 * reach * along)
+            curve = Segment(foot - reach * along, foot + reach * along).point
         else:
-            curve = _circle(middle, offset)
+            curve = Arc(middle, offset, 0.0, 2 * np.pi).point
         for low, high in _changes(scene, curve, outline, reach):
             if middle is None:
                 found.append(Feature(name, *curve(np.array([low, high]))))
@@ -156,18 +157,6 @@ def _same(
         return bool(apart < _EXACT * reach)
     sense = np.sign(n @ m)
     return bool(np.abs(n - sense * m).max() + abs(offset - sense * other_offset) / reach < _EXACT)
-
-
-def _line(start: Array, along: Array) -> Callable[[Array], Array]:
-    return lambda t: start + np.asarray(t)[:, None] * along
-
-
-def _circle(centre: Array, radius: float) -> Callable[[Array], Array]:
-    def point(t: Array) -> Array:
-        angle = 2 * np.pi * np.asarray(t)
-        return centre + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-    return point
 
 
 def _changes(

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict
 
 from verify.errors import InputError
 from verify.files import asked_place
-from verify.printable import shown
+from verify.result import checked
 from verify.scene import BodyForce, Scene
 from verify.scene.strict import nearest
 
@@ -188,16 +188,9 @@ def foreign_solver(name: str) -> ForeignSolver:
 def _read(path: Path) -> ForeignSolver:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-        return _RECORD.validate_python({"name": path.parent.name, **content})
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise InputError(f"{key}: {first['msg']}, not {shown(first['input'])}", str(path)) from None
     except ValueError as error:  # no TOML, or no text: the former with its line
         raise InputError(str(error), str(path)) from None
-
-
-_RECORD = TypeAdapter(ForeignSolver)
+    return checked(ForeignSolver, {"name": path.parent.name, **content}, "record", str(path))
 
 
 def write_template(folder: Path) -> list[Path]:

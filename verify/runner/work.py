@@ -208,9 +208,7 @@ class Work:
         return solves + len(self.comparing)
 
     def _prepare(self, plan: CasePlan) -> None:
-        folder = self.directory.case_folder(plan.scene.name)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_json(scene_content(plan.scene), folder / "scene.json")
+        self._restore(plan, ())
         for job, record in plan.refused:
             self._kept(job, record)
             self.progress.solved(job.label, record, reused=False)
@@ -342,7 +340,7 @@ class Work:
         return [record for record in records if record.status is Status.SOLVED]
 
     def _restore(self, plan: CasePlan, jobs: Sequence[Job]) -> None:
-        """Write anew what a solver may have removed or changed: the scene and the records."""
+        """Write the scene and records of jobs, anew if a solver has removed or changed them."""
         folder = self.directory.case_folder(plan.scene.name)
         folder.mkdir(parents=True, exist_ok=True)
         write_json(scene_content(plan.scene), folder / "scene.json")
