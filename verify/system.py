@@ -7,7 +7,7 @@ diagonal, whose own condition number is small.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,17 +119,9 @@ def critical_step(system: System) -> float:
         If there is no mass, or it is singular to round-off: the consistent mass of a strip much
         thinner than its elements.
     """
-    if system.mass is None:
-        raise InputError("the scene states no density")
-    free = _unknowns(system)
-    stiffness, mass = (csc_array(m)[free][:, free] for m in (system.stiffness, system.mass))
-    diagonal = mass.diagonal()
-    if not (diagonal > 0.0).all():
-        raise InputError("an unknown without mass: every step is too large")
-    scale = diags_array(1.0 / np.sqrt(diagonal))
-    mass, stiffness = (csc_array(scale @ one @ scale) for one in (mass, stiffness))
+    mass, stiffness = _scaled("mass", system, "every step is too large")
     lumped = np.abs((mass - diags_array(mass.diagonal())).data).max(initial=0.0) == 0.0
-    if len(free) > _DENSE:
+    if mass.shape[0] > _DENSE:
         largest = _largest_eigenvalue(stiffness, None if lumped else mass)
     else:
         dense = mass.toarray()
@@ -151,38 +143,49 @@ def lowest_frequency(system: System) -> float:
     InputError
         If there is no mass, an unknown without one, or a part that nothing holds.
     """
-    if system.mass is None:
-        raise InputError("the scene states no density")
-    free = _unknowns(system)
-    stiffness, mass = (csc_array(m)[free][:, free] for m in (system.stiffness, system.mass))
-    if not (stiffness.diagonal() > 0.0).all():
-        raise InputError("an unknown without stiffness: the matrix is singular")
-    scale = diags_array(1.0 / np.sqrt(stiffness.diagonal()))
-    mass, stiffness = (csc_array(scale @ one @ scale) for one in (mass, stiffness))
+    stiffness, mass = _scaled("stiffness", system, "the matrix is singular")
     try:
         inverse = LinearOperator(stiffness.shape, splu(stiffness).solve)
     except RuntimeError:
         raise InputError("a part that nothing holds: its lowest frequency is 0") from None
-    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
     # M x = μ K x: the largest μ belongs to the lowest frequency
-    common: dict[str, Any] = {"k": 1, "which": "LA", "return_eigenvectors": False, "v0": start}
-    largest = eigsh(mass, M=stiffness, Minv=inverse, tol=_LANCZOS, **common)[0]
+    largest = _largest(mass, M=stiffness, Minv=inverse)
     return float(1.0 / (2.0 * np.pi * np.sqrt(largest)))
+
+
+def _scaled(by: Literal["mass", "stiffness"], system: System, so: str) -> list[csc_array]:
+    """Scale mass and stiffness of the free unknowns to a unit diagonal of one, which is first."""
+    if system.mass is None:
+        raise InputError("the scene states no density")
+    free = _unknowns(system)
+    pair = [csc_array(one)[free][:, free] for one in (system.mass, system.stiffness)]
+    if by == "stiffness":
+        pair.reverse()
+    diagonal = pair[0].diagonal()
+    if not (diagonal > 0.0).all():
+        raise InputError(f"an unknown without {by}: {so}")
+    scale = diags_array(1.0 / np.sqrt(diagonal))
+    return [csc_array(scale @ one @ scale) for one in pair]
+
+
+def _largest(matrix: Any, tol: float = _LANCZOS, **given: Any) -> float:
+    """Largest eigenvalue by a Lanczos iteration."""
+    start = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    common: dict[str, Any] = {"k": 1, "which": "LA", "return_eigenvectors": False, "v0": start}
+    return float(eigsh(matrix, tol=tol, **common, **given)[0])
 
 
 def _largest_eigenvalue(stiffness: csc_array, mass: csc_array | None) -> float:
     """Of K x = λ M x, by a Lanczos iteration; M is the identity where it is not given."""
-    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
-    common: dict[str, Any] = {"k": 1, "which": "LA", "return_eigenvectors": False, "v0": start}
     if mass is None:
-        return float(eigsh(stiffness, tol=_LANCZOS, **common)[0])
+        return _largest(stiffness)
     try:
         inverse = LinearOperator(mass.shape, splu(mass).solve)
     except RuntimeError:
         _check_mass(0.0)
         raise
-    _check_mass(1.0 / float(eigsh(inverse, tol=0.1, **common)[0]))
-    return float(eigsh(stiffness, M=mass, Minv=inverse, tol=_LANCZOS, **common)[0])
+    _check_mass(1.0 / _largest(inverse, tol=0.1))
+    return _largest(stiffness, M=mass, Minv=inverse)
 
 
 def _check_mass(least: float) -> None:

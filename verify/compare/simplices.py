@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
-from verify.geometry.simplices import measures
+from verify.geometry.simplices import halves, measures, split_at_zeros
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -269,22 +269,8 @@ def split_at_level(corners: Array, level: Callable[[Array], Array]) -> tuple[Arr
     value = np.asarray(level(corners.reshape(-1, d)), dtype=float).reshape(m, count)
     size = np.abs(value).max(axis=1, keepdims=True, initial=0.0)
     value[np.abs(value) <= _ON * size] = 0.0
-    done, signs = [corners[:0]], [np.zeros(0)]
-    ends = np.array(list(combinations(range(count), 2)))
-    while len(corners):
-        crossing = value[:, ends[:, 0]] * value[:, ends[:, 1]] < 0.0
-        open_ = crossing.any(axis=1)
-        done.append(corners[~open_])
-        signs.append(np.where(value[~open_].sum(axis=1) < 0.0, -1.0, 1.0))
-        corners, value = corners[open_], value[open_]
-        i, j = ends[np.argmax(crossing[open_], axis=1)].T
-        rows = np.arange(len(corners))
-        a, b = value[rows, i], value[rows, j]
-        share = (a / (a - b))[:, None]
-        middle = (1.0 - share) * corners[rows, i] + share * corners[rows, j]
-        corners, value = _halves(corners, i, j, middle), np.vstack([value, value])
-        value[np.concatenate([rows, len(rows) + rows]), np.concatenate([i, j])] = 0.0
-    return np.concatenate(done), np.concatenate(signs)
+    corners, value, _ = split_at_zeros(corners, value)
+    return corners, np.where(value.sum(axis=1) < 0.0, -1.0, 1.0)
 
 
 def bisect(corners: Array, target: Callable[[Array], Array]) -> Array:
@@ -321,14 +307,5 @@ def divide(corners: Array, wanted: Callable[[Array, Array], NDArray[np.bool_]]) 
         done.append(corners[~open_])
         corners = corners[open_]
         i, j = ends[longest[open_]].T
-        rows = np.arange(len(corners))
-        corners = _halves(corners, i, j, 0.5 * (corners[rows, i] + corners[rows, j]))
+        corners = halves(corners, i, j, np.full(len(i), 0.5))
     return np.concatenate([*done, corners])
-
-
-def _halves(corners: Array, i: NDArray[np.int64], j: NDArray[np.int64], middle: Array) -> Array:
-    """Halve each simplex: `middle` replaces corner i in the first half, j in the second."""
-    rows = np.arange(len(corners))
-    first, second = corners.copy(), corners.copy()
-    first[rows, i], second[rows, j] = middle, middle
-    return np.concatenate([first, second])

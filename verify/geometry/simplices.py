@@ -70,6 +70,47 @@ def cell_facets(cells: Ints) -> Ints:
     return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
 
 
+def halves(corners: Array, i: Ints, j: Ints, share: Array) -> Array:
+    """Halves (2 m, k, d) of simplices at shares (m,) of their edges ij; the first m have corner i.
+
+    Corners i and j, (m,), are local numbers.
+    """
+    row = np.arange(len(i))
+    near, far = corners.copy(), corners.copy()
+    middle = (1.0 - share)[:, None] * corners[row, i] + share[:, None] * corners[row, j]
+    near[row, j] = far[row, i] = middle
+    return np.concatenate([near, far])
+
+
+def split_at_zeros(corners: Array, values: Array) -> tuple[Array, Array, Ints]:
+    """Divide simplices (m, k, d) along the zeros of functions (m, k) that are affine on each.
+
+    Returns
+    -------
+    corners : (n, k, d) array
+    values : (n, k) array
+        Of the functions, of one sign in each.
+    parent : (n,) int array
+        Which simplex it is a part of.
+    """
+    pairs = np.array(list(combinations(range(values.shape[1]), 2)))
+    done, parent = [], np.arange(len(corners))
+    while True:
+        with np.errstate(invalid="ignore"):
+            crossed = values[:, pairs[:, 0]] * values[:, pairs[:, 1]] < 0.0
+        some = crossed.any(axis=1)
+        done.append((corners[~some], values[~some], parent[~some]))
+        if not some.any():
+            break
+        i, j = pairs[crossed[some].argmax(axis=1)].T
+        row, values, parent = np.arange(len(i)), values[some], np.tile(parent[some], 2)
+        a, b = values[row, i], values[row, j]
+        corners, values = halves(corners[some], i, j, a / (a - b)), np.tile(values, (2, 1))
+        values[row, j] = values[len(row) + row, i] = 0.0
+    corners, values, parent = (np.concatenate(column) for column in zip(*done, strict=True))
+    return corners, values, parent
+
+
 def connected(count: int, first: Ints, second: Ints) -> Ints:
     """Label the components (count,) of a graph with edges from `first` (q,) to `second` (q,)."""
     from scipy.sparse import coo_array

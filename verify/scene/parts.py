@@ -17,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.geometry.simplices import feet, measures, nearest_parts, unit_normals
+from verify.geometry.simplices import (
+    feet,
+    halves,
+    measures,
+    nearest_parts,
+    split_at_zeros,
+    unit_normals,
+)
 from verify.result import Regularisation
 from verify.scene.geometry import Geometry
 from verify.scene.regions import Side, comparisons, is_affine, parse_region
@@ -195,37 +202,15 @@ def _refined(
         done.append(pieces[ready])
         found.append(np.where(np.abs(values) <= near, 0.0, values)[ready])
         pieces, longest = pieces[~ready], lengths[~ready].argmax(axis=1)
-        share = np.full(len(longest), 0.5)
-        pieces = _bisected(pieces, i[longest], j[longest], share)
+        parts = halves(pieces.barycentric, i[longest], j[longest], np.full(len(longest), 0.5))
+        pieces = Pieces(np.tile(pieces.facet, 2), parts)
     return sum(done[1:], done[0]), np.concatenate(found)
 
 
 def clipped(pieces: Pieces, values: Array) -> Pieces:
     """Divide simplices along the zeros of functions that are affine on each (r, k)."""
-    pairs = np.array(list(combinations(range(values.shape[1]), 2)))
-    done: list[Pieces] = []
-    while len(pieces.facet):
-        with np.errstate(invalid="ignore"):
-            crossed = values[:, pairs[:, 0]] * values[:, pairs[:, 1]] < 0.0
-        some = crossed.any(axis=1)
-        done.append(pieces[~some])
-        pieces, values = pieces[some], values[some]
-        i, j = pairs[crossed[some].argmax(axis=1)].T
-        row = np.arange(len(i))
-        a, b = values[row, i], values[row, j]
-        pieces = _bisected(pieces, i, j, a / (a - b))
-        values = np.concatenate([values, values])
-        values[row, j] = values[len(row) + row, i] = 0.0
-    return sum(done[1:], done[0]) if done else pieces
-
-
-def _bisected(pieces: Pieces, i: Ints, j: Ints, share: Array) -> Pieces:
-    """Halves of simplices at a share of their edges ij; the first have corner i, in order."""
-    row = np.arange(len(i))
-    near, far = pieces.barycentric.copy(), pieces.barycentric.copy()
-    middle = (1.0 - share)[:, None] * near[row, i] + share[:, None] * near[row, j]
-    near[row, j], far[row, i] = middle, middle
-    return Pieces(pieces.facet, near) + Pieces(pieces.facet, far)
+    parts, _, parent = split_at_zeros(pieces.barycentric, values)
+    return Pieces(pieces.facet[parent], parts)
 
 
 def _normal_projections(corners: Array) -> Array:
@@ -279,13 +264,16 @@ def _off_ridges(simplices: Array, boundary: Array, size: float) -> Array:
 def _ridges(boundary: Array) -> Array:
     """Where facets (b, k, d) of different directions meet: points (e, 1, d), segments (e, 2, d)."""
     count, k, d = boundary.shape
-    normals = unit_normals(boundary)
+    directions = boundary[:, 1] - boundary[:, 0]  # of segments, in space too
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    if k == 3:
+        directions = unit_normals(boundary)
     ends = boundary[:, list(combinations(range(k), k - 1))].reshape(-1, k - 1, d)
     _, node = np.unique(ends.reshape(-1, d), axis=0, return_inverse=True)
     keys = np.sort(node.reshape(-1, k - 1), axis=1)
     _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     facet = np.repeat(np.arange(count), k)
-    turn = 1.0 - np.abs(np.sum(normals[facet] * normals[facet[first[place.ravel()]]], axis=1))
+    turn = 1.0 - np.abs(np.sum(directions[facet] * directions[facet[first[place.ravel()]]], axis=1))
     return ends[first[np.unique(place.ravel()[turn > _STRAIGHT])]]
 
 
