@@ -156,21 +156,20 @@ def _to_realised(
 
 def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Array, Array, Flags]:
     """Measure points to a cut as asked: distances (n,), feet (n, d), whether it ends there (n,)."""
+    if isinstance(body, SolidBody):
+        found = [patch.nearest(points) for patch in body.cuts[cut]]
+        feet, rim = (np.array(column) for column in zip(*found, strict=True))
+        each = np.linalg.norm(points - feet, axis=2)
+        away, foot = each.min(axis=0), feet[each.argmin(axis=0), np.arange(len(points))]
+        nearest = each <= away + same
+        # an edge that two patches share is no end
+        return away, foot, (nearest & rim).any(axis=0) & (nearest.sum(axis=0) == 1)
     if isinstance(body, MembraneBody):
         ends = body.lines[cut].ends
         away, foot, _ = nearest_segments(points, ends)
     else:
-        pieces = body.cuts[cut]
-        feet = np.array([piece.foot(points) for piece in pieces])
-        each = np.linalg.norm(points - feet, axis=2)
-        away, foot = each.min(axis=0), feet[each.argmin(axis=0), np.arange(len(points))]
-    if isinstance(body, SolidBody):
-        nearest = each <= away + same
-        rim = np.array([patch.nearest(points)[1] for patch in body.cuts[cut]])
-        # an edge that two patches share is no end
-        return away, foot, (nearest & rim).any(axis=0) & (nearest.sum(axis=0) == 1)
-    if isinstance(body, Body):
         ends = np.array([piece.point(np.array([0.0, 1.0])) for piece in body.cuts[cut]])
+        away, foot, _ = distance_to_cut(body.cuts[cut], points)
     free = np.repeat(_free_faces(ends, body, same), 2, axis=1)
     end = distance_to_segments(points, free) <= away + same
     if isinstance(body, MembraneBody):  # the surfaces may be apart

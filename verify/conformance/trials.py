@@ -17,7 +17,7 @@ from verify.errors import InputError
 from verify.files import read_json, write_json
 from verify.processes import die_with_parent
 from verify.result import Status
-from verify.runner.child import Child, telling_line, watch
+from verify.runner.child import Child, death, telling_line, watch
 from verify.runner.solve import solve_job
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
@@ -98,7 +98,7 @@ def solve_trials(
     outcomes: dict[str, Outcome] = {}
     while waiting:
         child = _start(solver, parameters, waiting, folder / f"{label}-{len(waiting)}")
-        why, how = _watch(child, [folder / name for name in waiting], timeout)
+        how, why = _watch(child, [folder / name for name in waiting], timeout)
         while waiting and (folder / waiting[0] / "outcome.json").is_file():
             name = waiting.pop(0)
             outcomes[name] = _outcome(folder / name)
@@ -114,7 +114,7 @@ def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: P
     return Child("verify.conformance.trials", batch, log, _START_SECONDS, float("inf"), own=own)
 
 
-def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Status]:
+def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[Status, str]:
     """Wait for the end of a batch, and explain it as if it had been a death."""
     ready, done = child.log.with_suffix(".ready"), -1
 
@@ -129,10 +129,8 @@ def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Stat
     if not ready.exists():
         raise InputError(f"the solver could not be loaded: {telling_line(child.log)}")
     if ending.killed_for == "timeout":
-        return f"no answer after {timeout:g} s", Status.TIMEOUT
-    code = ending.returncode
-    how = f"signal {-code}" if code < 0 else f"exit code {code}"
-    return f"{telling_line(child.log)} ({how})", Status.FAILED
+        return Status.TIMEOUT, f"no answer after {timeout:g} s"
+    return death(child.log, ending, timeout, child.memory)
 
 
 def _answered(folders: list[Path]) -> int:
