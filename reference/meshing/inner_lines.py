@@ -17,7 +17,7 @@ from reference.meshing.edge_splitting import split_edges
 from reference.meshing.features import Feature, formulas_of_parts
 from reference.meshing.opening import doubled_nodes
 from verify.errors import UnsupportedSceneError
-from verify.geometry.curves import Arc, Segment
+from verify.geometry.curves import Arc
 from verify.geometry.planar import inside_polygon
 from verify.geometry.simplices import (
     boundary_facets,
@@ -65,7 +65,7 @@ def plane_interfaces(scene: Scene) -> list[Feature]:
         if middle is None:
             foot = centre + (offset - normal @ centre) * normal
             along = np.array([-normal[1], normal[0]])
-            curve = Segment(foot - reach * along, foot + reach * along).point
+            curve = _line(foot - reach * along, 2 * reach * along)
         else:
             curve = Arc(middle, offset, 0.0, 2 * np.pi).point
         for low, high in _changes(scene, curve, outline, reach):
@@ -91,7 +91,8 @@ def solid_interfaces(scene: Scene) -> list[Array]:
         if middle is not None:  # a sphere
             continue
         foot = centre + (offset - normal @ centre) * normal
-        across = frame(normal)[:2]
+        second, first, _ = frame(normal)
+        across = np.stack([first, -second])
         square = foot + reach * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across
         share = np.linspace(-1.0, 1.0, 65) * reach
         grid = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2)
@@ -157,6 +158,10 @@ def _same(
         return bool(apart < _EXACT * reach)
     sense = np.sign(n @ m)
     return bool(np.abs(n - sense * m).max() + abs(offset - sense * other_offset) / reach < _EXACT)
+
+
+def _line(start: Array, along: Array) -> Callable[[Array], Array]:
+    return lambda t: start + np.asarray(t)[:, None] * along
 
 
 def _changes(

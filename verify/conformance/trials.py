@@ -130,7 +130,7 @@ def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[Status, s
         raise InputError(f"the solver could not be loaded: {telling_line(child.log)}")
     if ending.killed_for == "timeout":
         return Status.TIMEOUT, f"no answer after {timeout:g} s"
-    return death(child.log, ending, timeout, child.memory)
+    return death(child.log, ending, timeout, float("inf"))
 
 
 def _answered(folders: list[Path]) -> int:
