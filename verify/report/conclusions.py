@@ -116,8 +116,9 @@ def _weighed(
 ) -> Found | None:  # fmt: skip
     """Say which of two is better from `factor` on: words for less, for no difference, for more.
 
-    At rest a difference of errors has to show over positions of the mesh (protocol). A run and a
-    study of positions that contradict each other support nothing.
+    A difference of errors has to show over positions of the mesh (protocol), in motion where they
+    were studied; else the sentence says their range. A run and a study that contradict each other
+    support nothing.
     """
     own = _claimed(evidence, kind, metric, solver, rival)
     if own is None:
@@ -126,10 +127,14 @@ def _weighed(
     shown = 0 if own.scatter is None else (own.scatter[1] > 1.0) - (own.scatter[2] < 1.0)
     if side and own.scatter is None and kind != "motion" and metric != "time":
         return None
+    hidden = bool(side) and own.scatter is not None and not shown
     if own.scatter is not None and shown != -side:
         side = shown and side
     needs = f"a difference of {factor:g}, to the same side over positions of the mesh if studied"
     text = words[side + 1].format(number(own.ratio, 2))
+    if own.scatter is not None and hidden:
+        middle, low, high = (number(value, 2) for value in own.scatter)
+        text += f" Over positions of the mesh it is {middle} ({low} to {high}): not told apart."
     return Found(text, own.written, needs, not side or shown in (0, side))
 
 
@@ -293,9 +298,10 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
              "XFEM needs no new mesh, but in motion its error is {} times a conforming mesh's."))),
         Sentence("motion, remeshed", "XFEM beside remeshing on three such scenes", partial(
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
-            factor=QUARTER, words=tuple(
-                f"Beside a new mesh for each cut {word} {{}} times its error." for word in (
-                    "it is more accurate,", "it is as accurate,", "it is less accurate,")))),
+            factor=QUARTER, words=(
+             "Beside a new mesh for each cut it is more accurate, {} times its error.",
+             "Its error is {} times that of a new mesh for each cut.",
+             "Beside a new mesh for each cut it is less accurate, {} times its error."))),
         Sentence("real time", "a blade in real time (`verify study thesis`)", _real_time),
         Sentence("sofa", "real time beside SOFA (`make bench`)", _sofa),
     ),
