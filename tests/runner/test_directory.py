@@ -179,6 +179,10 @@ def test_a_solve_that_was_refused_is_not_asked_for_again_by_the_same_code(verify
     again = verify(*command).stderr
     assert "RefusingLate · level 0: reused" in again
     assert (record.read_bytes(), result.read_bytes()) == (before, judged)
+    # left out without a try, as by --within
+    content = read_json(record)
+    record.write_text(json.dumps(content | {"record": content["record"] | {"wall": None}}))
+    assert "RefusingLate · level 0: refused" in verify(*command).stderr
     case.write_text(case.read_text().replace("young = 1.0", "young = 2.0"))
     assert "RefusingLate · level 0: refused" in verify(*command).stderr
 

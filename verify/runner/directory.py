@@ -220,7 +220,8 @@ def check_files(folder: Path) -> None:
 def stored_record(job: Job) -> SolveRecord | None:
     """Return the record of an earlier run of this very job: solved, its files whole, or refused.
 
-    The same code refuses the same scene again. What died or ran out of time may do better.
+    The same code refuses the same scene again. What died, ran out of time or was left out for want
+    of it (without a ``wall``) may do better.
     """
     try:
         content = read_json(job.folder / "record.json")
@@ -228,7 +229,8 @@ def stored_record(job: Job) -> SolveRecord | None:
         check_files(job.folder)
     except InputError:
         return None
-    whole = record.status is Status.REFUSED or (record.status is Status.SOLVED and content["files"])
+    refused = record.status is Status.REFUSED and record.wall is not None
+    whole = refused or (record.status is Status.SOLVED and content["files"])
     return record if content.get("key") == job.key and whole else None
 
 
