@@ -625,7 +625,7 @@ def complex_gradient(
 ) -> Array:
     """Compute gradients (n, 2, 2) of u_x + i u_y from 2μ times its derivatives by z and z̄ (n,).
 
-    `axes` (2, 2) are those of z, as rows.
+    The rows of `axes` (2, 2) are the axes of z.
     """
     along_x, along_y = (dz + dz_bar) / (2 * shear), 1j * (dz - dz_bar) / (2 * shear)
     rows = matrices([[along_x.real, along_y.real], [along_x.imag, along_y.imag]])

@@ -312,7 +312,7 @@ def _polygon_area(polygon: Array) -> float:
     return 0.5 * float(np.linalg.norm(np.cross(spokes[1:-1], spokes[2:]).sum(axis=0)))
 
 
-_AT_ONCE = 2**14  # pairs of a point and a part: what is made of them stays in the cache
+_AT_ONCE = 2**14  # pairs of a point and a part: their arrays stay in the cache
 
 
 def shares(points: Array, starts: Array, ends: Array) -> Array:

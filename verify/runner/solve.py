@@ -54,8 +54,8 @@ def solve_job(
 ) -> dict[str, Any]:
     """Solve and `store`; every way to fail is an outcome with its reason.
 
-    Only a solve that is `timed` has its critical step asked for and, if repeated often enough that
-    anybody states its speed, the machine timed beside it.
+    Only a solve that is `timed` computes its critical step. The machine is timed beside it if
+    it is repeated often enough that anybody states its speed.
     """
     try:
         return _solved(job, folder, store, timed)
