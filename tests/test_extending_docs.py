@@ -82,7 +82,7 @@ within = 0.1
 """
 
 
-# in a process that finds what is installed in its folder; its own are forked from it
+# in a process that finds the packages installed in its folder; its own are forked from it
 INSTALLED = """
 from verify.cli import main
 for words in {lines}:

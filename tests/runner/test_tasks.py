@@ -60,7 +60,7 @@ def guest(monkeypatch, found_by_name):
 
 
 def test_every_call_is_answered_in_order_and_made_once(tmp_path, guest, monkeypatch):
-    """What was broken off goes on with what is missing."""
+    """A study that was broken off goes on with the rest."""
     log, said = tmp_path / "log", []
 
     def stop(text):
