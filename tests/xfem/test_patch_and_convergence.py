@@ -44,7 +44,7 @@ def test_a_thin_strip_that_bends_is_factorised_where_iterations_do_not_end():
     held = xfem.Supports.none(phantom).prescribe(phantom, np.flatnonzero(mesh.points[:, 0] == 0.0))
     load = xfem.body_force(phantom, (0.0, 0.0, -1.0))
     material = xfem.isotropic(1e4, 0.3, "solid")
-    solution = xfem.solve_static(phantom, material, held, load)
+    solution = xfem.solve_static(phantom, material, held, load, kernels=FAST)
     assert phantom.node_count > 2000
     assert solution.solver == "direct"
     work = np.sum(load * solution.displacement)
