@@ -54,7 +54,7 @@ def test_a_check_without_a_solver_is_made_of_each_that_is_asked_and_does_not_ref
     again = verify(*BESIDE, "--judge", INSTANT)
     assert list(verdicts(again)) == [INSTANT]
     assert again.returncode == 0
-    assert again.stderr.count("reused") == 4
+    assert again.stderr.count("reused") == 5  # four solves and a refusal
     none = verify(*BESIDE, "--judge", "fake_solvers:Wrnog")
     assert none.returncode == 2
     assert "--judge: solver 'fake_solvers:Wrnog' is not asked; did you mean" in none.stderr
