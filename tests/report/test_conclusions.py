@@ -307,7 +307,7 @@ def test_who_misses_a_part_of_the_body_is_marked_and_never_the_least():
     assert of["conforming P1 mesh=remeshed"][0] == " **1** "
     figure = figures(evidence)["Accuracy at a tip"]
     assert f"{FUNCTIONS}†" in figure.alt
-    assert "† a part of the body is missing" in figure.body
+    assert "† a part is missing" in figure.body
 
 
 def test_who_answers_no_scene_is_named_with_the_reasons(tmp_path):

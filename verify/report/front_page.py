@@ -162,11 +162,9 @@ def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
         for name, own in found if 1 / _FAR <= own.ratio <= _FAR
     ]  # fmt: skip
     rows.sort(key=lambda row: row.value)
-    over = (
-        "90 % over positions of the mesh (* range over scenes)" if studied else "range over scenes"
-    )
+    over = "90 % over mesh positions (* over scenes)" if studied else "range over scenes"
     if any(MISSING in row.name for row in rows):
-        over += f"; {MISSING} a part of the body is missing"
+        over += f"; {MISSING} a part is missing"
     title = f"{_SCENES[kind]}: error over a conforming mesh's"
     return ranges(title, f"median, {over}", rows, Palette(), 1.0, (1 / _FAR, _FAR))
 
