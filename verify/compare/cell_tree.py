@@ -360,7 +360,7 @@ def _holding_in_numpy(
     points: Floats, directions: Floats, sided: bool, wanted: NDArray[np.int8],
     searched: SearchedCells, sides: NDArray[np.int8], tolerance: float, found: Ints,
 ) -> None:  # fmt: skip
-    """Do as `_containing` for all points at once, first for some: others share their cells."""
+    """Do as `_containing` for all points at once, first in the cells of the nearest centres."""
     _, _, cells, corners, normals, centres = searched
     offsets = np.einsum("mka,mka->mk", normals, np.roll(corners, -1, axis=1))
 

@@ -88,13 +88,15 @@ def evaluate_quadratic(
     `origins` and `first` (m, d) place and value of the first corners.
     """
     n, d = points.shape
-    if not COMPILED:
-        parts = [slice(start, start + _AT_ONCE) for start in range(0, n, _AT_ONCE)]
-        given = [(points[s] - origins[found[s]], found[s]) for s in parts]
-        both = [_quadratic_in_numpy(x, first[cell], bends[cell], slopes[cell]) for x, cell in given]
-        u, grad = zip(*both, strict=True) if both else ([points], [np.empty((0, d, d))])
-        return np.concatenate(u), np.concatenate(grad)
     u, grad = np.empty((n, d)), np.empty((n, d, d))
+    if not COMPILED:
+        for start in range(0, n, _AT_ONCE):
+            here = slice(start, start + _AT_ONCE)
+            cell = found[here]
+            u[here], grad[here] = _quadratic_in_numpy(
+                points[here] - origins[cell], first[cell], bends[cell], slopes[cell]
+            )
+        return u, grad
     across = axes_of(slopes.shape[1])  # of a triangle in space there are two
     _evaluate_quadratic(points, found, origins, first, bends, slopes, axes_of(d), across, u, grad)
     return u, grad
