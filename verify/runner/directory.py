@@ -230,7 +230,7 @@ def stored_record(job: Job) -> SolveRecord | None:
     except InputError:
         return None
     refused = record.status is Status.REFUSED and record.wall is not None
-    whole = refused or (record.status is Status.SOLVED and content["files"])
+    whole = refused or (record.status is Status.SOLVED and content.get("files"))
     return record if content.get("key") == job.key and whole else None
 
 
