@@ -159,7 +159,7 @@ def _comparison() -> None:
         still, gradients = np.zeros((1, *mesh.points.shape)), np.zeros((1, mesh.space, mesh.space))
         difference_squares(gradients, gradients)
         kinetic(Solution(mesh.points, mesh.cells, still, velocity=still), 1.0)
-        distance_to_segments(points, np.stack([points, points], axis=1))
+        distance_to_segments(points, np.stack([points, points], axis=1), 1.0)
     nowhere = np.zeros((0, 2))
     area_rule(Body((np.eye(3, 2),), {}, [], nowhere, nowhere), 1.0)
     sheet = _flat_membrane()

@@ -96,15 +96,15 @@ class Body:
         """Tell whether points (n, 2) lie inside the body."""
         return _inside(points, self.loops)
 
-    def tip_distance(self, points: Array) -> Array:
-        """Compute the distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
-        return np.asarray(distance_to_segments(points, self.tips[:, None].repeat(2, axis=1)))
+    def tip_distance(self, points: Array, within: float) -> Array:
+        """Measure distances (n,) of points (n, 2) to the nearest tip, as `distance_to_segments`."""
+        return distance_to_segments(points, self.tips[:, None].repeat(2, axis=1), within)
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Find nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""
         pieces = [piece for cut in self.cuts.values() for piece in cut]
         foot = distance_to_cut(pieces, points)[1]
-        return foot, self.tip_distance(foot) <= 1e-10 * self.size
+        return foot, self.tip_distance(foot, tight := 1e-10 * self.size) <= tight
 
 
 AnyBody = Body | SolidBody | MembraneBody

@@ -357,7 +357,7 @@ def _cells(body: SimplexBody, spacing: float, seed: int, depth: float, grading: 
     if len(body.front):
 
         def near_front(c: Array) -> Array:
-            away = body.tip_distance(c.mean(axis=1))
+            away = body.tip_distance(c.mean(axis=1), spacing / grading)
             return _DIAGONAL * np.clip(grading * away, depth * spacing, spacing)
 
         cells = bisect(cells, near_front)

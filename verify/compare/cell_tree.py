@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from verify.compare.cell_walk import Walk
 from verify.compiled import COMPILED, njit
 
 LEAF = 4  # cells per leaf
-# In numpy: points at once, centres of cells that are tried, share of points that is worth a tree
-_AT_ONCE, _TRIED, _WORTH = 1 << 15, 4, 0.125
+_AT_ONCE, _WORTH = 1 << 15, 0.125  # in numpy: points at once; points per cell that are worth a walk
 # Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
 _SPREAD = {
     2: (
@@ -360,33 +360,23 @@ def _holding_in_numpy(
     points: Floats, directions: Floats, sided: bool, wanted: NDArray[np.int8],
     searched: SearchedCells, sides: NDArray[np.int8], tolerance: float, found: Ints,
 ) -> None:  # fmt: skip
-    """Do as `_containing` for all points at once, first in the cells of the nearest centres."""
+    """Do as `_containing` for all points at once: by a walk first, where it is worth its start."""
     _, _, cells, corners, normals, centres = searched
-    offsets = np.einsum("mka,mka->mk", normals, np.roll(corners, -1, axis=1))
+    walk, kept = Walk(corners, normals), cells[cells >= 0]
 
-    def fitting(rows: Ints, held: Ints) -> tuple[Floats, NDArray[np.bool_]]:
-        """Give depths (n,) of points in cells, and whether the cells are on their sides."""
-        depth, agreed = np.full(len(rows), np.inf), np.ones(len(rows), dtype=bool)
-        for k in range(offsets.shape[1]):  # facet by facet: three times as fast
-            along = np.einsum("na,na->n", normals[held, k], points[rows])
-            np.minimum(depth, along - offsets[held, k], out=depth)
+    def agreed(row: Ints, cell: Ints) -> NDArray[np.bool_]:
+        """Tell whether cells are on the sides that points wish for."""
+        good = np.ones(len(row), dtype=bool)
         for c in range(wanted.shape[1]):
-            agreed &= wanted[rows, c] * sides[held, c] >= 0
-        return depth, agreed
+            good &= wanted[row, c] * sides[cell, c] >= 0
+        return good
 
-    kept = cells[cells >= 0]
     if len(points) > _WORTH * len(kept) > 0:
-        beside = cKDTree(centres[kept], balanced_tree=False, compact_nodes=False)
-        for nearest in range(1, min(_TRIED, len(kept)) + 1):
-            rows = np.flatnonzero(found < 0)
-            cell = kept[beside.query(points[rows], [nearest])[1][:, 0]]
-            depth, agreed = fitting(rows, cell)
-            there = agreed & (depth > tolerance)
-            found[rows[there]] = cell[there]
+        found[:] = walk.to(points, kept, agreed, tolerance)
     near = near_points(points, tolerance)
     for row, cell in pairs_met(searched, corners, np.flatnonzero(found < 0), near):
-        depth, there = fitting(row, cell)
-        there &= depth >= -tolerance
+        depth = walk.depth(points[row].T, cell)[0]
+        there = (depth >= -tolerance) & agreed(row, cell)
         row, cell, depth = row[there], cell[there], depth[there]
         inside = depth > tolerance
         on_side = inside

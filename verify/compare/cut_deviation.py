@@ -148,7 +148,7 @@ def _to_realised(
     free = _free_faces(facets, body, same)
     away, foot, nearest = _nearest_facets(points, facets, same)
     to_face = free if facets.shape[1] == 3 else np.repeat(free, 2, axis=1)
-    end = distance_to_segments(points, to_face) <= away + same
+    end = distance_to_segments(points, to_face, away.max(initial=0.0) + same) <= away + same
     if isinstance(body, MembraneBody) and normals is not None:  # the surfaces may be apart
         away = np.abs(np.sum((points - foot) * normals, axis=1))
     return away, end, nearest
@@ -171,7 +171,7 @@ def _to_asked(points: Array, body: AnyBody, cut: str, same: float) -> tuple[Arra
         ends = np.array([piece.point(np.array([0.0, 1.0])) for piece in body.cuts[cut]])
         away, foot, _ = distance_to_cut(body.cuts[cut], points)
     free = np.repeat(_free_faces(ends, body, same), 2, axis=1)
-    end = distance_to_segments(points, free) <= away + same
+    end = distance_to_segments(points, free, away.max(initial=0.0) + same) <= away + same
     if isinstance(body, MembraneBody):  # the surfaces may be apart
         away = distance_to_cut(body.cuts[cut], points)[0]
     return away, foot, end

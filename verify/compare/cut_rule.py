@@ -80,8 +80,8 @@ def cut_rule(body: Body, spacing: float) -> CutRule:
     found = []
     for part in body.parts:
         ends = np.array([part.start, part.end])
-        away = distance_to_segments(part.piece.point(ends), np.stack([body.singular] * 2, axis=1))
-        at_end = away <= 1e-12 * body.size
+        singular, tight = np.stack([body.singular] * 2, axis=1), 1e-12 * body.size
+        at_end = distance_to_segments(part.piece.point(ends), singular, tight) <= tight
         t, weights, away = along_cut(ends, part.piece.length, at_end, body.size, spacing)
         points = part.piece.point(t)
         found.append(CutRule.beside(points, weights, part.piece.facing(points), away))
@@ -145,7 +145,8 @@ def membrane_cut_rule(body: MembraneBody, spacing: float) -> CutRule:
     """
     found = []
     for lines in body.lines.values():
-        at_tip = body.tip_distance(lines.ends.reshape(-1, 3)).reshape(-1, 2) <= 1e-9 * body.size
+        from_tip = body.tip_distance(lines.ends.reshape(-1, 3), tight := 1e-9 * body.size)
+        at_tip = from_tip.reshape(-1, 2) <= tight
         for k, (ends, length) in enumerate(zip(lines.ends, lines.lengths, strict=True)):
             t, weights, away = along_cut(_WHOLE, length, at_tip[k], body.size, spacing)
             points = ends[0] + t[:, None] * (ends[1] - ends[0])
@@ -261,7 +262,7 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
         sizes = size(some)
         target = np.full(len(some), spacing)
         if len(body.front):
-            away = body.tip_distance(patch.point(some.mean(axis=1)))
+            away = body.tip_distance(patch.point(some.mean(axis=1)), spacing)
             target = np.clip(away, depth * spacing, spacing)
         too_large = sizes > target
         if border < np.inf:

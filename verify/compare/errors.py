@@ -230,7 +230,7 @@ def near_radius(body: AnyBody) -> float:
         for part in body.parts:
             lengths[part.cut] += (part.end - part.start) * part.piece.length
             ends = part.piece.point(np.array([part.start, part.end]))
-            if (body.tip_distance(ends) <= 1e-10 * body.size).any():
+            if near_tip(body, ends, 1e-10 * body.size).any():
                 tipped.add(part.cut)
         return NEAR * min(lengths[cut] for cut in tipped)
     if isinstance(body, MembraneBody):
@@ -243,13 +243,7 @@ def near_radius(body: AnyBody) -> float:
 
 def near_tip(body: AnyBody, points: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
     """Tell whether points (n, d) are nearer to a tip or front than `radius` m."""
-    near = np.zeros(len(points), dtype=bool)
-    ends = body.tips if isinstance(body, Body) else body.front.reshape(-1, 3)
-    if len(ends):  # most points are farther off than the box around all tips
-        low, high = ends.min(axis=0) - radius, ends.max(axis=0) + radius
-        (some,) = np.nonzero(((points >= low) & (points <= high)).all(axis=1))
-        near[some] = body.tip_distance(points[some]) < radius
-    return near
+    return np.asarray(body.tip_distance(points, radius) < radius)
 
 
 def _lengths_with_tip(body: MembraneBody) -> list[float]:
@@ -257,7 +251,7 @@ def _lengths_with_tip(body: MembraneBody) -> list[float]:
     return [
         float(lines.lengths.sum())
         for lines in body.lines.values()
-        if (body.tip_distance(lines.ends.reshape(-1, 3)) <= 1e-9 * body.size).any()
+        if near_tip(body, lines.ends.reshape(-1, 3), 1e-9 * body.size).any()
     ]
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from verify.compare.cell_tree import axes_of
 from verify.compiled import COMPILED, njit
@@ -19,9 +20,19 @@ AskedCut = Sequence[Piece | Patch]
 _Floats = NDArray[np.float64]
 
 
-def distance_to_segments(points: _Floats, segments: _Floats) -> _Floats:
-    """Measure distances (n,) of points (n, d) to the nearest segment (k, 2, d)."""
-    return nearest_segments(points, segments)[0]
+def distance_to_segments(points: _Floats, segments: _Floats, within: float) -> _Floats:
+    """Measure distances (n,) of points (n, d) to the nearest segment (k, 2, d), m.
+
+    Of points farther than `within` m it may be infinite: most are far from all, and left out.
+    """
+    distance = np.full(len(points), np.inf)
+    if len(segments):
+        longest = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max()
+        reach = (within + 0.5 * longest) * (1.0 + 1e-9)
+        middles = cKDTree(segments.mean(axis=1))
+        rows = np.isfinite(middles.query(points, distance_upper_bound=reach)[0])
+        distance[rows] = nearest_segments(points[rows], segments)[0]
+    return distance
 
 
 def nearest_segments(

@@ -74,9 +74,9 @@ class SimplexBody:
         """Whether anything is cut."""
         return bool(self.cuts)
 
-    def tip_distance(self, points: Array) -> Array:
-        """Compute the distance (n,) of points (n, 3) to the nearest front; infinite without one."""
-        return distance_to_segments(points, self.front)
+    def tip_distance(self, points: Array, within: float) -> Array:
+        """Measure distances (n,) of points (n, 3) to the nearest front: `distance_to_segments`."""
+        return distance_to_segments(points, self.front, within)
 
     def frames_at(self, points: Array) -> Array | None:
         """Return tangents and normal (n, 3, 3) of a surface at points (n, 3); None of a solid."""
@@ -364,7 +364,7 @@ class MembraneBody(SimplexBody):
         """Find nearest points (n, 3) on the lines of the cuts, and whether they are tips (n,)."""
         ends = np.concatenate([lines.ends for lines in self.lines.values()])
         _, foot, _ = nearest_segments(points, ends)
-        return foot, self.tip_distance(foot) <= _SAME * self.size
+        return foot, self.tip_distance(foot, tight := _SAME * self.size) <= tight
 
 
 def membrane_of(scene: Scene) -> MembraneBody:
