@@ -190,6 +190,8 @@ class Beside:
         Median and 90 % range over positions of the mesh; None where they were not studied.
     meshes : int
         Ratios behind it.
+    outcomes : tuple of int
+        Scenes won, tied and lost.
     """
 
     ratio: float
@@ -198,10 +200,24 @@ class Beside:
     count: int
     scatter: tuple[float, float, float] | None = None
     meshes: int = 0
+    outcomes: tuple[int, int, int] = (0, 0, 0)
 
     def within(self, least: float, most: float) -> bool:
         """Whether the medians over scenes and over mesh positions lie between two numbers."""
         return all(least <= middle <= most for middle in (self.ratio, *(self.scatter or ())[:1]))
+
+    @property
+    def over_scenes(self) -> str:
+        """The ratio with its range over scenes."""
+        return f"{number(self.ratio, 2)} ({number(self.low, 2)} to {number(self.high, 2)})"
+
+    @property
+    def over_positions(self) -> str:
+        """The ratio over positions of the mesh, as words; none where they were not studied."""
+        if self.scatter is None:
+            return ""
+        middle, low, high = (number(value, 2) for value in self.scatter)
+        return f" Over positions of the mesh it is {middle} ({low} to {high})"
 
     @property
     def written(self) -> str:
@@ -210,6 +226,8 @@ class Beside:
             f"{number(self.ratio, 3)} [{number(self.low, 3)}, {number(self.high, 3)}] over "
             f"{self.count} scene{'s' if self.count != 1 else ''}"
         )
+        if any(self.outcomes):
+            text += " ({} won, {} tied, {} lost)".format(*self.outcomes)
         if self.scatter is None:
             return f"{text}; mesh scatter not studied"
         middle, low, high = (number(v, 3) for v in self.scatter)
@@ -242,7 +260,8 @@ def beside(
     if len(ratios):
         middle, low, high = (float(v) for v in np.quantile(ratios, [0.5, 0.05, 0.95]))
         scatter = middle, low, high
-    return Beside(pair.ratio, pair.low, pair.high, pair.count, scatter, len(ratios))
+    outcomes = pair.wins, pair.ties, pair.losses
+    return Beside(pair.ratio, pair.low, pair.high, pair.count, scatter, len(ratios), outcomes)
 
 
 def _is(kind: str, moving: bool, tip: bool) -> bool:

@@ -80,7 +80,7 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
 
 def combined(evidence: Evidence) -> list[str]:
     """Return the lines of a table of what scenes combine; where no scene does, nothing is known."""
-    lines = ["What no scene combines is not compared (sweeps count once):", "",
+    lines = ["Scenes by what they combine, a sweep counted once; of **none** nothing is known:", "",
              f"| scenes | {' | '.join(_KINDS)} |", "|---" * (len(_KINDS) + 1) + "|"]  # fmt: skip
     for where, dimension in (("plane", 2), ("space", 3)):
         for mechanics in _MECHANICS:
@@ -159,7 +159,7 @@ def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
     rows = [
         Ranged(name + ("*" if studied and not own.scatter else ""),
                *(own.scatter or (own.ratio, own.low, own.high)))
-        for name, own in found if 1 / _FAR <= own.ratio <= _FAR
+        for name, own in found if 1 / _FAR <= _middle(own) <= _FAR
     ]  # fmt: skip
     rows.sort(key=lambda row: row.value)
     over = "90 % over mesh positions (* over scenes)" if studied else "range over scenes"
@@ -169,14 +169,18 @@ def _ratios(evidence: Evidence, kind: str) -> Drawing | None:
     return ranges(title, f"median, {over}", rows, Palette(), 1.0, (1 / _FAR, _FAR))
 
 
+def _middle(own: Beside) -> float:
+    return own.scatter[0] if own.scatter else own.ratio
+
+
 def _differences(evidence: Evidence, kind: str) -> list[str]:
     """Say which differences positions of the mesh show, and which ratios are off the scale."""
     found = list(_compared(evidence, kind))
     shown = {
         "less accurate": [n for n, own in found if own.scatter and own.scatter[1] > 1.0],
         "more accurate": [n for n, own in found if own.scatter and own.scatter[2] < 1.0],
-        "beyond the axis": [f"{n} ({number(own.ratio, 2)})" for n, own in found
-                            if not 1 / _FAR <= own.ratio <= _FAR],
+        "beyond the axis": [f"{n} ({number(_middle(own), 2)} times the error)" for n, own in found
+                            if not 1 / _FAR <= _middle(own) <= _FAR],
     }  # fmt: skip
     told = [f"{what}: {', '.join(names)}" for what, names in shown.items() if names]
     text = "; ".join(told)
