@@ -28,11 +28,11 @@ _NAMED = 6  # curves of a plot; further ones are grey
 _FIRST = ("xfem", MEASURE, "conforming mesh=remeshed")  # of the named ones
 _LEGEND = (
     "Relative L² error of the displacement over the least error of the scene, at equal element "
-    "size. **Bold**: the interval overlaps that of the best. In brackets: 90 % range of the ratio "
-    "over positions of the mesh on level 1, where they were studied; where orders differ, ratios "
-    "grow with the level. – refused with a reason; × asked, and "
-    "not solved; blank: not asked. ≈ the reference cannot tell the error from none. Several "
-    "members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶. "
+    "size, on the finest level. **Bold**: the interval overlaps that of the best. After the "
+    "semicolon: median and 90 % range of the ratio over positions of the mesh on level 1, where "
+    "they were studied; where orders differ, ratios grow with the level. – refused with a reason; "
+    "× asked, and not solved; blank: not asked. ≈ the reference cannot tell the error from none. "
+    "Several members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶. "
     f"{MISSING} A part of the body is missing, which is softer; linear elements are stiffer, and "
     "the errors can cancel: it is never the least."
 )
@@ -126,7 +126,8 @@ def _cell(
             return "≈" if found.ties else "not exact"
         text = number(found.ratio, 2)
         if scatter:
-            text += f" [{number(scatter[0], 2)}, {number(scatter[1], 2)}]"
+            middle, low, high = (number(value, 2) for value in scatter)
+            text += f"; {middle} [{low}, {high}]"
         text += MISSING * misses_material(members, name)
         return f"**{text}**" if found.ties >= max(found.wins, found.losses) else text
     statuses = {s.status for r in members for s in r.solves if s.solver in group}
@@ -165,15 +166,14 @@ def _least(members: Sequence[CaseResult], best: str | None) -> str:
 
 def _scatter(
     evidence: Evidence, members: Sequence[CaseResult], name: str, best: str
-) -> tuple[float, float] | None:
-    """Return the 90 % range of a ratio over positions of the mesh, if this scene was studied."""
+) -> list[float] | None:
+    """Return median and 90 % range of a ratio over positions of the mesh, if it was studied."""
     cases = {result.case for result in members}
     rows = evidence.benchmark_positions
     ratios = mesh_ratios(rows, METRIC, name, best, cases.__contains__)
     if not ratios:
         return None
-    low, high = np.quantile(ratios, [0.05, 0.95])
-    return float(low), float(high)
+    return [float(value) for value in np.quantile(ratios, [0.5, 0.05, 0.95])]
 
 
 def time_plot(label: str, members: Sequence[CaseResult]) -> Drawing | None:

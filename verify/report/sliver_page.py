@@ -26,6 +26,7 @@ _SCALED = "condition number scaled by the diagonal"
 _FREQUENCY, _MEASURE = "lowest natural frequency", "conforming"
 _UNKNOWNS = "unknowns of the system"
 _ERRORS = {"displacement_l2": "displacement, L²", "energy_norm": "energy norm"}
+_OF_SWEEPS = {**_ERRORS, "jump_l2": "jump across the cut, L²"}
 _DRAWN = ("condition number", _SCALED, _STEP)
 _KEPT = 0.9  # of the step, as in the findings: a tenth is what its safety factor takes
 _ALIKE = 0.05  # by which errors differ with the position of a mesh: less is no difference
@@ -117,9 +118,11 @@ def _shares(measured: Records, family: str, solver: str) -> list[tuple[float, fl
     return [(step / whole, size) for size, step in steps.items()] if whole else []
 
 
-def _ratios(measured: Records, family: str, solver: str, quantity: str) -> dict[float, float]:
-    """Return values over the conforming ones, by ε."""
-    own, others = (_values(measured, family, s, quantity) for s in (solver, _MEASURE))
+def _ratios(
+    measured: Records, family: str, solver: str, quantity: str, rival: str = _MEASURE
+) -> dict[float, float]:
+    """Return values over those of another solver, by ε."""
+    own, others = (_values(measured, family, s, quantity) for s in (solver, rival))
     return {size: value / others[size] for size, value in own.items() if others.get(size)}
 
 
@@ -133,24 +136,34 @@ def _swept(solvers: Sequence[str] | dict[str, None]) -> tuple[str, dict[str, flo
 
 
 def _lead_of_sweep(measured: Records, name: str, values: Mapping[str, float]) -> Lead | None:
-    """Return the largest error over ε against the number over the conforming one."""
+    """Return the largest error over ε against the number, over that at its least value."""
     families = dict.fromkeys(m["family"] for m in measured)
-    worst: dict[str, dict[float, float]] = {error: {} for error in _ERRORS}
-    for label, value in sorted(values.items(), key=lambda item: item[1]):
+    worst: dict[str, dict[float, float]] = {error: {} for error in _OF_SWEEPS}
+    labels = sorted(values, key=lambda label: values[label])
+
+    def most(label: str, error: str, rival: str) -> float:
+        own = [r for f in families for r in _ratios(measured, f, label, error, rival).values()]
+        return max(own, default=0.0)
+
+    for label in labels:
         for error, own in worst.items():
-            found = [r for f in families for r in _ratios(measured, f, label, error).values()]
-            if found:
-                own[value] = max(found)
+            if found := most(label, error, labels[0]):
+                own[values[label]] = found
     worst = {error: own for error, own in worst.items() if len(own) >= _SWEPT}
     if not worst:
         return None
-    palette, title = Palette(), "largest error over ε, over that of the conforming mesh"
-    series = [Series(_ERRORS[error], list(own.items())) for error, own in worst.items()]
+    first = f"{name} = {values[labels[0]]:g}"
+    palette, title = Palette(), f"largest error over ε, over that at {first}"
+    series = [Series(_OF_SWEEPS[error], list(own.items())) for error, own in worst.items()]
+    beside = ", ".join(
+        f"{_OF_SWEEPS[error]} {number(most(labels[0], error, _MEASURE), 3)}" for error in worst
+    )
     question = _QUESTIONS.get(name, f"What does {name} do to the error?")
     return Lead(
         question, _said_of_sweep(name, worst), [loglog(title, name, series, palette)],
         f"{len(values)} values of {name}; each point is the largest over ε of "
-        f"{_listed(list(families))}.",
+        f"{_listed(list(families))}. At {first}, over a conforming mesh of the same size, at most: "
+        f"{beside}.",
     )  # fmt: skip
 
 
@@ -160,17 +173,18 @@ def _said_of_sweep(name: str, worst: Mapping[str, Mapping[float, float]]) -> lis
     most = {v: max(own.get(v, 0.0) for own in worst.values()) for v in values}
     bad = [value for value in values if most[value] > 1.0 + _ALIKE]
     good = [value for value in values if not bad or value < bad[0]]
-    if not good:
-        return [f"No value of {name} leaves the error within {_ALIKE:.0%} of a conforming mesh's."]
-    off = max(most[value] for value in good) - 1.0
-    said = [
-        f"Up to {name} = {good[-1]:g} it costs nothing: at every ε the error is at most "
-        f"{100 * max(off, 0.0):.1f} % above that of a conforming mesh of the same size."
-    ]
+    if len(good) < 2:
+        said = [f"Every {name} above the least, {values[0]:g}, adds more than {_ALIKE:.0%}."]
+    else:
+        off = max(most[value] for value in good) - 1.0
+        said = [
+            f"Up to {name} = {good[-1]:g} it costs nothing: at every ε no error is more than "
+            f"{100 * max(off, 0.0):.1f} % above that at {values[0]:g}."
+        ]
     if not bad:
         return [*said, f"Larger values were not tried: {values[-1]:g} is the last."]
     parts = [
-        f"{_ERRORS[error]}: {_times(own[bad[0]])} at {bad[0]:g}, {_times(own[values[-1]])} at "
+        f"{_OF_SWEEPS[error]}: {_times(own[bad[0]])} at {bad[0]:g}, {_times(own[values[-1]])} at "
         f"{values[-1]:g}"
         for error, own in worst.items()
         if bad[0] in own and values[-1] in own
@@ -180,7 +194,11 @@ def _said_of_sweep(name: str, worst: Mapping[str, Mapping[float, float]]) -> lis
     return [
         *said,
         f"From {bad[0]:g} on it locks: {'; '.join(parts)}."
-        + (" There it no longer grows." if flat and len(bad) > 1 else ""),
+        + (
+            f" Beyond {values[-2]:g} no error grows by more than {_ALIKE:.0%}."
+            if flat and len(bad) > 1
+            else ""
+        ),
     ]
 
 

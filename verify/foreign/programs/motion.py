@@ -102,8 +102,11 @@ def _uniform(case, load):
 def _opening(case):
     """Return the time (N,) at which a node parts from its twins; −∞ without one.
 
-    It does when the last facet of a cut there is open: behind a blade no node opens early.
+    It does when the last facet of a cut there is open: behind a blade no node opens early. Where a
+    background mesh is cut, the case says it itself.
     """
+    if hasattr(case, "opening"):
+        return case.opening()
     facets = np.array(case.problem["cut_facets"]).reshape(-1, case.dimension)
     times = np.repeat(case.problem["cut_opens"], case.dimension)
     both = np.concatenate([case.points, facets])

@@ -46,6 +46,13 @@ class PartedCase:
         self.forms = forms
         self.timings = {}
 
+    def opening(self):
+        """Return the time (N,) at which a node parts from its twin; −∞ without one."""
+        _, place = np.unique(self.points, axis=0, return_inverse=True)
+        twins = np.bincount(place.ravel())[place.ravel()] > 1
+        times = [cut["opens_at"] for cut in self.content["cuts"]]  # all alike
+        return np.where(twins, max(times, default=0.0), -np.inf)
+
     def held(self, time=0.0):
         """Which components of which values are held, and by how much at a time."""
         return tuple(field[self.used] for field in prescribed(self._case, self._body, time))
