@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from cut_meshes import grid, quadratic, solution
+from scipy.spatial.transform import Rotation
 from solid_meshes import cube_grid
 
 from verify.compare.body_rule import Rule
 from verify.compare.errors import energy_error
 from verify.compare.hooke import Corotated, NeoHookean, corotated, hooke, strain_energy
+from verify.compare.hooke import _rotations as rotations
 from verify.compare.locate import SolutionField
 from verify.compare.simplices import points_in
 from verify.scene import Material
@@ -67,6 +69,24 @@ def test_an_inverted_cell_has_a_negative_stretch(d):
     stretch = 1.5  # from 1 to −0.5
     expected = (law.shear + 0.5 * law.lame) * stretch**2
     assert law.energy_density(moved)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.1, 0.5, 3.0])
+def test_rotations_in_space_are_nearest_whatever_the_stretch(spread):
+    """R ∈ SO(3) is nearest to F if S = RᵀF is symmetric with tr(S) I − S not negative (Horn)."""
+    random = np.random.default_rng(5)
+    turns = Rotation.random(3000, rng=random).as_matrix()
+    F = turns @ (np.eye(3) + spread * random.standard_normal((3000, 3, 3)))
+    R = rotations(F - np.eye(3))
+    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < 1e-13
+    assert np.linalg.det(R).min() > 0.0
+    S = np.swapaxes(R, 1, 2) @ F
+    size = np.abs(F).max(axis=(1, 2))
+    assert (np.abs(S - np.swapaxes(S, 1, 2)).max(axis=(1, 2)) / size).max() < 1e-12
+    hessian = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S
+    least = np.linalg.eigvalsh(0.5 * (hessian + np.swapaxes(hessian, 1, 2)))[:, 0]
+    assert (least / size).min() > -1e-12
+    assert spread < 0.5 or (np.linalg.det(F) < 0.0).any()
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -26,6 +26,9 @@ from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.solution import Solution
 
+_AT_ONCE = 1 << 11  # matrices: what is made of them stays in the cache
+_NEWTON_STEPS, _SETTLED = 9, 1e-9  # the last step; its square is left
+
 Array = NDArray[np.float64]
 
 
@@ -255,10 +258,38 @@ def _rotations(gradient: Array) -> Array:
         )
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    left, _, right = np.linalg.svd(deformation, full_matrices=False)
+    turned, rest = np.empty(deformation.shape), np.ones(len(deformation), dtype=bool)
+    if gradient.shape[2] == 3:
+        for begin in range(0, len(deformation), _AT_ONCE):
+            here = slice(begin, begin + _AT_ONCE)
+            turned[here], rest[here] = _by_newton(deformation[here])
+    left, _, right = np.linalg.svd(deformation[rest], full_matrices=False)
     if gradient.shape[2] == 3:
         left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return np.asarray(left @ right)
+    turned[rest] = left @ right
+    return turned
+
+
+def _by_newton(F: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Compute the polar factors (n, 3, 3) of F, and whether they are left to another way (n,).
+
+    Newton's method (Higham, SIAM J. Sci. Stat. Comput. 7, 1986) squares the distance in each step;
+    it is ten times as fast as a singular value decomposition where stretches are near one.
+    """
+    A = np.ascontiguousarray(np.moveaxis(F, 0, -1))
+    cofactors, found = np.empty(A.shape), np.zeros(len(F), dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for _ in range(_NEWTON_STEPS):
+            for i, j in np.ndindex(3, 3):
+                cofactors[i, j] = A[i - 2, j - 2] * A[i - 1, j - 1]
+                cofactors[i, j] -= A[i - 2, j - 1] * A[i - 1, j - 2]
+            volume = (A[0] * cofactors[0]).sum(axis=0)  # its sign stays
+            step = 0.5 * (cofactors / volume - A)
+            A += step
+            found = (np.abs(step).max(axis=(0, 1)) <= _SETTLED) & (volume > 0.0)
+            if found.all():
+                break
+    return np.moveaxis(A, -1, 0), ~found
 
 
 def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]:
