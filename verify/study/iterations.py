@@ -199,7 +199,7 @@ def _distance(answer: Solution, other: Solution) -> float:
 
 
 def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
-    measured = measured_solve(scene, "solver", 0, answer, None)
+    measured = measured_solve(scene, "solver", 0, answer)
     asked = [measured.metric(quantity.name) for quantity in scene.quantities]
     found = {
         m.name if m.unit == "1" else f"{m.name}, {m.unit}": m.value for m in asked if m is not None

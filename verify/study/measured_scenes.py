@@ -176,20 +176,19 @@ def measured_families(
     return rows
 
 
-def measured_solve(
-    scene: Scene, name: str, level: int, solution: Solution, exact: Any
-) -> SolveRecord:
+def measured_solve(scene: Scene, name: str, level: int, solution: Solution) -> SolveRecord:
     """Measure the solution of one level of a scene, held against an exact field if there is one."""
+    from reference.exact import exact_of
+
+    exact = exact_of(scene)
     record = SolveRecord(scene.name, name, level, Status.SOLVED, size=solution.size)
     (measured,) = assess_accuracy(scene, [record], {name: {level: solution}}, exact).solves
     return measured
 
 
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
-    from reference.exact import exact_of
-
     solution = checked_solution(solver.solve(scene, level, repetitions=1, **variant.parameters))
-    measured = measured_solve(scene, variant.solver, level, solution, exact_of(scene))
+    measured = measured_solve(scene, variant.solver, level, solution)
     if measured.status is not Status.SOLVED:
         raise NotMeasuredError(measured.reason)
     for metric in measured.metrics:
