@@ -133,7 +133,7 @@ def test_made_numbers_support_every_sentence_and_stand_in_it():
     assert "over 4 scenes" in found["through"].numbers  # the sweep is one of them
     assert "over 16 positions of meshes" in found["through"].numbers
     assert "0.71 of a conforming mesh's" in found["tip functions"].text  # the root of a half
-    assert "10\N{THIN SPACE}000 steps" in found["drift"].text
+    assert "10\N{NARROW NO-BREAK SPACE}000 steps" in found["drift"].text
     # an error of 0.9 is reached in time 1/0.9 sooner by c·h², t ~ 1/h²: 5·0.9 over 1·1.1
     assert found["remeshing time"].text.startswith(
         "At equal error remeshing takes 4.1 (4.1 to 4.1) times"

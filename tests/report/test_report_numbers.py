@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from page_parser import parsed
 from synthetic_run import make_run
-from synthetic_studies import HOSTILE, STUDIES
+from synthetic_studies import HOSTILE, STUDIES, make_studies
 
 from verify.cli import ranking as runner_ranking
 from verify.cli.ranking import rank_run
@@ -171,11 +171,24 @@ def test_numbers_of_studies_are_those_of_the_record(studies):
     for kind, said in (
         ("slivers", "0.899 at 0.1"), ("slivers", "∝ ε^0.00"),
         ("energy", "XFEM scheme=x"), ("energy", "2.50×10⁻¹³"),
-        ("cost", "500 ms (400–600)"), ("cost", "not reached"), ("cost", "2.5 ms"),
+        ("cost", "500\N{NO-BREAK SPACE}ms (400–600)"), ("cost", "not reached"),
         ("budget", "−2.03 %"), ("budget", "round-off"), ("budget", "it ran away"),
         ("calibration", "2.00"), ("calibration", "1 marks, 0 not covered"),
     ):  # fmt: skip
         assert said in texts[kind], (kind, said)
+
+
+def test_numbers_keep_their_units_and_commands_their_signs(tmp_path):
+    """On the site `--solver` and straight quotes stay as they are in code alone."""
+    command = "verify study energy --solver 'xfem tip=inside' -k '[a|b] > 1'"
+    record = json.loads((make_studies(tmp_path) / "cost.json").read_text())
+    (tmp_path / "cost.json").write_text(json.dumps({**record, "command": command}))
+    text = render_study(tmp_path, "cost", "markdown").read_text(encoding="utf-8")
+    assert text.count("--solver") == text.count(f"`{command}`") == 2
+    for joined in ("2.5\N{NO-BREAK SPACE}ms", "1\N{NARROW NO-BREAK SPACE}200"):
+        assert joined in text
+    page = parsed(render_study(tmp_path, "cost").read_text(encoding="utf-8"))
+    assert len(page.all("code")) == 2
 
 
 def test_a_place_that_is_not_known_is_a_gap_of_the_curve_and_not_bridged(monkeypatch):

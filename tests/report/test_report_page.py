@@ -118,6 +118,27 @@ def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_besid
     assert said not in next(iter(verdict_lines([result])))
 
 
+@pytest.mark.parametrize("many", [False, True])
+def test_few_failures_are_told_in_words_and_many_are_counted(tmp_path, many):
+    """Of 40 solvers that fail in a case the first screen has a short line, no list of checks."""
+    root = make_run(tmp_path / "run", pictures=False)
+    file = root / "cases/statics__griffith_inside/result.json"
+    result = read_result(file)
+    (failed,) = [v for v in result.verdicts if v.verdict is Verdict.FAIL]
+    names = [f"solver_{k}" for k in range(40 if many else 2)]
+    own = [replace(failed, solver=name) for name in names]
+    twice = [replace(one, metric="displacement_l2") for one in own[:1]]
+    passed = [replace(failed, solver=names[0], metric="jump_l2", verdict=Verdict.PASS)]
+    result.verdicts[:] = [*own, *twice, *passed]
+    write_result(result, file)
+    text = render(root, "summary").read_text(encoding="utf-8")
+    (line,) = [one for one in text.splitlines() if one.startswith("**Failed**")]
+    assert ("statics/griffith_inside (order" in line) is not many
+    if many:
+        assert line.startswith("**Failed**: 41 checks, by solver: solver_0 2 of 3, solver_1 1 of 1")
+        assert len(line) < 25 * len(names)
+
+
 def test_csv_has_a_row_per_metric_and_one_per_failed_solve(plain_run):
     rows = list(csv.DictReader(io.StringIO((plain_run / "results.csv").read_text())))
     assert tuple(rows[0]) == COLUMNS

@@ -1,11 +1,11 @@
 """Claims from the literature: verdicts follow from numbers; numbers against independent values."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
-from verify.report.study_page import render_study
+from verify.report.study_page import _claim, render_study
 from verify.scene import load_scene, load_scenes
 from verify.solution import Solution
 from verify.solvers import find_solver
@@ -151,6 +151,29 @@ def test_a_number_that_is_not_installed_decides_nothing_and_gives_its_reason():
     assert "no_such_solver" in in_words(found)
 
 
+def test_no_text_of_a_claim_has_marks_that_its_page_would_show():
+    for claim in CLAIMS.values():
+        texts = [claim.sense, claim.who, claim.made]
+        texts += [text for limit in claim.limits for text in (limit.number, limit.why)]
+        assert not [text for text in texts if set("*`[]") & set(text)]
+
+
+def test_the_number_beside_a_verdict_is_the_first_that_breaks_a_limit():
+    claim = CLAIMS["uncut_step"]
+    numbers = [
+        exactly(4.44e-16, "0 to 4.44e-16"),
+        *(exactly(value) for value in (0.995, 0.894, 1.2)),
+    ]
+    shown = [in_words(one) for one in numbers]
+    judged = Judged(claim, numbers, shown, judgement_of(claim.limits, numbers))
+    seen = _claim(asdict(judged))
+    assert seen["decides"] == f"{claim.limits[2].number} = 0.894 (at least 0.99)"
+    assert seen["bounds"][0] == "at most 10⁻⁶"
+    assert seen["authors"] == "Menouillard, Réthoré, Moës, Combescure and Bung 2008"
+    numbers[2] = exactly(0.991)
+    assert _claim(asdict(judged))["decides"].startswith(f"{claim.limits[0].number} = 4.44×10⁻¹⁶ (")
+
+
 def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path):
     wanted = {"removal": inside, "springs": outside, "open_question": inside}
     judged = []
@@ -164,12 +187,14 @@ def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path
     study = ClaimsStudy(judged=judged, findings=[])
     write_study(tmp_path, "claims", study, "verify study claims")
     text = render_study(tmp_path, "claims", "markdown").read_text("utf-8")
-    counts = "Of 3 claims: 1 hold, 0 in part, 1 not, 1 cannot be told here."
-    assert [line for line in text.splitlines() if line][:2] == [
-        "# Claims from the literature, judged", counts
-    ]  # fmt: skip
+    first = [line for line in text.splitlines() if line][:3]
+    assert first[1] == "Of 3 claims 1 hold, 0 hold in part, 1 does not hold, 1 cannot be told here."
+    assert first[2] == f"**Does not hold**: {judged[1].claim.sense}"
     for one in judged:
-        assert one.claim.command in text
+        assert f"`{one.claim.command}`" in text
     assert "1.25" in text
+    (row,) = [line for line in text.splitlines() if line.startswith(f"| {judged[1].claim.sense}")]
+    assert f"{judged[1].claim.limits[0].number} = 0.01" in row
+    assert "(at least 0.01) | Van Gelder 1998 |" in row
     assert len(study.rows()) == sum(len(one.claim.limits) for one in judged)
     assert render_study(tmp_path, "claims").is_file()

@@ -3,6 +3,7 @@
 import csv
 import sys
 import textwrap
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ from command_line import forking
 
 from verify.cli import main
 from verify.judge.models import coarsest
+from verify.report.study_page import positions_lead, render_study
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import load_scene
 from verify.study.positions import SCENES, _at, spread_of, summary
+from verify.study.study import write_study
 
 
 def result_of(scene, errors, failed=()):
@@ -41,6 +44,10 @@ def study_of(table, solvers=("mine", "conforming")):
         for number, errors in enumerate(rows)
     }  # fmt: skip
     return summary(found, dict.fromkeys(table, 0), solvers)
+
+
+def lead_of(study):
+    return positions_lead(asdict(study))
 
 
 def pair(study, scene, solver, rival, metric="displacement_l2"):
@@ -81,19 +88,42 @@ def test_a_mesh_on_which_either_is_exact_failed_or_unknown_has_no_ratio():
     unknown = {("a", 0): result_of("a", {"mine": (0.1, 0.2), "conforming": (0.1, 0.0)})}
     study = summary(unknown, {"a": 0}, ["mine", "conforming"])
     assert not study.pairs
-    assert "not told from zero" in study.missing[0]["reason"]
+    assert "cannot tell it from zero" in study.missing[0]["reason"]
 
 
 def test_a_difference_is_said_only_where_the_range_excludes_1():
     above = [(1.1 + 0.01 * k, 1.0) for k in range(16)]
     study = study_of(dict.fromkeys("abcdef", above))
-    assert "1 of 1 pairs by the error of the displacement" in study.answer[0]
-    assert "differ: mine 1.1" in study.answer[1]
-    assert "Nothing is claimed" not in study.answer[0]
+    counts, against = lead_of(study).sentences
+    assert "1 of 1 differ in the error of the displacement" in counts
+    assert "these differ: mine 1.1" in against
+    assert "Nothing is claimed" not in counts
     both = {**dict.fromkeys("abcde", above), "f": [(0.9, 1.0)] * 16}
-    assert "not told apart: mine" in study_of(both).answer[1]
+    assert "these are not told apart: mine" in lead_of(study_of(both)).sentences[1]
     assert "not told apart" in study_of(both).findings[0].sentence
-    assert "Nothing is claimed" in study_of({"a": above}).answer[0]
+    assert "Nothing is claimed" in lead_of(study_of({"a": above})).sentences[0]
+    barely = study_of(dict.fromkeys("abcdef", [(1.0003, 1.0)] * 16))
+    assert "differ: mine 1 (1.0003 to 1.0003)" in lead_of(barely).sentences[1]
+
+
+def test_a_page_says_once_what_its_scenes_levels_and_limit_are(tmp_path):
+    """Of two pages of positions each has its own title and heads; of equal heads none is short."""
+
+    def page(name, *scenes):
+        write_study(tmp_path / name, "positions", study_of({s: [(2.0, 1.0)] for s in scenes}), "c")
+        return render_study(tmp_path / name, "positions", "markdown").read_text("utf-8")
+
+    own = page("own", "benchmark/c2_meeting", "benchmark/c5_blade_03")
+    mixed = page("mixed", "benchmark/c1_slit", "statics/f3_inclined")
+    same = page("same", "benchmark/c5_blade_01", "benchmark/c5_blade_03")
+    first = [text.splitlines()[0] for text in (own, mixed)]
+    assert first[0].endswith("in the benchmark's scenes?")
+    assert first[1].endswith("in 2 scenes of 2 kinds?")
+    assert "| solver | all | C2 | C5 |" in own
+    assert own.count("level 0: C2 (benchmark/c2_meeting), C5 (benchmark/c5_blade_03)") == 1
+    assert "| solver | all | C1 | f3_inclined |" in mixed
+    assert "| solver | all | benchmark/c5_blade_01 | benchmark/c5_blade_03 |" in same
+    assert own.count("differ where the range excludes 1") == 1
 
 
 # off by 0.01 (1 + position)^power in every norm; on the third mesh it breaks if asked

@@ -160,5 +160,5 @@ def _duration(solve: SolveRecord) -> str:
         return "–"
     steps = (solve.iterations or {}).get("steps")
     if steps:
-        return f"{number(1e3 * median(totals) / steps, 2)} ms"
-    return f"{number(median(totals), 2)} s"
+        return f"{number(1e3 * median(totals) / steps, 2)}\N{NO-BREAK SPACE}ms"
+    return f"{number(median(totals), 2)}\N{NO-BREAK SPACE}s"

@@ -186,7 +186,7 @@ def number(value: Any, digits: int = 4) -> str:
     if value is None or isinstance(value, str | bool):
         return _MISSING if value is None else str(value)
     if isinstance(value, int):
-        return f"{value:,}".replace(",", "\N{THIN SPACE}")
+        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
     if not math.isfinite(value):
         return "not finite"
     mantissa, power = _decimal(value, digits)
@@ -265,7 +265,7 @@ def seconds_text(value: float | None, beside: float | None = None) -> str:
     unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3)) if judged >= u[1]), ("µs", 1e-6))
     shown = value / size
     written = f"{shown:.3g}" if shown < 999.5 else f"{shown:.0f}"
-    return written if beside is not None else f"{written} {unit}"
+    return written if beside is not None else f"{written}\N{NO-BREAK SPACE}{unit}"
 
 
 def spread_text(middle: float, low: float, high: float) -> str:

@@ -22,6 +22,7 @@ from verify.result import CaseResult, Status, Verdict, VerdictRecord
 
 _NAMED = 6  # entries of a list in the paragraph
 _PLACES = 2  # of what one solver fails
+_SAID = 3  # solvers or places that are named in words; of more, counts
 
 
 def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> dict[str, Any]:
@@ -93,47 +94,71 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     return said
 
 
-def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[tuple[str, str]]:
-    """Return verdicts that are no plain pass, in lists of at most six entries, failures first."""
-    failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
-    errors = _unjudged(judged)
-    errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
-    warned: dict[str, list[str]] = {}
+_Judged = list[tuple[CaseEntry, VerdictRecord]]
+
+
+def _findings(run: Run, judged: _Judged) -> list[tuple[str, str]]:
+    """Return verdicts that are no plain pass, failures first: in words, or counted if many."""
+    marked = {word: [(e, v) for e, v in judged if v.verdict is word] for word in Verdict}
+    failed = marked[Verdict.FAIL]
+    errors = _unjudged(marked[Verdict.ERROR])
+    lost = [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
+    warned: dict[str, dict[str, list[str]]] = {}
     for entry in run.entries:
         for w in entry.result.warnings if entry.result else []:
             whose = solver_title(w.solver) if w.solver else "every solver"
-            warned.setdefault(f"{w.about} in {entry.name}", []).append(whose)
+            warned.setdefault(w.about, {}).setdefault(entry.name, []).append(whose)
+
+    def of_solvers(some: _Judged) -> str:
+        said = _by_solver(some, judged)
+        return "; ".join(said) if len(said) <= _SAID else _counted(some, judged)
+
+    undecided = [
+        f"{e.name} ({check_text(v)}): {_clause(v.reason)}" for e, v in marked[Verdict.UNDECIDED]
+    ]
+    # the text of each stands on top of its case
+    warnings = [
+        f"{about} in {name} ({', '.join(whose)})"
+        for about, places in warned.items()
+        for name, whose in places.items()
+    ]
+    counts = [f"{about} in {len(places)} case{'s' * (len(places) != 1)}"
+              for about, places in warned.items()]  # fmt: skip
     lists = {
-        "Failed": _by_solver([(e, v) for e, v in failed if not v.known], judged),
-        "Failed, known findings": _by_solver([(e, v) for e, v in failed if v.known], judged),
-        "Undecided": [
-            f"{e.name} ({check_text(v)}): {_clause(v.reason)}"
-            for e, v in judged
-            if v.verdict is Verdict.UNDECIDED
-        ],
-        "Not judged": errors,
-        # the text of each stands on top of its case
-        "Warned of": [f"{about} ({', '.join(whose)})" for about, whose in warned.items()],
-    }
-    return [(title, _listed(entries)) for title, entries in lists.items() if entries]
+        "Failed": of_solvers([(e, v) for e, v in failed if not v.known]),
+        "Failed, known findings": of_solvers([(e, v) for e, v in failed if v.known]),
+        "Undecided": "; ".join(undecided) if len(undecided) <= _SAID
+        else _counted(marked[Verdict.UNDECIDED], judged),
+        "Not judged": "; ".join([
+            *(errors if len(errors) <= _SAID else [_counted(marked[Verdict.ERROR], judged)]),
+            *([_listed(lost)] if lost else []),
+        ]),
+        "Warned of": "; ".join(warnings if len(warnings) <= _SAID else counts),
+    }  # fmt: skip
+    return [(title, words) for title, words in lists.items() if words]
 
 
-def _unjudged(judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[str]:
+def _counted(some: _Judged, judged: _Judged) -> str:
+    """Say how many checks these are, and how many of each solver's, most first."""
+    made = Counter(v.solver for _, v in judged)
+    parts = [f"{solver_title(solver or 'nobody')} {count} of {made[solver]}"
+             for solver, count in Counter(v.solver for _, v in some).most_common()]  # fmt: skip
+    return f"{len(some)} checks, by solver: {', '.join(parts)}"
+
+
+def _unjudged(errors: _Judged) -> list[str]:
     """Say of each solver how many checks could not be judged, and why the first could not."""
     whose: dict[str, list[str]] = {}
-    for entry, record in judged:
-        if record.verdict is Verdict.ERROR:
-            said = whose.setdefault(record.solver or "nobody", [])
-            said.append(f"{entry.name}: {_clause(record.reason)}")
+    for entry, record in errors:
+        said = whose.setdefault(record.solver or "nobody", [])
+        said.append(f"{entry.name}: {_clause(record.reason)}")
     return [
         f"{solver_title(name)}, {len(said)} check{'s' * (len(said) > 1)}, first {said[0]}"
         for name, said in whose.items()
     ]
 
 
-def _by_solver(
-    failed: list[tuple[CaseEntry, VerdictRecord]], judged: list[tuple[CaseEntry, VerdictRecord]]
-) -> list[str]:
+def _by_solver(failed: _Judged, judged: _Judged) -> list[str]:
     """Say of each solver what it fails, the one that fails most first."""
     said = []
     for solver, count in Counter(v.solver for _, v in failed).most_common():

@@ -45,6 +45,7 @@ PICTURES = "report-pictures"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _PRINT_SECONDS = 180.0
 _SPECIAL = re.compile(r"([\\`*\[\]|])")
+_SPACES = re.compile(r"[^\S\u00a0\u202f]+")  # not those that hold a number and its unit together
 _START = re.compile(r"^(\s*)([#>+=-]|\d+[.)](?=\s))")
 _LOOK = (
     "<style>text { font-family: sans-serif; } "
@@ -116,9 +117,14 @@ def load_templates(kind: str, template: str) -> None:
 
 def in_markdown(text: str) -> str:
     """Return text that Markdown shows as it is: no marks, no elements, no line breaks."""
-    plain = _SPECIAL.sub(r"\\\1", " ".join(text.split()))
+    plain = _SPECIAL.sub(r"\\\1", _SPACES.sub(" ", text).strip())
     plain = _START.sub(lambda m: f"{m[1]}{m[2][:-1]}\\{m[2][-1]}", plain)
     return plain.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _in_code(text: str) -> Markup:
+    """Return text as a code span of Markdown, where nothing is escaped and nothing replaced."""
+    return Markup(f"`{' '.join(printable(text).replace('`', chr(39)).split())}`")
 
 
 @cache
@@ -133,7 +139,8 @@ def _environment(kind: str) -> Environment:
     made.filters |= {
         "number": notation.number, "seconds": notation.seconds_text, "form": format, "rank": rank,
         "metric": notation.metric_title, "error": notation.error_title, "solver": solver_title,
-        "signed": notation.signed, "spread": notation.spread_text,
+        "signed": notation.signed, "spread": notation.spread_text, "code": _in_code,
+        "scientific": notation.scientific,
     }  # fmt: skip
     return made
 

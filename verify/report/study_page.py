@@ -1,7 +1,8 @@
 """The page of a study: findings as sentences, then tables and curves, then where it comes from."""
 
+import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from verify.report.notation import (
     Table,
     metric_title,
     number,
+    scientific,
     solver_title,
 )
 from verify.report.page import origin_facts
@@ -67,7 +69,6 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
         "record": record,
         "counts": Counter(finding["verdict"] or "SHOWN" for finding in record["findings"]),
         "origin": origin_facts(record),
-        "answer": record.get("answer", []),
         "lead": None,
         **_VIEWS[kind](record),
     }
@@ -82,8 +83,8 @@ def render_study(directory: Path, kind: str, form: str = "html") -> Path:
 
 
 def _positions(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ratios to one solver as strips, and tables of them, over all scenes and each."""
-    measure, palette = record["measure"], Palette()
+    """Return the answer, ratios to one solver as strips, and tables over all scenes and each."""
+    measure, palette, short = record["measure"], Palette(), _short(record["scenes"])
     panels, tables = [], []
     for metric in dict.fromkeys(pair["metric"] for pair in record["pairs"]):
         own = listed(record["pairs"], metric=metric, rival=measure)
@@ -98,20 +99,75 @@ def _positions(record: Mapping[str, Any]) -> dict[str, Any]:
         rows = []
         for solver in dict.fromkeys(pair["solver"] for pair in own):
             known = {pair["scene"]: pair for pair in listed(own, solver=solver)}
-            cells = [_ratio(known[place]) if place in known else "–" for place in places]
+            cells = [Cell(_ratio(known[place]), strong=known[place]["differs"])
+                     if place in known else "–" for place in places]  # fmt: skip
             rows.append([solver_title(solver), *cells])
-        heads = [
-            "solver",
-            *(f"{p}, level {record['scenes'][p]}" if p != _ALL else p for p in places),
-        ]
-        said = "median (90 % of the ratios); bold where that range excludes 1"
-        tables.append(Table(f"{title}: {said}", heads, rows, "", True))
-    return {"panels": panels, "tables": tables}
+        heads = ["solver", *(short.get(place, place) for place in places)]
+        tables.append(Table(title, heads, rows, "", True))
+    levels = dict.fromkeys(record["scenes"].values())
+    at = [
+        f"level {level}: "
+        + ", ".join(
+            f"{short[name]} ({name})" for name, its in record["scenes"].items() if its == level
+        )
+        for level in levels
+    ]
+    scenes = f"Scenes, at {'; at '.join(at)}."
+    return {"lead": positions_lead(record, panels), "scenes": scenes, "tables": tables}
 
 
-def _ratio(pair: Mapping[str, Any]) -> Cell:
-    text = f"{pair['ratio']:.3g} ({pair['low']:.3g} to {pair['high']:.3g})"
-    return Cell(text, strong=pair["differs"])
+def _short(scenes: Iterable[str]) -> dict[str, str]:
+    """Return a head for the column of each scene: C2 of the benchmark's, else without the folder.
+
+    Where two would share it, all keep their names.
+    """
+    short = {name: re.sub(r"^benchmark/c(\d+)_.*", r"C\1", name).split("/")[-1] for name in scenes}
+    return short if len({*short.values()}) == len(short) else {name: name for name in short}
+
+
+_FEWEST = (6, 16)  # scenes and meshes of the protocol
+_NORMS_IN_WORDS = {"displacement_l2": "displacement", "energy_norm": "energy norm"}
+
+
+def positions_lead(record: Mapping[str, Any], panels: Sequence[Drawing | None] = ()) -> Lead:
+    """Return which solvers differ wherever the mesh lies: of all pairs, and beside the measure."""
+    scenes, positions, measure = record["scenes"], record["positions"], record["measure"]
+    over_all = listed(record["pairs"], scene=_ALL)
+    counts = []
+    for metric, words in _NORMS_IN_WORDS.items():  # each pair stands there both ways
+        every = [p for p in listed(over_all, metric=metric) if p["solver"] < p["rival"]]
+        differ = sum(pair["differs"] for pair in every)
+        counts.append(f"{differ} of {len(every)} differ in the error of the {words}")
+    count = f"{len(scenes)} scene{'s' * (len(scenes) != 1)}"
+    first = f"Of all pairs of solvers, over {count} on {positions} meshes each, "
+    first += f"{' and '.join(counts)}."
+    if len(scenes) < _FEWEST[0] or positions < _FEWEST[1]:
+        first += f" Nothing is claimed from fewer than {_FEWEST[0]} scenes on {_FEWEST[1]} meshes."
+    own, said = listed(over_all, metric="displacement_l2", rival=measure), []
+    for differ, words in ((True, "these differ"), (False, "these are not told apart")):
+        names = [f"{solver_title(p['solver'])} {_ratio(p)}" for p in listed(own, differs=differ)]
+        if names:
+            said.append(f"{words}: {', '.join(names)}")
+    second = f"From {solver_title(measure)}, by the displacement (median ratio, range of 90 %), "
+    second += "; ".join(said) or "no solver has a ratio"
+    kinds = {name.split("/")[0] for name in scenes}
+    where = "the benchmark's scenes" if kinds == {"benchmark"} else f"{count} of {len(kinds)} kinds"
+    return Lead(
+        f"Which solvers differ wherever the mesh lies, in {where}?", [first, f"{second}."], panels,
+        f"A point is one scene on one mesh: error over error of {solver_title(measure)} on that "
+        "mesh; left of 1 is better. Dot and line are the median and the range of 90 % of the "
+        "points. Solvers differ where that range excludes 1.",
+    )  # fmt: skip
+
+
+def _ratio(pair: Mapping[str, Any]) -> str:
+    return f"{pair['ratio']:.3g} ({_beside_1(pair['low'])} to {_beside_1(pair['high'])})"
+
+
+def _beside_1(value: float) -> str:
+    """Write a number so that it is not 1 where it is not."""
+    written = f"{value:.3g}"
+    return f"{value:.5g}" if written == "1" else written
 
 
 def _running(record: Mapping[str, Any]) -> list[Drawing]:
@@ -225,6 +281,38 @@ def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
             text += f" {lead}: {'; '.join(rest)}." if rest else ""
         said.append(text)
     return said or ["No claim was judged."]
+
+
+_IDENTIFIER = re.compile(r",? (10\.\d{4,}/\S+?|arXiv \S+?)(?=[;)\s]|$)")
+
+
+def _claim(one: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a claim with its authors, and its number that breaks a limit, else the first."""
+    bounds = [
+        scientific(" and ".join(
+            f"{words} {limit[key]:g}"
+            for key, words in (("at_least", "at least"), ("at_most", "at most"))
+            if limit[key] is not None
+        ))
+        for limit in one["claim"]["limits"]
+    ]  # fmt: skip
+    rows = list(zip(one["claim"]["limits"], one["numbers"], bounds, strict=True))
+    name, found, bound = next((row for row in rows if _broken(*row[:2])), rows[0])
+    value = number(found["value"], 3)
+    decides = f"{name['number']} = {value}" + (f" ({bound})" if bound else "")
+    authors = _IDENTIFIER.sub("", one["claim"]["who"])
+    return {**one, "bounds": bounds, "decides": decides, "authors": authors}
+
+
+def _broken(limit: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+    if found["value"] is None:
+        return False
+    least, most = limit["at_least"], limit["at_most"]
+    below, above = (
+        least is not None and found["high"] < least,
+        most is not None and found["low"] > most,
+    )
+    return below or above
 
 
 Settings = Sequence[Mapping[str, Any]]
@@ -350,5 +438,5 @@ _VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
         ],
     },
     "positions": _positions,
-    "claims": lambda r: {},
+    "claims": lambda r: {"judged": [_claim(one) for one in r["judged"]]},
 }  # fmt: skip
