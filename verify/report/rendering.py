@@ -188,7 +188,7 @@ class Beside:
         """Write an SVG file; return its path from the Markdown."""
         width, height = drawing.size
         head = (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}pt" height="{height:g}pt" '
             f'xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 {width:g} {height:g}">'
         )
         ground = '<rect width="100%" height="100%" fill="#fff"/>'  # black on dark pages else
