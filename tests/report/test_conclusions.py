@@ -7,6 +7,7 @@ import re
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -25,6 +26,8 @@ from verify.report.benchmark_page import (
 from verify.report.conclusions import answer
 from verify.report.evidence import Evidence, benchmark_scenes, beside
 from verify.report.front_page import arena_head, combined, figures, write_front
+from verify.report.notation import solver_title
+from verify.report.plots import Palette
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
 SCRIPT = Path(__file__).parents[2] / ".ci/results"
@@ -345,6 +348,9 @@ def test_the_command_line_knows_every_run_of_the_protocol(foreign, monkeypatch, 
         build_parser().parse_args(words)  # leaves with a message where it does not know a word
     assert set(made) <= set(PUBLISHER.PAGES)
     assert {words[-1] for words in asked} == {str(PUBLISHER.RUNS / n) for n in (*made, "long")}
+    names = {word for words in asked for option, word in pairwise(words) if option == "--solver"}
+    shown = [solver_title(name) for name in sorted(names) if "ghost=" not in name]
+    assert Palette.of(shown) == Palette.of(reversed(shown))  # one look on all pages
 
 
 def test_the_front_page_is_short_and_has_four_to_six_figures(tmp_path):

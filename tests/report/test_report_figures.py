@@ -1,10 +1,16 @@
-"""Figures: every error where its number says, motions, openings, outlines, error maps, notices."""
+"""Figures: every error where its number says, motions, openings, outlines, error maps, notices.
+
+And what holds for all: names inside, one solver one style, marks where something is cut off.
+"""
 
 import json
+import re
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.textpath import TextPath
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
@@ -12,12 +18,12 @@ from verify.report import error_plots, plots
 from verify.report.bodies import Body, deformed_bodies
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import error_curves, floor, limits
-from verify.report.error_plots import error_panel, error_range
+from verify.report.error_plots import error_panel, error_range, key
 from verify.report.pictures import case_pictures, plane_tips
-from verify.report.plots import Palette, drawing
+from verify.report.plots import Bar, Palette, Ranged, Series, bars, drawing, loglog, ranges
 from verify.report.problem import cut_lines
 from verify.report.profiles import opening_figures
-from verify.report.rendering import render
+from verify.report.rendering import Beside, render
 from verify.report.run_directory import load_run
 from verify.result import (
     Metric,
@@ -325,3 +331,91 @@ def test_an_end_on_the_boundary_or_on_another_cut_is_no_tip():
     assert [length for _, length in tips] == pytest.approx(
         [np.hypot(0.5, 0.3), np.hypot(0.05, 0.45)]
     )
+
+
+SOLVERS = (
+    "XFEM mass=consistent", "snapping_subdivision", "virtual_node_arbitrary weights=raised",
+    "conforming P1 mesh=remeshed", "getfem tip=functions", "subdivision", "XFEM tip=inside",
+    "virtual_node", "XFEM", "conforming P1",
+)  # fmt: skip
+TEXT = re.compile(
+    r'<text style="font-size: (\d+)px([^"]*)"[^>]*'
+    r"(?:translate\(|rotate\(\S+ )([-\d.]+) [^>]*>([^<]+)"
+)
+
+
+def curves(names):
+    return loglog("error", "x", [Series(n, [(1.0, 1.0), (2.0, 3.0)]) for n in names], Palette())
+
+
+@pytest.mark.parametrize("draw", [
+    lambda: curves(SOLVERS),
+    lambda: curves(SOLVERS[:4]),
+    lambda: key(SOLVERS, Palette()),
+    lambda: ranges("ratio", "x", [Ranged(f"{name} (= that of another)", 2.0) for name in SOLVERS],
+                   Palette(), 1.0),
+    lambda: bars("a title that is longer than the bars, their names and their numbers, and a word",
+                 [Bar(name, 1.0, 0.0, "9 of 9") for name in SOLVERS], ""),
+], ids=["legend", "named", "key", "ranges", "bars"])  # fmt: skip
+def test_no_word_is_cut_off(draw):
+    drawn = draw()
+    found = TEXT.findall(drawn.body)
+    assert len(found) >= 4
+    assert len(found) == drawn.body.count("<text")
+    for size, style, x, text in found:
+        width = TextPath((0, 0), text, size=int(size)).get_extents().width
+        left = float(x) - width * (0.5 * ("middle" in style) + ("end" in style))
+        assert left >= -0.5, text
+        assert left + width <= drawn.size[0] + 0.5, text
+
+
+def test_solvers_look_the_same_in_every_figure_and_none_as_another():
+    there, back = Palette.of(SOLVERS), Palette.of(reversed(SOLVERS))
+    assert there == back
+    assert there["virtual_node†*"] == there["virtual_node (= a program)"] == there["virtual_node"]
+    styles = Palette.of([*SOLVERS, *(f"unknown {n}" for n in range(100))]).values()
+    for one, other in combinations(styles, 2):
+        assert (one.colour, one.marker) != (other.colour, other.marker)
+        assert (one.colour, one.dashes) != (other.colour, other.dashes)
+
+
+@pytest.fixture
+def axes_of(monkeypatch):
+    """Return the axes of a figure before it is SVG."""
+
+    def of(plot, *given):
+        kept = []
+        monkeypatch.setattr(plots, "drawing", lambda figure, *_: kept.append(figure.axes[0]))
+        plot(*given)
+        return kept[0]
+
+    return of
+
+
+def test_a_range_has_an_arrow_head_where_it_goes_on_beyond_the_axis(axes_of):
+    rows = [Ranged("whole", 2.0, 0.5, 8.0), Ranged("right", 1.0, 0.3, 80.0),
+            Ranged("left", 1.0, 0.0, 3.0), Ranged("none", 1.0)]  # fmt: skip
+    axes = axes_of(ranges, "ratio", "x", rows, Palette(), 1.0, (0.1, 10.0))
+    heads = [line for line in axes.lines if line.get_marker() in ("<", ">")]
+    left, right = axes.get_xlim()
+    assert [(h.get_marker(), *map(float, np.ravel(h.get_xydata()))) for h in heads] == [
+        (">", right, 1.0), ("<", left, 2.0),
+    ]  # fmt: skip
+    assert 0.05 < left < 0.1
+    assert 10.0 < right < 20.0
+
+
+def test_only_bars_with_an_interval_have_caps(axes_of):
+    parts = [Bar("exact", 3.0, 0.0, ""), Bar("measured", 2.0, 0.25, "")]
+    axes = axes_of(bars, "share", parts, "")
+    caps = [x for line in axes.lines if line.get_marker() == "|" for x in line.get_xdata()]
+    assert sorted(x for x in caps if np.isfinite(x)) == [1.75, 2.25]
+
+
+def test_a_figure_beside_a_page_has_its_size_in_points(tmp_path):
+    drawn = bars("share", [Bar("one", 1.0, 0.0, "")], "")
+    width, height = drawn.size
+    Beside(tmp_path / "pictures").drawing(drawn)
+    head = (tmp_path / "pictures/001.svg").read_text("utf-8").partition(">")[0]
+    assert f' width="{width:g}pt" height="{height:g}pt"' in head
+    assert f' viewBox="0 0 {width:g} {height:g}"' in head

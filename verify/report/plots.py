@@ -15,11 +15,14 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox
 
 from verify.report.notation import RAISED, Drawing, printable
 
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"
+_MARGIN = 0.02  # inches around what lies beyond a figure
+_LETTERS = 23  # in a line of a name
 _LEFT, _ASIDE = 0.52, 2.0  # inches left of the axes, and with those right of them for a legend
 _RC = {
     "svg.fonttype": "none", "svg.hashsalt": "report", "text.parse_math": False, "font.size": 9,
@@ -45,32 +48,45 @@ class Style:
         return {"color": self.colour, "marker": self.marker, "markerfacecolor": face}
 
 
+# 16 colours, 11 markers, 13 dashes: without a common factor, so that no pair of colour and marker
+# comes twice in 176 slots, nor one of colour and dashes
+_COLOURS = (
+    "#00785a", "#a3487b", "#8a6a00", "#5b4db5", "#1b8fb8", "#b0003a", "#4a7c00", "#7a3b00",
+    "#d0378f", "#1f2f6f", "#111111", "#00a0a0", "#777777", "#d4a000", "#b487ff", "#00a832",
+)  # fmt: skip
+_MARKERS = "^PvXphd*8HD"
+_DASHES = (
+    (7, 2, 1.5, 2), (3, 1.5), (2, 2), (9, 3), (4, 1.5, 1, 1.5, 1, 1.5), (6, 1.5), (1, 3),
+    (8, 2, 2, 2), (3, 3), (5, 1, 1, 1), (12, 2), (10, 1.5, 1, 1.5), (2, 4),
+)  # fmt: skip
+
+
+def _style(slot: int) -> Style:
+    hollow = bool((slot + slot // len(_COLOURS)) % 2)
+    dashes = (0, _DASHES[slot % len(_DASHES)])
+    return Style(_COLOURS[slot % len(_COLOURS)], _MARKERS[slot % len(_MARKERS)], hollow, dashes)
+
+
+# the solvers of the protocol, in an order in which no two of one figure share a colour
+_SLOTS = (
+    "mass_spring", "snapping", "removal", "virtual_node", "uncut", "conforming P1 mesh=remeshed",
+    "subdivision", "snapping_subdivision", "getfem", "ngsxfem", "SOFA", "XFEM tip=inside",
+    "kratos", "akantu", "getfem tip=functions", "vbd", "virtual_node_arbitrary weights=raised",
+    "XFEM mass=consistent", "XFEM mass=evs", "XFEM mass=gevs", "XFEM slivers=merge",
+    "XFEM slivers=penalise",
+)  # fmt: skip
 _KNOWN = {
     "XFEM": Style("#c04a00", "o"),
     "conforming P1": Style("#0067a5", "s", True, (0, (5, 2))),
     "reference": Style("#4d4d4d", "D", True, (0, (1, 1.5))),
     "exact": Style("#4d4d4d", "D", True, (0, (1, 1.5))),
+    **{name: _style(slot) for slot, name in enumerate(_SLOTS)},
 }
-_OTHERS = (
-    Style("#00785a", "^", False, (0, (7, 2, 1.5, 2))),
-    Style("#a3487b", "P", False, (0, (3, 1.5))),
-    Style("#8a6a00", "v", True, (0, (2, 2))),
-    Style("#5b4db5", "X", False, (0, (9, 3))),
-    Style("#1b8fb8", ">", True, (0, (4, 1.5, 1, 1.5, 1, 1.5))),
-    Style("#b0003a", "p", False, (0, (6, 1.5))),
-    Style("#4a7c00", "<", True, (0, (1, 3))),
-    Style("#7a3b00", "h", False, (0, (8, 2, 2, 2))),
-    Style("#d0378f", "d", True, (0, (3, 3))),
-    Style("#1f2f6f", "*", False, (0, (5, 1, 1, 1))),
-    Style("#111111", "8", True, "-"),
-    Style("#00a0a0", "H", False, (0, (10, 1.5, 1, 1.5))),
-    Style("#777777", "^", True, (0, (2, 4))),
-    Style("#d4a000", "s", False, (0, (12, 2))),
-)
+_BESIDE_NAME = re.compile(r" \(= .*|[*†]+$")  # programs that agree, marks of a note
 
 
 class Palette(dict[str, Style]):
-    """Styles by label: the same in every figure of a page, distinct for the first twelve others."""
+    """Styles by label: of a known solver the same everywhere, of others in order, none twice."""
 
     @classmethod
     def of(cls, labels: Iterable[str]) -> "Palette":
@@ -81,9 +97,9 @@ class Palette(dict[str, Style]):
         return palette
 
     def __missing__(self, label: str) -> Style:
-        known = _KNOWN.get(label)
-        taken = sum(name not in _KNOWN for name in self)
-        self[label] = known or _OTHERS[taken % len(_OTHERS)]
+        known = _KNOWN.get(_BESIDE_NAME.sub("", label))
+        others = sum(name not in _KNOWN for name in self)
+        self[label] = known or _style(len(_SLOTS) + others)
         return self[label]
 
 
@@ -117,11 +133,15 @@ def _place(axes: Axes, aside: float = _ASIDE) -> None:
 
 
 def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
-    """Return a figure as SVG, without what only a file of its own needs."""
+    """Return a figure as SVG, without what only a file of its own needs.
+
+    It is as wide and high as the figure, or more where a name would be cut off.
+    """
     buffer = io.StringIO()
     with rc_context(_RC):  # type: ignore[arg-type]
         none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-        figure.savefig(buffer, format="svg", transparent=True, metadata=none)
+        whole = Bbox.union([figure.bbox_inches, figure.get_tightbbox().padded(_MARGIN)])
+        figure.savefig(buffer, format="svg", transparent=True, metadata=none, bbox_inches=whole)
     text = buffer.getvalue()
     body = text[text.index(">", text.index("<svg")) + 1 : text.rindex("</svg>")]
     body = re.sub(
@@ -134,18 +154,17 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
     # places to a hundredth of a point; only in paths, never in text
     body = re.sub(r' d="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
     body = re.sub(r">\s+<", "><", re.sub(r"\s*\n\s*", " ", body)).strip()
-    inches = figure.get_size_inches()
-    return Drawing(body, (72.0 * inches[0], 72.0 * inches[1]), alt, kind)
+    return Drawing(body, (72.0 * whole.width, 72.0 * whole.height), alt, kind)
 
 
-def _lines(label: str, width: int) -> list[str]:
-    return [s for line in printable(label).split("\n") for s in wrap(line, width) or [""]]
+def _lines(label: str) -> list[str]:
+    return [s for line in printable(label).split("\n") for s in wrap(line, _LETTERS) or [""]]
 
 
 def legend(axes: Axes) -> None:
     """Name the curves right of the axes, long names in several lines; many make room for all."""
     handles, found = axes.get_legend_handles_labels()
-    labels = ["\n".join(_lines(label, 20)) for label in found]
+    labels = ["\n".join(_lines(label)) for label in found]
     if not handles:
         return
     axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
@@ -172,7 +191,7 @@ def _named(axes: Axes) -> None:
     if len(curves) < len(handles) or len(curves) > _FEW:
         legend(axes)
         return
-    names = [_lines(label, 23) for _, label in curves]
+    names = [_lines(label) for _, label in curves]
     figure = axes.get_figure(root=True)
     assert figure is not None
     needed = sum(_LINE * len(lines) + _GAP for lines in names) / 72 + 0.78  # inches
@@ -189,10 +208,11 @@ def _named(axes: Axes) -> None:
     sizes = [_LINE * len(lines) + _GAP for _, _, lines, _ in ends]
     places = _spread([at for at, *_ in ends], sizes, height)
     for place, (_, end, lines, colour) in zip(places, ends, strict=True):
-        axes.annotate("\n".join(lines), end, (1.05, place / height), textcoords="axes fraction",
-                      fontsize=8, va="center", color=colour, annotation_clip=False,
-                      arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5,
-                                  "shrinkA": 0, "shrinkB": 4, "relpos": (0.0, 0.5)})  # fmt: skip
+        axes.text(1.05, place / height, "\n".join(lines), transform=axes.transAxes, fontsize=8,
+                  va="center", color=colour)  # fmt: skip
+        (x, y), to = within.transform(end), (1.04, place / height)
+        figure.add_artist(Line2D((x, to[0]), (y, to[1]), transform=axes.transAxes, zorder=-1,
+                                 linewidth=0.5, color=colour))  # fmt: skip
 
 
 def _end_of(places: Any) -> tuple[float, float]:
@@ -380,7 +400,8 @@ def bars(title: str, parts: Sequence[Bar], said: str) -> Drawing:
         axes.set_position((1.75 / width, 0.05 / height, 1.9 / width, (height - 0.37) / height))
         axes.set_title(title, loc="left", x=-1.7 / 1.9, fontsize=9)
         rows = range(len(parts))
-        axes.barh(rows, [p.value for p in parts], xerr=[p.half for p in parts], height=0.6,
+        axes.barh(rows, [p.value for p in parts], height=0.6,
+                  xerr=[p.half or math.nan for p in parts],  # no caps where there is none
                   color=[_TOTAL if p.total else _PART for p in parts],
                   error_kw={"elinewidth": 1.0, "capsize": 3})  # fmt: skip
         axes.axvline(0.0, color="#333", linewidth=0.8)
@@ -445,14 +466,6 @@ def _logarithmic(axes: Axes, x_title: str, places: Sequence[tuple[float, float]]
     axes.set_xlabel(x_title)
 
 
-_PARTS = tuple(
-    Style(colour, "", dashes=dashes)
-    for colour, dashes in (("#c04a00", "-"), ("#0067a5", (0, (5, 2))), ("#00785a", (0, (2, 1.5))),
-                           ("#4d4d4d", (0, (8, 2, 2, 2))), ("#7a3e9d", (0, (1, 2))),
-                           ("#8a6a00", (0, (3, 1, 1, 1))))
-)  # fmt: skip
-
-
 def profile_panel(
     title: str, along: Sequence[float], curves: Sequence[tuple[str, Sequence[float]]],
     palette: Palette | None = None, marks: Sequence[float] = (), x_title: str = "time, s",
@@ -468,7 +481,7 @@ def profile_panel(
         Ascending.
     curves : sequence of (name, values)
     palette : Palette, optional
-        Where curves are solvers; else they have colours of their own.
+        Where the curves of a page share one; each place of few has its marker then.
     marks : sequence of float
         Instants to be marked by a vertical line.
     x_title : str
@@ -489,8 +502,9 @@ def profile_panel(
                               label="uncertainty")  # fmt: skip
         for mark in marks:
             axes.axvline(mark, color="#8f8f8f", linewidth=0.8, linestyle=(0, (4, 2)))
-        for k, (name, curve) in enumerate(curves):
-            style = _PARTS[k % len(_PARTS)] if palette is None else palette[name]
+        styles = Palette() if palette is None else palette
+        for name, curve in curves:
+            style = styles[name]
             few = style.marked if len(along) <= _MARKED and palette is not None else {}
             axes.plot(along, _gaps(curve), label=name, linestyle=style.dashes,
                       **{"color": style.colour, **few})  # fmt: skip
@@ -520,7 +534,8 @@ def ranges(
 ) -> Drawing | None:  # fmt: skip
     """Return numbers with their ranges on a logarithmic axis, the first on top; `line` is marked.
 
-    Ranges that reach out of `within` are cut off there. None if there is nothing positive.
+    The axis ends at `within`; a range that goes on has an arrow head there. None if there is
+    nothing positive.
     """
     drawn = [row for row in rows if _can_be_drawn((row.value, row.value))]
     if not drawn:
@@ -535,14 +550,19 @@ def ranges(
         axes.set_xlabel(x_title)
         axes.grid(True, axis="x", color=_GRID, linewidth=0.7)
         axes.axvline(line, color="#333", linewidth=0.9)
+        left, right = axes.get_xlim()
         for place, row in enumerate(drawn):
             style = palette[row.name]
             if row.low is not None and row.high is not None:
-                low, high = max(row.low, within[0], 1e-99), min(row.high, within[1])
+                low, high = max(row.low, left), min(row.high, right)
                 axes.plot([low, high], [place, place], color=style.colour,
                           linewidth=2.2, solid_capstyle="butt")  # fmt: skip
-            axes.plot([row.value], [place], color=style.colour, marker="o", markersize=5)
-            axes.annotate(_tick_text(row.value), (1.0, place), (4, 0), fontsize=8, va="center",
+                for end, head, cut in ((low, "<", row.low < left), (high, ">", row.high > right)):
+                    if cut:
+                        axes.plot([end], [place], color=style.colour, marker=head, markersize=6,
+                                  clip_on=False)  # fmt: skip
+            axes.plot([row.value], [place], **style.marked)
+            axes.annotate(_tick_text(row.value), (1.0, place), (9, 0), fontsize=8, va="center",
                           xycoords=("axes fraction", "data"), textcoords="offset points",
                           annotation_clip=False)  # fmt: skip
         axes.set_yticks(range(len(drawn)), [row.name for row in drawn], fontsize=8)
