@@ -126,25 +126,28 @@ def test_substeps_pay_where_the_whole_error_at_equal_work_is_a_fifth_less():
         return iterations_lead({"solver": "s", "tolerance": 0.01, "settings": rows}).sentences
 
     iterations, substeps = said(0.079)
-    assert "iterations in a step: 8 (c, 2 in each of 4 substeps)." in iterations
+    assert (
+        "within 1 % of the same steps, solved to convergence: 8 (c, 2 in each of 4 substeps)."
+        in iterations
+    )
     assert substeps.startswith("Substeps pay at equal work, on all 1 cases.")
     assert "c, 8 iterations: 0.079 with 4 substeps, 0.10 with 1" in substeps
     assert said(0.081)[1].startswith("Substeps do not pay at equal work on any of 1 cases.")
     never = {"solver": "s", "tolerance": 0.01, "settings": [setting(8, 1, 0.02, 0.1)]}
     sentence = iterations_lead(never).sentences[0]
-    assert sentence.startswith("Not within 1 % of its own steps, solved, on any of 1")
+    assert sentence.startswith("No number comes within 1 % of the same steps, solved to")
     assert "8 are not enough on c" in sentence
 
 
 def test_whose_claim_fails_is_said_in_words():
     def finding(whose, verdict, topic):
-        return {"topic": topic, "expected": f"limit of {topic}", "verdict": verdict, "whose": whose}
+        return {"topic": topic, "expected": f"{topic} holds", "verdict": verdict, "whose": whose}
 
     said = _said([
         finding("the thesis", "PASS", "a"), finding("the thesis", "FAIL", "b"),
         finding("this project", "UNDECIDED", "c"),
     ])  # fmt: skip
     assert said == [
-        "Of 2 claims of the thesis, 1 hold. Not: b (limit of b).",
-        "Of 1 claims of this project, 0 hold. Not told by this run: c (limit of c).",
+        "Of 2 claims of the thesis 1 hold. Failed: b holds.",
+        "Of 1 claims of this project 0 hold. Undecided: c holds.",
     ]

@@ -33,7 +33,7 @@ _HOLD = (
     "stable: no slivers in the face",
 )
 _FALL = (
-    "fewer unknowns: the catch",
+    "fewer unknowns: at every",
     "Table 4.6, the thesis' own",
 )
 

@@ -275,9 +275,9 @@ def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
         if not own:
             continue
         held = len(listed(own, verdict="PASS"))
-        text = f"Of {len(own)} claims of {whose}, {held} hold."
-        for verdict, lead in (("FAIL", "Not"), ("UNDECIDED", "Not told by this run")):
-            rest = [f"{one['topic']} ({one['expected']})" for one in listed(own, verdict=verdict)]
+        text = f"Of {len(own)} claims of {whose} {held} hold."
+        for verdict, lead in (("FAIL", "Failed"), ("UNDECIDED", "Undecided")):
+            rest = [one["expected"] for one in listed(own, verdict=verdict)]
             text += f" {lead}: {'; '.join(rest)}." if rest else ""
         said.append(text)
     return said or ["No claim was judged."]
@@ -328,8 +328,8 @@ def iterations_lead(record: Mapping[str, Any]) -> Lead:
         f"How many iterations does {record['solver']} need on a cut body, and do substeps help?",
         [_said_of_iterations(record, cases), _said_of_substeps(settings, cases)],
         iterations_panels(settings, "whole_error"),
-        "Distance from the smallest steps, solved, over the largest displacement (RMS over nodes), "
-        "against iterations in a step of the case: those of all its substeps.",
+        "Distance (RMS over nodes) from the answer with the smallest steps, solved to convergence, "
+        "over the largest displacement. Iterations in a step of the case: in all of its substeps.",
     )
 
 
@@ -386,10 +386,10 @@ def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
             met.append(f"{work} ({case}{each})")
         elif tried:
             missed.append(f"{max(work for work, _ in tried)} are not enough on {case}")
-    within = f"within {100 * tolerance:.2g} % of its own steps, solved"
+    within = f"within {100 * tolerance:.2g} % of the same steps, solved to convergence"
     if not met:
-        return f"Not {within}, on any of {len(cases)} cut cases: {'; '.join(missed)}."
-    said = f"To be {within}, it takes so many iterations in a step: {', '.join(met)}"
+        return f"No number comes {within}, on any of {len(cases)} cut cases: {'; '.join(missed)}."
+    said = f"So many iterations in a step of the case come {within}: {', '.join(met)}"
     return f"{said}; {'; '.join(missed)}." if missed else f"{said}."
 
 
@@ -421,7 +421,7 @@ def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
         f"pay at equal work{where}" if better else f"do not pay at equal work on any of {compared}"
     )
     shown = "; ".join(text for own in told.values() for text in own)
-    return f"Substeps {said} cases. Error of the whole: {shown}."
+    return f"Substeps {said} cases. Error beside the smallest steps: {shown}."
 
 
 _VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
