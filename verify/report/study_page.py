@@ -253,7 +253,9 @@ def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
     over_cuts = partial(over, steps, "asked_cuts", "cuts", "asked_tetrahedra")
     over_sizes = partial(over, delays, "tetrahedra", "tetrahedra", "speed_name")
     unknowns = [profile_panel("nodes added", cuts, nodes, x_title="cut elements")]
-    caption = "Nodes added by cuts that grow; S + S is snapping and subdivision with its threshold."
+    caption = (
+        "Nodes added as cuts grow. S + S: snapping and subdivision, with its threshold in edges."
+    )
     question, said = "Which claims of the thesis hold?", _said(record["findings"])
     return {
         "lead": Lead(question, said, unknowns, caption),

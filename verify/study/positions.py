@@ -16,6 +16,7 @@ from verify.errors import InputError
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import number_on_finest
 from verify.judge.models import changed, on_one_level
+from verify.report.notation import metric_title
 from verify.result import CaseResult
 from verify.scene import Scene, scene_content
 from verify.study.study import Finding, Making, Study
@@ -244,8 +245,9 @@ def _findings(pairs: Sequence[dict[str, Any]], measure: str) -> Iterator[Finding
         for pair in _against(pairs, metric, measure):
             said = "they differ" if pair["differs"] else "they are not told apart"
             text = (
-                f"The ratio of {metric} to that of {measure} is {pair['ratio']:.3g} in the median, "
-                f"{pair['low']:.3g} to {pair['high']:.3g} in 90 % of {pair['count']} ratios, from "
-                f"{pair['scenes']} scene{'s' * (pair['scenes'] != 1)}: {said}."
+                f"The {metric_title(metric)} over the one of {measure} is {pair['ratio']:.3g} in "
+                f"the median and {pair['low']:.3g} to {pair['high']:.3g} in 90 % of "
+                f"{pair['count']} ratios, from {pair['scenes']} "
+                f"scene{'s' * (pair['scenes'] != 1)}: {said}."
             )
             yield Finding(pair["solver"], text, "they differ where the range excludes 1", None)

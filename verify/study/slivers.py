@@ -15,6 +15,7 @@ from scipy.stats import t as student
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line, words_of
+from verify.report.notation import metric_title
 from verify.result import Verdict
 from verify.scene import Analysis, Box, Rectangle, Scene, restore_scene
 from verify.solvers import Solver
@@ -371,11 +372,15 @@ def _near(topic: str, error: str, values: Values) -> Iterator[Finding]:
         return
     expected = f"within {_NEAR_LIMIT:.0%} of the error at ε = 0, for ε ≤ {NEAR:g}"
     if max(base, *small.values()) <= _ROUND_OFF:
-        yield Finding(topic, f"{error} is round-off at every ε ≤ {NEAR:g}.", expected, Verdict.PASS)
+        text = f"The {metric_title(error)} is round-off at every ε ≤ {NEAR:g}."
+        yield Finding(topic, text, expected, Verdict.PASS)
         return
     worst = max(small, key=lambda e: abs(small[e] / base - 1.0))
     off = small[worst] / base - 1.0
-    text = f"{error} at ε = {worst:g} is {small[worst]:.4g}, {off:+.2%} from that at ε = 0."
+    text = (
+        f"The {metric_title(error)} at ε = {worst:g} is {small[worst]:.4g}; it is "
+        f"{100 * abs(off):.2f} % {'above' if off > 0 else 'below'} the one at ε = 0."
+    )
     yield Finding(topic, text, expected, held(abs(off) <= _NEAR_LIMIT))
 
 
@@ -384,7 +389,8 @@ def _far(topic: str, error: str, values: Values, others: Values) -> Iterator[Fin
     if not both or max(values[e] for e in both) <= _ROUND_OFF:
         return
     worst = max(both, key=lambda e: both[e])
-    text = f"{error} at ε = {worst:g} is {both[worst]:.3f} times that of the conforming mesh."
+    text = f"The {metric_title(error)} at ε = {worst:g} is {both[worst]:.3f} times as large as on "
+    text += "the conforming mesh."
     expected = f"at most {_FAR_LIMIT:g}, for ε > {NEAR:g}"
     yield Finding(topic, text, expected, held(both[worst] <= _FAR_LIMIT))
 

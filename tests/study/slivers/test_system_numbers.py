@@ -242,4 +242,7 @@ def test_errors_are_held_against_the_row_at_zero_and_the_conforming_mesh(near, f
 
     measured = [row("own", 0.5, far), row("own", 1e-6, near), row("own", 0.0, 1.0)]
     measured += [row("conforming", 0.5, 1.0)]
-    assert [f.verdict for f in findings(measured, [])] == verdicts
+    found = list(findings(measured, []))
+    assert [f.verdict for f in found] == verdicts
+    off = f"{100 * abs(near - 1.0):.2f} % {'above' if near > 1.0 else 'below'} the one at ε = 0."
+    assert found[0].sentence.endswith(off)
