@@ -8,7 +8,7 @@ from synthetic_studies import measured
 
 from verify.report import plots as figures
 from verify.report.plots import Palette, Series, loglog
-from verify.report.sliver_page import sliver_lead
+from verify.report.sliver_page import sliver_families, sliver_lead
 from verify.report.study_page import _said, iterations_lead
 
 STEP, UNCUT = "critical explicit step", "critical explicit step, uncut"
@@ -97,6 +97,18 @@ def test_curves_that_nobody_can_tell_apart_are_one_and_end_where_unknowns_change
     assert [x for x in places[:, 0] if x == x] == [0.1, 1e-3, 1e-6]  # falling
     assert len(places) == 4  # no line from the split mesh to the cut on nodes
     assert places[2] != pytest.approx(places[2], nan_ok=False)
+
+
+def test_panels_of_one_page_tell_by_their_titles_what_they_hold():
+    """Eight variants, one of which stands in a panel with the others."""
+    names = [*(f"xfem mass={n}" for n in range(8)), "conforming", "subdivision"]
+    errors = {name: (0.1, 0.1 * (k + 1), 0.1) for k, name in enumerate(names)}
+    ((family,), own) = sliver_families(record(errors)), "relative L² error of the displacement"
+    titles = [panel.alt.partition(" against ")[0] for panel in family["curves"]]
+    assert titles == [
+        f"{own}: variants of XFEM, 1 of 2", f"{own}: variants of XFEM, 2 of 2",
+        f"{own}: XFEM beside others",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("count", [1, 6])

@@ -5,7 +5,7 @@ If one solver takes part with many values of one number, the question is what th
 
 import re
 from collections.abc import Mapping, Sequence
-from itertools import groupby
+from itertools import batched, groupby
 from typing import Any
 
 from verify.report.notation import (
@@ -308,14 +308,16 @@ def _panels(title: str, series: Mapping[str, Series], palette: Palette) -> list[
     for label in joined:
         variants.setdefault(label.split()[0], []).append(label)
     many = max(variants.values(), key=len, default=[])
-    groups = [list(joined)]
+    groups = {title: list(joined)}
     if len(joined) > _FEW and 1 < len(many) < len(joined):
-        groups = [many, [label for label in joined if label not in many[1:]]]
+        name = solver_title(many[0].split()[0])
+        others = [label for label in joined if label not in many[1:]]
+        groups = {f"{title}: variants of {name}": many, f"{title}: {name} beside others": others}
     return [
-        loglog(title, "ε, in elements", [joined[label] for label in group[at : at + _FEW]],
-               palette, falling=True)
-        for group in groups
-        for at in range(0, len(group), _FEW)
+        loglog(f"{words}, {part} of {-(-len(group) // _FEW)}" if len(group) > _FEW else words,
+               "ε, in elements", [joined[label] for label in own], palette, falling=True)
+        for words, group in groups.items()
+        for part, own in enumerate(batched(group, _FEW), 1)
     ]  # fmt: skip
 
 
