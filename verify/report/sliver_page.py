@@ -121,7 +121,7 @@ def _shares(measured: Records, family: str, solver: str) -> list[tuple[float, fl
 def _ratios(
     measured: Records, family: str, solver: str, quantity: str, rival: str = _MEASURE
 ) -> dict[float, float]:
-    """Return values over those of another solver, by ε."""
+    """Return values over the values of another solver, by ε."""
     own, others = (_values(measured, family, s, quantity) for s in (solver, rival))
     return {size: value / others[size] for size, value in own.items() if others.get(size)}
 
