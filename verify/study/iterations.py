@@ -140,7 +140,7 @@ def iterations_study(
     Raises
     ------
     InputError
-        If the truth has no answer, or not on the nodes of the solver.
+        If the truth has no answer on the nodes of the solver in any scene.
     """
     asked = sorted(grid.substeps)
     truths = {count: grid.set(truth, None, count) for count in (*asked, _FINER * asked[-1])}
@@ -152,14 +152,22 @@ def iterations_study(
     names = tuple(dict.fromkeys([*truths.values(), *counted.values()]))
     place = making.place_of("iterations", [[scene_content(scene) for scene in scenes], names])
     making.announce(f"{len(names)} settings of {len(scenes)} cases, into {place}")
-    settings = [
-        setting
-        for found in making.solved([coarsest(scene, 1) for scene in scenes], place, names)
-        for setting in _settings(found, truths, counted)
+    settings: list[Setting] = []
+    without: dict[str, InputError] = {}
+    for found in making.solved([coarsest(scene, 1) for scene in scenes], place, names):
+        try:
+            settings += _settings(found, truths, counted)
+        except InputError as problem:  # of this scene alone
+            without[found.scene.name] = problem
+    if not settings:
+        raise next(iter(without.values()))
+    left_out = [
+        Finding(f"{case}, {variant.label}", f"Not compared: {problem.what}.", "", None)
+        for case, problem in without.items()
     ]
     return IterationsStudy(
         solver=variant.label, truth=truth.label, tolerance=tolerance, settings=settings,
-        findings=_findings(variant.label, settings, tolerance, grid.names),
+        findings=[*_findings(variant.label, settings, tolerance, grid.names), *left_out],
     )  # fmt: skip
 
 
