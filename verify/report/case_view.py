@@ -86,23 +86,26 @@ class CaseView:
     reference_tables: list[Table] = field(default_factory=list)
 
 
-def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
-    """Return the view of case number `index`, with notes on missing pictures."""
+def case_view(
+    index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette, drawn: bool = True
+) -> CaseView:
+    """Return the view of case number `index`, with notes on missing pictures, perhaps undrawn."""
     anchor, result = f"case-{index + 1}", entry.result
     if result is None:
         return CaseView(anchor, entry.name, entry.name, Verdict.ERROR,
                         defect=f"Not judged: {entry.defect}.", unjudged=entry.unjudged)  # fmt: skip
     view = CaseView(anchor, entry.name, result.title, result.verdict, result, pictures=pictures)
     try:
-        _fill(view, result, palette)
-        show_pictures(view)
+        _fill(view, result)
+        if drawn:
+            _draw(view, result, palette)
     except Exception as error:
         said = f"This case cannot be shown: {words_of(error)}. Its numbers are in results.json."
         return CaseView(anchor, entry.name, result.title, view.verdict, defect=said)
     return view
 
 
-def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
+def _fill(view: CaseView, result: CaseResult) -> None:
     view.failing = [solver_title(name) for name in result.failing]
     of_solver: dict[str, list[Verdict]] = {}
     for record in result.verdicts:
@@ -111,14 +114,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     for notice in result.warnings:
         whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
         view.warnings.append((f"{whose}{notice.about}", notice.text))
-    try:
-        view.facts, view.sketch = problem_facts(result.scene), sketch(result.scene)
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        view.facts.append(("Sketch", [f"cannot be drawn ({words_of(error)})"]))
     view.tables, view.metrics = case_tables(result), metric_names(result)
-    _convergence(view, result, palette)
-    view.openings = opening_figures(result, palette)
-    view.motion = motion_view(result, palette)
     view.many = len({solve.solver for solve in result.solves}) > MANY
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
@@ -126,6 +122,17 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.reference_tables = reference_tables(
         result.reference, {m.name: m.unit for s in result.solves for m in s.metrics}
     )
+
+
+def _draw(view: CaseView, result: CaseResult, palette: Palette) -> None:
+    try:
+        view.facts, view.sketch = problem_facts(result.scene), sketch(result.scene)
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        view.facts.append(("Sketch", [f"cannot be drawn ({words_of(error)})"]))
+    _convergence(view, result, palette)
+    view.openings = opening_figures(result, palette)
+    view.motion = motion_view(result, palette)
+    show_pictures(view)
 
 
 def show_pictures(view: CaseView) -> None:

@@ -290,7 +290,7 @@ def _written(run: Run, directory: Path, jobs: int) -> tuple[Path, dict[str, Any]
 
 def _summary(run: Run, directory: Path) -> Path:
     palette, none = run_palette(run.record), CasePictures()
-    cases = [case_view(i, entry, none, palette) for i, entry in enumerate(run.entries)]
+    cases = [case_view(i, entry, none, palette, drawn=False) for i, entry in enumerate(run.entries)]
     view = page_view(run, cases, palette, [], short=True)
     view["origin"] = [fact for fact in view["origin"] if fact[0] in _PUBLISHED]
     target = directory / "summary.md"
