@@ -125,6 +125,8 @@ def test_a_page_says_once_what_its_scenes_levels_and_limit_are(tmp_path):
     assert "| solver | all | C1 | f3_inclined |" in mixed
     assert "| solver | all | benchmark/c5_blade_01 | benchmark/c5_blade_03 |" in same
     assert own.count("differ where the range excludes 1") == 1
+    html = render_study(tmp_path / "own", "positions").read_text("utf-8")
+    assert 'class="verdicts free"' in html  # on a phone its third column is called no limit
 
 
 # off by 0.01 (1 + position)^power in every norm; on the third mesh it breaks if asked
