@@ -61,6 +61,30 @@ STUDIES = {
              "fastest": 0.4, "slowest": 0.6},
         ],
     },
+    "thesis": {
+        "face": [{
+            "asked": 10, "cuts": 10, "strokes": 1, "step": {"xfem": 1.0},
+            "thesis": {"xfem": 16, "snapping_subdivision": 20},
+            "added": {"xfem": 8, "snapping_subdivision 0.02": 19, "snapping_subdivision 0.2": 13},
+        }],
+        "steps": [
+            {"asked_tetrahedra": 200, "tetrahedra": 207, "asked_cuts": n, "cuts": n, "nodes": n,
+             "thesis_nodes": n, "step": 7.5e-4, "per_second": 1.5e-3,
+             "thesis_per_second": 0.28435}
+            for n in (0, 50)
+        ],
+        "delays": [
+            {"tetrahedra": n, "speed_name": "slow", "speed": 0.0104, "elements": 138, "edge": 0.016,
+             "delay": 0.7124, "seen": 0.7218, "thesis": 0.7124}
+            for n in (200, 400)
+        ],
+        "hand": {
+            "tetrahedra": 1005, "cuts": 243, "unknowns": 1674, "steps": 276, "cutting_steps": 43,
+            "within": {"1 ms": 0.25, "2 ms": 0.5}, "within_wall": {"1 ms": 0.0, "2 ms": 0.125},
+            "resting": {"step": 2.44e-3}, "cutting": {"step": 0.0231},
+        },
+        "contended": "", "published": {"source": HOSTILE},
+    },
     "calibration": {"trials": [
         {"family": "airy", "scene": 0, "degree": 1, "level": 2, "quantity": "jump_l2",
          "stated": 2e-3, "true": 1e-3, "ratio": 2.0, "covered": True, "left_out": ""},

@@ -173,6 +173,8 @@ def test_numbers_of_studies_are_those_of_the_record(studies):
         ("energy", "XFEM scheme=x"), ("energy", "2.50×10⁻¹³"),
         ("cost", "500\N{NO-BREAK SPACE}ms (400–600)"), ("cost", "not reached"),
         ("budget", "−2.03 %"), ("budget", "round-off"), ("budget", "it ran away"),
+        ("thesis", "within 1 ms 25.0 % (0.0 % in wall time), within 2 ms 50.0 % (12.5 % in wall"),
+        ("thesis", "0.28435\N{NO-BREAK SPACE}s"), ("thesis", "10.4\N{NO-BREAK SPACE}mm/s"),
         ("calibration", "2.00"), ("calibration", "1 marks, 0 not covered"),
     ):  # fmt: skip
         assert said in texts[kind], (kind, said)
