@@ -10,6 +10,7 @@ from verify.compare.body_rule import rules
 from verify.compare.cut_rule import cut_rule_of
 from verify.compare.errors import displacement_jump, nodal_error
 from verify.compare.realised import cut_deviation, field_of
+from verify.compare.sides import distance_to_segments
 from verify.scene import load_scene
 
 _MOVED = 1e-9  # parts are moved by whole numbers
@@ -83,3 +84,22 @@ def test_the_ends_of_a_cut_have_no_sides_beyond_them():
     solution, _ = moved_parts(scene, random_square(12, random), 1 / 12)
     field = field_of(solution, body)
     assert np.abs(displacement_jump(field, cut_rule_of(body, 1 / 12))).max() < _MOVED
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_distances_to_segments_hold_within_a_reach_and_beyond_it_are_no_smaller(d):
+    """Segments of lengths from 0 to 2, points on both sides of the reach; dense sampling."""
+    random = np.random.default_rng(d)
+    starts = random.uniform(-1, 1, (9, d))
+    lengths = np.linspace(0.0, 1.0, 9)[:, None]
+    segments = np.stack([starts, starts + lengths * random.uniform(-1, 1, (9, d))], axis=1)
+    points = random.uniform(-1.5, 1.5, (400, d))
+    t = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    along = (1 - t) * segments[:, 0] + t * segments[:, 1]
+    true = np.array([np.linalg.norm(along - x, axis=2).min() for x in points])
+    found = distance_to_segments(points, segments, 0.5)
+    near = true < 0.5 - 1e-3
+    assert near.sum() > 20
+    assert np.abs(found - true)[near].max() < 1e-3  # of the sampling
+    assert found[~near].min() > 0.5 - 2e-3
+    assert np.isinf(distance_to_segments(points, segments[:0], 0.5)).all()

@@ -190,10 +190,11 @@ def _said_of_sweep(name: str, worst: Mapping[str, Mapping[float, float]]) -> lis
         if bad[0] in own and values[-1] in own
     ]
     end = [own for own in worst.values() if len(own) > 1]
+    locks = ", and it locks" if most[values[-1]] > 2.0 else ""
     flat = all(own[v] <= (1.0 + _ALIKE) * own[u] for own in end for u, v in [sorted(own)[-2:]])
     return [
         *said,
-        f"From {bad[0]:g} on it locks: {'; '.join(parts)}."
+        f"From {bad[0]:g} on errors grow{locks}: {'; '.join(parts)}."
         + (
             f" Beyond {values[-2]:g} no error grows by more than {_ALIKE:.0%}."
             if flat and len(bad) > 1
