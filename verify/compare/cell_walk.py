@@ -60,8 +60,8 @@ class Walk:
     ) -> Ints:
         """Find the cells (n,) that hold points (n, d) more than a `tolerance` deep, or −1.
 
-        A walk begins in one of the cells `begin`, and ends well only in a cell for which
-        ``fits(points, cells)`` is true, of the numbers of both.
+        A walk begins in one of the cells `begin`. ``fits(points, cells)`` tells by their numbers
+        in which cells it may end.
         """
         found, columns = np.full(len(points), -1), np.ascontiguousarray(points.T)
         beside = _neighbours(self._corners)

@@ -26,7 +26,7 @@ from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.solution import Solution
 
-_AT_ONCE = 1 << 11  # matrices: what is made of them stays in the cache
+_AT_ONCE = 1 << 11  # matrices: their arrays stay in the cache
 _NEWTON_STEPS, _SETTLED = 9, 1e-9  # the last step; its square is left
 
 Array = NDArray[np.float64]
