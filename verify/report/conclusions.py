@@ -153,12 +153,14 @@ def _real_time(evidence: Evidence) -> Found | None:
     if not hand:
         return None
     slowest, cells = float(hand["slowest"]), int(hand["tetrahedra"])
+    keeps = "keeps" if slowest <= FRAME else "does not keep"
     text = (
-        f"In real time, XFEM's engine cuts a hand of {number(cells)} tetrahedra at 60 frames a "
-        f"second: its slowest step took {number(1e3 * slowest, 2)} ms."
+        f"In real time, XFEM's engine {keeps} 60 frames a second while a hand of {number(cells)} "
+        f"tetrahedra is cut: its slowest step took {number(1e3 * slowest, 2)} ms, on a machine "
+        f"whose calibration kernel took {number(1e3 * float(hand['kernel']), 2)} ms (6 if quiet)."
     )
     numbers = f"{hand['steps']} steps, {hand['cuts']} elements cut, slowest {slowest:.4f} s"
-    return Found(text, numbers, "every step within 1/60 s", slowest <= FRAME, "thesis")
+    return Found(text, numbers, "every step within 1/60 s; the sentence tells", True, "thesis")
 
 
 def _sofa(evidence: Evidence) -> Found | None:
