@@ -18,7 +18,7 @@ from verify.report.plots import Palette, Series, loglog
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
 from verify.report.which import which_view
-from verify.result import CaseResult, Status, Verdict, VerdictRecord
+from verify.result import REFERENCE, CaseResult, Status, Verdict, VerdictRecord
 
 _NAMED = 6  # entries of a list in the paragraph
 _PLACES = 2  # of what one solver fails
@@ -37,13 +37,13 @@ def overview(run: Run, cases: Sequence[CaseView], palette: Palette) -> dict[str,
         notes.append(
             "the code differed from its commit when this ran: it cannot be reproduced from it."
         )
-    asked = [s.solver for s in solves if s.solver != "reference"]
+    asked = [s.solver for s in solves if s.solver != REFERENCE]
     asked += [v.solver or "nobody" for _, v in judged]
     names = [solver_title(name) for name in dict.fromkeys(asked)]
     view: dict[str, Any] = {
         "counts": {str(verdict): counts[str(verdict)] for verdict in Verdict},
         "cases": len(run.entries), "checks": len(judged), "solves": len(solves),
-        "solvers": len({v.solver for _, v in judged if v.solver}),
+        "solvers": len({v.solver for _, v in judged} - {"", REFERENCE}),
         "findings": _findings(run, judged),
         "unchecked": _listed([e.name for e in run.entries if e.result and not e.result.verdicts]),
         "ended": ", ".join(f"{count} {name}" for name, count in sorted(ended.items())),
