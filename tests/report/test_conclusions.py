@@ -181,9 +181,11 @@ def test_a_sentence_without_support_stops_the_publication(name, evidence):
     assert "Rewrite these sentences" in said
 
 
-@pytest.mark.parametrize(("slowest", "words"), [(0.016, " keeps 60"), (0.017, "not keep 60")])
-def test_real_time_is_told_with_the_speed_of_the_machine(slowest, words):
-    hand = {**made().hand, "slowest": slowest, "kernel": 0.0189}
+@pytest.mark.parametrize(("slowest", "busy", "words"), [
+    (0.016, "load 3", " keeps 60"), (0.017, "", "not keep 60"), (0.017, "load 3", "nothing is"),
+])  # fmt: skip
+def test_real_time_is_told_with_the_speed_of_the_machine(slowest, busy, words):
+    hand = {**made().hand, "slowest": slowest, "kernel": 0.0189, "contended": busy}
     (sentence,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
                    if s.name == "real time")  # fmt: skip
     found = sentence.of(made(hand=hand))
@@ -398,6 +400,7 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     head = "\n".join(arena_head(evidence, answer(evidence), tmp_path))
     assert head.startswith("- **Accuracy at rest**: XFEM or a conforming mesh")
     assert "answered of asked. " in head
+    assert "**Verdicts of XFEM**: of 0 checks 0 failed" in head  # made without checks
     assert "SOFA" not in head  # of another run
     assert "snapping 7 of 8" in head  # bars count scenes
     assert "getfem 2 of 3" in head

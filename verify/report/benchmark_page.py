@@ -33,6 +33,7 @@ _LEGEND = (
     "they were studied; where orders differ, ratios grow with the level. – refused with a reason; "
     "× asked, and not solved; blank: not asked. ≈ the reference cannot tell the error from none. "
     "Several members of a scene (C5, C8) count by their median. Programs in one row agree to 10⁻⁶. "
+    "C8 motion: the norm hardly sees the small corner; its fall is judged (verdicts). "
     f"{MISSING} A part of the body is missing, which is softer; linear elements are stiffer, and "
     "the errors can cancel: it is never the least."
 )

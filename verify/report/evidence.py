@@ -111,7 +111,8 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
         benchmark_positions=table("benchmark_positions", "positions.csv"),
         slivers=table("slivers", "slivers.csv"), claims=table("claims", "claims.csv"),
         speed=_rows(published / "speed.csv"),
-        hand=dict(thesis.get("hand") or {}),
+        hand={**(thesis.get("hand") or {}), "contended": thesis.get("contended")}
+        if thesis.get("hand") else {},
         commands=commands, tips=_with_tips({row["scene"] for row in positions}),
     )  # fmt: skip
 
@@ -227,7 +228,8 @@ class Beside:
             f"{self.count} scene{'s' if self.count != 1 else ''}"
         )
         if any(self.outcomes):
-            text += " ({} won, {} tied, {} lost)".format(*self.outcomes)
+            won, tied, lost = self.outcomes
+            text += f" (with exact ones: {won} won, {tied} tied, {lost} lost)"
         if self.scatter is None:
             return f"{text}; mesh scatter not studied"
         middle, low, high = (number(v, 3) for v in self.scatter)

@@ -1,5 +1,6 @@
 """Front pages of the results and of the ranked run: answers and figures."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from verify.report.notation import Drawing, number, solver_title
 from verify.report.plots import Bar, Palette, Ranged, Series, bars, loglog, ranges
 from verify.report.rendering import Beside as Pictures
 from verify.report.rendering import in_markdown
-from verify.result import CaseResult
+from verify.result import CaseResult, Verdict
 
 PICTURES = "front-pictures"
 _STEPS = (
@@ -30,6 +31,7 @@ _STEPS = (
     MEASURE,
 )  # fmt: skip
 _FAR = 10.0  # ratios beyond it, or below its inverse, would press the others onto one line
+_CONTROLS = ("uncut", "mass_spring")
 _OF_THE_ARENA = ("Accuracy at rest", "Accuracy at a tip", "A moving body, a blade, real time",
                  "Why (not) remesh?", "What it costs")  # fmt: skip
 _RATIOS = {"Accuracy at rest": "through", "Accuracy at a tip": "tip",
@@ -75,6 +77,15 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
         if own.question in _OF_THE_ARENA:
             told = " ".join(one.text for one in own.found.values() if one.source == "arena")
             lines += [f"- **{own.question}**: {told}"] if told else []
+    verdicts = [v for result in evidence.results for v in result.verdicts]
+    failed = [v.solver for v in verdicts if v.verdict is Verdict.FAIL]
+    counts = Counter(str(v.verdict) for v in verdicts if v.solver == "xfem")
+    lines.append(
+        f"- **Verdicts of XFEM**: of {counts.total()} checks {counts['FAIL']} failed and "
+        f"{counts['UNDECIDED']} are undecided. Of all {len(failed)} failures "
+        f"{sum(name in _CONTROLS for name in failed)} are of the controls "
+        f"{' and '.join(_CONTROLS)}."
+    )
     return [*lines, "", " ".join(figure[0] for figure in shown.values()), "", *combined(evidence)]
 
 

@@ -161,9 +161,9 @@ def _lead_of_sweep(measured: Records, name: str, values: Mapping[str, float]) ->
     question = _QUESTIONS.get(name, f"What does {name} do to the error?")
     return Lead(
         question, _said_of_sweep(name, worst), [loglog(title, name, series, palette)],
-        f"{len(values)} values of {name}; each point is the largest over ε of "
-        f"{_listed(list(families))}. At {first}, over a conforming mesh of the same size, at most: "
-        f"{beside}.",
+        f"{len(values)} values of {name} of {labels[0].split()[0]}; each point is the largest over "
+        f"ε of {_listed(list(families))}. At {first}, over a conforming mesh of the same size, at "
+        f"most: {beside}.",
     )  # fmt: skip
 
 
@@ -178,29 +178,23 @@ def _said_of_sweep(name: str, worst: Mapping[str, Mapping[float, float]]) -> lis
     else:
         off = max(most[value] for value in good) - 1.0
         said = [
-            f"Up to {name} = {good[-1]:g} it costs nothing: at every ε no error is more than "
+            f"Up to {name} = {good[-1]:g} it adds no error: at every ε none is more than "
             f"{100 * max(off, 0.0):.1f} % above that at {values[0]:g}."
         ]
     if not bad:
         return [*said, f"Larger values were not tried: {values[-1]:g} is the last."]
     parts = [
-        f"{_OF_SWEEPS[error]}: {_times(own[bad[0]])} at {bad[0]:g}, {_times(own[values[-1]])} at "
-        f"{values[-1]:g}"
-        for error, own in worst.items()
-        if bad[0] in own and values[-1] in own
-    ]
-    end = [own for own in worst.values() if len(own) > 1]
+        ", ".join(f"{_OF_SWEEPS[error]} {_times(own[at])}"
+                  for error, own in worst.items() if own.get(at, 0.0) > 1.0 + _ALIKE)
+        + f" at {at:g}"
+        for at in dict.fromkeys((bad[0], values[-1]))
+    ]  # fmt: skip
     locks = ", and it locks" if most[values[-1]] > 2.0 else ""
-    flat = all(own[v] <= (1.0 + _ALIKE) * own[u] for own in end for u, v in [sorted(own)[-2:]])
-    return [
-        *said,
-        f"From {bad[0]:g} on errors grow{locks}: {'; '.join(parts)}."
-        + (
-            f" Beyond {values[-2]:g} no error grows by more than {_ALIKE:.0%}."
-            if flat and len(bad) > 1
-            else ""
-        ),
-    ]
+    level = next(v for v in values if all(
+        max(own.values()) <= (1.0 + _ALIKE) * own.get(v, 0.0) for own in worst.values()
+    ) or v == values[-1])  # fmt: skip
+    end = f" Beyond {level:g} none grows by more than {_ALIKE:.0%}." if level < values[-1] else ""
+    return [*said, f"From {bad[0]:g} on errors grow{locks}: {'; '.join(parts)}.{end}"]
 
 
 def _times(ratio: float) -> str:

@@ -293,7 +293,8 @@ def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
         if good:
             work, count, parts = min(good)
             each = f", {count} in each of {parts} substeps" if parts > 1 else ""
-            met.append(f"{work} ({case}{each})")
+            most = "at most " if work == min(work for work, _ in tried) else ""
+            met.append(f"{most}{work} ({case}{each})")
         elif tried:
             missed.append(f"{max(work for work, _ in tried)} are not enough on {case}")
     within = f"within {100 * tolerance:.2g} % of the same steps, solved to convergence"
