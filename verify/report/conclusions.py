@@ -132,7 +132,7 @@ def _weighed(
     needs = f"a difference of {factor:g}, to the same side over positions of the mesh if studied"
     text = words[side + 1].format(own.over_scenes if own.scatter is None else number(own.ratio, 2))
     if own.scatter is not None:
-        text += own.over_positions + (": not told apart." if not shown else ".")
+        text += own.over_positions + (", not told apart." if not shown else ".")
     return Found(text, own.written, needs, not side or shown in (0, side))
 
 
@@ -153,18 +153,17 @@ def _real_time(evidence: Evidence) -> Found | None:
     if not hand:
         return None
     slowest, cells = float(hand["slowest"]), int(hand["tetrahedra"])
-    what = f"60 frames a second while a hand of {number(cells)} tetrahedra is cut"
-    if slowest <= FRAME:
-        said = f"In real time, XFEM's engine keeps {what}"
-    elif hand.get("contended"):
-        said = f"On a busy machine nothing is told of {what}"
-    else:
-        said = f"In real time, XFEM's engine does not keep {what}"
+    cuts = "cuts" if slowest <= FRAME else "does not cut"
+    busy = hand.get("contended") and slowest > FRAME
     text = (
-        f"{said}: its slowest step took {number(1e3 * slowest, 2)} ms, where the calibration "
-        f"kernel took {number(1e3 * float(hand['kernel']), 2)} ms (6 if quiet)."
+        f"XFEM's engine {'may cut' if busy else cuts} a hand of {number(cells)} tetrahedra at 60 "
+        f"frames a second: its slowest step took {number(1e3 * slowest, 2)} ms"
+        f"{' on a busy machine' if busy else ''}."
     )
-    numbers = f"{hand['steps']} steps, {hand['cuts']} elements cut, slowest {slowest:.4f} s"
+    numbers = (
+        f"{hand['steps']} steps, {hand['cuts']} elements cut, slowest {slowest:.4f} s; calibration "
+        f"kernel {number(1e3 * float(hand['kernel']), 2)} ms, 6 if quiet"
+    )
     return Found(text, numbers, "every step within 1/60 s; the sentence tells", True, "thesis")
 
 
@@ -175,10 +174,11 @@ def _sofa(evidence: Evidence) -> Found | None:
     ratios = [float(row["ratio"]) for row in rows]
     text = (
         f"On uncut bodies a step without surfaces takes {number(min(ratios), 2)} to "
-        f"{number(max(ratios), 2)} times as long as SOFA's, recorded elsewhere and scaled by "
-        "memory bandwidth."
+        f"{number(max(ratios), 2)} of SOFA's time, recorded elsewhere and scaled."
     )
-    numbers = ", ".join(f"{row['ratio']} at {row['size']}" for row in rows)
+    numbers = "scaled by memory bandwidth: " + ", ".join(
+        f"{row['ratio']} at {row['size']}" for row in rows
+    )
     return Found(text, numbers, "at most 1", max(ratios) <= 1.0, "speed")
 
 
@@ -209,8 +209,8 @@ def _step_kept(evidence: Evidence) -> Found | None:
         return None
     _, size, least = found[0]
     text = (
-        "XFEM with a mass lumped on each side of the cut: where cuts go through, it keeps "
-        f"{number(least, 3)} of the uncut body's step, however close they pass to nodes"
+        "XFEM with a mass lumped on each side of the cut: through cuts leave "
+        f"{number(least, 3)} of the uncut body's step, however close to nodes"
     )
     moved = [
         float(row["value"]) for row in evidence.claims
@@ -218,8 +218,7 @@ def _step_kept(evidence: Evidence) -> Found | None:
     ]  # fmt: skip
     text += f"; on meshes with moved nodes at least {number(min(moved), 2)}" if moved else ""
     text += (
-        ". The smallest uncut element's step is always kept there; [ends of cuts]"
-        "(../theory/xfem.md) keep less."
+        ", always that of the smallest uncut element. [Ends of cuts](../theory/xfem.md) leave less."
     )
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
@@ -291,8 +290,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
     "Accuracy at rest": (
         Sentence("through", _RUN_BOTH, partial(
             _close, kind="through", least=1 / QUARTER, template="XFEM or a conforming mesh: "
-            "where cuts go through, XFEM's displacement "
-            "error is {} times a conforming mesh's.")),
+            "where cuts go through, XFEM's error is {} times a conforming mesh's.")),
     ),
     "Accuracy at a tip": (
         Sentence("tip", _RUN_BOTH, partial(

@@ -218,7 +218,7 @@ class Beside:
         if self.scatter is None:
             return ""
         middle, low, high = (number(value, 2) for value in self.scatter)
-        return f" Over positions of the mesh it is {middle} ({low} to {high})"
+        return f" Over positions: {middle} ({low} to {high})"
 
     @property
     def written(self) -> str:

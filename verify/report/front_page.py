@@ -65,7 +65,7 @@ def write_front(
         lines += [*_answered(evidence, own), *pictures.get(own.question, [])]
         if kind := _RATIOS.get(own.question):
             lines += _differences(evidence, kind)
-    lines += ["## All results", "", *links]
+    lines += ["## All results", "", " · ".join(links)]
     write_whole(folder / "index.md", "\n".join(lines) + "\n")
 
 
@@ -190,8 +190,8 @@ def _differences(evidence: Evidence, kind: str) -> list[str]:
     shown = {
         "less accurate": [n for n, own in found if own.scatter and own.scatter[1] > 1.0],
         "more accurate": [n for n, own in found if own.scatter and own.scatter[2] < 1.0],
-        "beyond the axis": [f"{n} ({number(_middle(own), 2)} times the error)" for n, own in found
-                            if not 1 / _FAR <= _middle(own) <= _FAR],
+        "ratios beyond the axis": [f"{n} {number(_middle(own), 2)}" for n, own in found
+                                   if not 1 / _FAR <= _middle(own) <= _FAR],
     }  # fmt: skip
     told = [f"{what}: {', '.join(names)}" for what, names in shown.items() if names]
     text = "; ".join(told)
