@@ -366,7 +366,7 @@ def test_the_command_line_knows_every_run_of_the_protocol(foreign, monkeypatch, 
 
 
 def words_of_page(page):
-    """Words that a reader meets: without what is folded, pictures, and the targets of links."""
+    """Words that a reader meets: without folded parts, pictures, and the targets of links."""
     shown = re.sub(r"<details>.*?</details>|!\[[^\]]*\]\([^)]*\)", "", page, flags=re.DOTALL)
     return re.findall(r"[^\W_][\w'’.×−/-]*", re.sub(r"\(([\w./-]+)\)", "", shown))
 
