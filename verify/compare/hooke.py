@@ -274,7 +274,7 @@ def _by_newton(F: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Compute the polar factors (n, 3, 3) of F, and whether they are left to another way (n,).
 
     Newton's method (Higham, SIAM J. Sci. Stat. Comput. 7, 1986) squares the distance in each step;
-    it is ten times as fast as a singular value decomposition where stretches are near one.
+    it is several times as fast as a singular value decomposition where stretches are near one.
     """
     A = np.ascontiguousarray(np.moveaxis(F, 0, -1))
     cofactors, found = np.empty(A.shape), np.zeros(len(F), dtype=bool)

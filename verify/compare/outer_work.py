@@ -640,6 +640,11 @@ def taken_up(mass: csr_array, held: NDArray[np.bool_], rates: Array, given: Arra
     """Let held nodes take up given rates (n, d) at once: M × rates stays the same elsewhere.
 
     Scaled by its diagonal a mass is as well conditioned on graded meshes (Wathen, 1987).
+
+    Raises
+    ------
+    InputError
+        If the iteration does not converge: the mass is no mass.
     """
     change = np.where(held, given - rates, 0.0)
     if not change.any():
@@ -651,5 +656,8 @@ def taken_up(mass: csr_array, held: NDArray[np.bool_], rates: Array, given: Arra
             scale = np.where(diagonal > 0.0, diagonal, 1.0) ** -0.5
             scaled = diags_array(scale) @ coupled[:, ~own] @ diags_array(scale)
             pull = -scale * (coupled[:, own] @ change[own, axis])
-            change[~own, axis] = scale * cg(scaled.tocsr(), pull, rtol=1e-12)[0]
+            found, failed = cg(scaled.tocsr(), pull, rtol=1e-12)
+            if failed:
+                raise InputError("the velocities that supports take up at once do not converge")
+            change[~own, axis] = scale * found
     return rates + change
