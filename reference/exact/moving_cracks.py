@@ -111,8 +111,11 @@ class BladeStrip(ExactSolution):
 
     def _local(self, points: Array) -> tuple[Array, Array]:
         """Find the places ahead of the tip and across the cut, m."""
-        x, y = ((np.asarray(points, dtype=float)[:, :2] - self._tip) @ self._axes.T).T
-        return x - self._v * self.time, y
+        x, y = (
+            column - at for column, at in zip(np.asarray(points, float).T, self._tip, strict=False)
+        )
+        ahead, across = (row[0] * x + row[1] * y for row in self._axes)
+        return ahead - self._v * self.time, across
 
 
 class ReleasedBar(ExactSolution):

@@ -7,6 +7,8 @@ strain alike along the interface, τ·ε τ: at one angle for two given material
 which shears, is a rotation of the second material.
 """
 
+from math import prod
+
 import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.optimize import brentq, root
@@ -207,10 +209,14 @@ class Sinusoidal(TwoSidedSolution):
 
     def _wave(self, s: Array, above: Above, which: int, *by: int) -> Array:
         """Give the derivative of U_α or V by the axes `by`, (n,)."""
-        rows = side(self._rows[:, which], above)
-        k = rows[:, 1:-1]
-        angle = np.sum(k * s[:, :-1], axis=1) + rows[:, -1] + len(by) * np.pi / 2
-        return np.asarray(rows[:, 0] * np.prod(k[:, list(by)], axis=1) * np.sin(angle))
+        # one side after the other, column by column: a third of the time of all rows at once
+        found = np.empty(len(s))
+        for on, (size, *k, phase) in zip((above, ~above), self._rows[:, which], strict=True):
+            angle = np.full(np.count_nonzero(on), phase + len(by) * np.pi / 2)
+            for one, column in zip(k, s.T[:-1], strict=True):
+                angle += one * column[on]
+            found[on] = size * prod(k[axis] for axis in by) * np.sin(angle)
+        return found
 
     def _divergence(self, s: Array, above: Above, *by: int) -> Array:
         return np.sum([self._wave(s, above, a, a, *by) for a in self._along], axis=0)

@@ -612,7 +612,7 @@ class TwoSidedSolution(ExactSolution):
 
 def side(pair: Array, above: Above) -> Array:
     """Return values (n, …) of a per-side parameter (2, …) at points on those sides."""
-    return np.asarray(pair[np.where(above, 0, 1)])
+    return np.asarray(pair.take(~above, axis=0))
 
 
 def matrices(rows: list[list[Array]]) -> Array:

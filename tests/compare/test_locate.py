@@ -95,3 +95,39 @@ def test_gradients_in_sliver_cells_lose_no_more_than_round_off_over_height(thin,
     u, gradient = field.evaluate(x)
     assert np.abs(gradient - slope).max() < 4 * np.finfo(float).eps / thin
     assert np.abs(u - x @ slope.T - 1).max() < 1e-15
+
+
+def turned(points):
+    """Turn a mesh out of the axes, so that nothing lies on them."""
+    return points @ np.linalg.qr(RNG.normal(size=2 * points.shape[1:]))[0] + 0.3
+
+
+SLIVER = layered(9, [lambda x: np.full_like(x, 0.5), lambda x: np.full_like(x, 0.5 + 3e-11)])[:2]
+
+
+@pytest.mark.parametrize("mesh", [grid(7, 5), cube(), SLIVER], ids=["2D", "3D", "thin"])
+def test_on_facets_and_edges_the_cell_is_one_that_lies_towards_near(mesh):
+    """A layer thinner than round-off of the search lies between two others as well."""
+    points, cells = turned(mesh[0]), mesh[1]
+    d = points.shape[1]
+    field = SolutionField(solution(points, cells, np.zeros_like(points)))
+    whole = np.flatnonzero(~field.shape.degenerate)
+    corners = points[cells[whole[RNG.integers(len(whole), size=900)]]]
+    shares = RNG.dirichlet(np.ones(d), 900)
+    shares[::9, 0] = 0.0  # on an edge or a corner
+    x = np.einsum("nk,nkd->nd", shares / shares.sum(1, keepdims=True), corners[:, :d])
+    towards = RNG.normal(size=x.shape)
+    found = field.cells_at(x, x + towards)
+
+    normals, corners = field.shape.normals[whole], points[cells[whole]]
+    facets = np.roll(corners, -1, axis=1)
+    depth = np.einsum("mki,nmki->nmk", normals, x[:, None, None] - facets).min(axis=2)
+    close = 1e-10 * field.scale  # a plane of a thin cell is close to points far from it
+    off = np.maximum(corners.min(1) - x[:, None], x[:, None] - corners.max(1)).max(axis=2)
+    holds = (depth > -close) & (off < close)
+    ahead = np.einsum("nmi,ni->nm", corners.mean(axis=1) - x[:, None], towards) > 0
+    place = np.searchsorted(whole, found), np.arange(900)
+    assert holds[place[::-1]].all()
+    could = (holds & ahead).any(axis=1)
+    assert could.mean() > 0.4
+    assert ahead[place[::-1]][could].all()

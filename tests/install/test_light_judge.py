@@ -9,7 +9,7 @@ import sys
 import venv
 from dataclasses import replace
 from statistics import median
-from time import thread_time
+from time import monotonic, thread_time
 from types import SimpleNamespace
 
 import pytest
@@ -68,7 +68,7 @@ sys.exit(code)
 
 def said(python, place, *command, environment=None):
     """Run a command of `verify` in an environment; return its answer and seconds of processor."""
-    seconds = place / "seconds.txt"
+    seconds, begun = place / "seconds.txt", monotonic()
     done = subprocess.run(
         [sys.executable, "-c", _COUNTED, seconds, python, "-m", "verify", *map(str, command)],
         env={**os.environ, "PYTHONPATH": "", **(environment or {})}
@@ -78,8 +78,10 @@ def said(python, place, *command, environment=None):
         text=True,
         check=False,
     )
-    spent = float(seconds.read_text())
-    return SimpleNamespace(code=done.returncode, out=done.stdout, err=done.stderr, seconds=spent)
+    return SimpleNamespace(
+        code=done.returncode, out=done.stdout, err=done.stderr,
+        seconds=float(seconds.read_text()), wall=monotonic() - begun,
+    )  # fmt: skip
 
 
 def verdicts(answer):
@@ -127,12 +129,12 @@ def lock_of(root):
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("place", ["plane", "space"])  # continuous integration has the first
+@pytest.mark.parametrize("place", ["plane", "all"])  # continuous integration has the first
 def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_path, light, place):
     """At most 350 MB with pip itself and what its use has compiled; 60 s on two cores for all.
 
-    Seconds of processor are scaled to a machine whose calibration kernel takes 6 ms. The plane
-    takes a third.
+    Seconds are scaled to a machine whose calibration kernel takes 6 ms. The plane takes a third,
+    of the processor: there other programs run beside it.
     """
     for name in FORBIDDEN:
         code = f"import {name}"
@@ -144,16 +146,17 @@ def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_pat
         ("benchmark/c8_slivers_corner[epsilon=0.0001]", "fall_of_the_corner"),
     }
     every = select_cases(["benchmark"], weight="heavy")
-    scenes = [one for one in every if one.dimension == (2 if place == "plane" else 3)]
+    scenes = [one for one in every if place == "all" or one.dimension == 2]
     for scene in scenes:
         like = answers_of_another(scene, tmp_path / place / scene.name)
         may_fail |= {(scene.name, k.metric) for k in scene.known_findings if k.solver == like}
     asked = ["import", "benchmark", place, "--solver", "mine", "--out", "out"]
     kernels = kernel_seconds(clock=thread_time)
     answer = said(light.python, tmp_path, *asked, "-j", 2, "--json")
-    seconds = answer.seconds * 0.006 / median([*kernels, *kernel_seconds(clock=thread_time)])
+    faster = 0.006 / median([*kernels, *kernel_seconds(clock=thread_time)])
     found = {n: one for n, one in verdicts(answer).items() if (tmp_path / place / n).is_dir()}
-    print(f"{answer.seconds:.0f} s of processor, {seconds:.0f} at a kernel of 6 ms", list(found))
+    took = f"{answer.wall:.0f} s, {answer.seconds:.0f} s of processor, times {faster:.2f}"
+    print(f"{took} at a kernel of 6 ms", list(found))
     assert set(found) == {scene.name for scene in scenes}
     failed = {
         (name, metric): verdict
@@ -164,7 +167,10 @@ def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_pat
     print(failed)
     assert set(failed.values()) <= {"FAIL"}
     assert set(failed) <= may_fail
-    assert seconds < (50.0 if place == "plane" else 90.0)
+    if place == "plane":
+        assert faster * answer.seconds < 40.0
+    else:
+        assert faster * answer.wall < 60.0
     size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())
     print(f"{size / 1e6:.0f} MB")
     assert size < 350e6

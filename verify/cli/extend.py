@@ -124,7 +124,7 @@ def import_(
             scenes, found, solver, out, options, progress, judged_as, command_line()
         )
     rank_run(out, results, {}, False, timeout, print)
-    return say_results(results, str(render(out)), strict, as_json)
+    return say_results(results, str(render(out, jobs=jobs)), strict, as_json)
 
 
 def conform(

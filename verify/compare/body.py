@@ -1,6 +1,7 @@
 """The body and its cuts as asked, as the comparison sees them in the plane."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class Body:
         """Corners (n, 2) of all loops."""
         return np.concatenate(self.loops)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box, m."""
         return float(np.linalg.norm(np.ptp(self.corners, axis=0)))

@@ -371,20 +371,30 @@ def _holding_in_numpy(
             good &= wanted[row, c] * sides[cell, c] >= 0
         return good
 
-    if len(points) > _WORTH * len(kept) > 0:
-        found[:] = walk.to(points, kept, agreed, tolerance)
-    near = near_points(points, tolerance)
-    for row, cell in pairs_met(searched, corners, np.flatnonzero(found < 0), near):
-        depth = walk.depth(points[row].T, cell)[0]
-        there = (depth >= -tolerance) & agreed(row, cell)
+    def take(row: Ints, cell: Ints, depth: Floats) -> None:
+        """Take the best of pairs of points and cells that hold them."""
+        there = agreed(row, cell)
         row, cell, depth = row[there], cell[there], depth[there]
         inside = depth > tolerance
         on_side = inside
         if sided:
-            towards = (directions[row] * (centres[cell] - points[row])).sum(axis=1)
+            towards = ((centres[cell] - points[row]) * directions[row]).sum(axis=1)
             on_side = inside | (towards > 0.0)
         order = np.lexsort((depth, on_side, inside))
         found[row[order]] = cell[order]  # the last of each point stays
+
+    if len(points) > _WORTH * len(kept) > 0:
+        found[:], on_facet = walk.to(points, kept, agreed, tolerance)
+        row = np.flatnonzero((found < 0) & (on_facet >= 0))
+        other = walk.across(points[row], on_facet[row], tolerance)
+        row, other = row[other >= 0], other[other >= 0]
+        two = np.concatenate([row, row]), np.concatenate([on_facet[row], other])
+        take(*two, walk.depth(points[two[0]].T, two[1])[0])
+    near = near_points(points, tolerance)
+    for row, cell in pairs_met(searched, corners, np.flatnonzero(found < 0), near):
+        depth = walk.depth(points[row].T, cell)[0]
+        there = depth >= -tolerance
+        take(row[there], cell[there], depth[there])
 
 
 Meets = Callable[[Ints, Floats, Floats, Ints], NDArray[np.bool_]]

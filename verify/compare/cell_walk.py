@@ -6,7 +6,8 @@ Pion and Teillaud, Walking in a triangulation, 2002). A walk that ends at the su
 has found nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +38,25 @@ class Walk:
         self._offsets = np.ascontiguousarray(np.einsum("mka,mka->km", normals, ends))
         self._corners = corners
 
+    @cached_property
+    def _beside(self) -> Ints:
+        return _neighbours(self._corners)
+
+    def _depths(self, columns: Floats, cells: Ints) -> Iterator[Floats]:
+        """Yield distances (n,) to each facet plane, m, positive inside."""
+        for normal, offset in zip(self._normals, self._offsets, strict=True):
+            along = -offset[cells]
+            for own, x in zip(normal, columns, strict=True):
+                along += own[cells] * x
+            yield along
+
     def depth(self, columns: Floats, cells: Ints) -> tuple[Floats, Ints]:
         """Compute distances (n,) to the nearest facet planes of cells, m, and which facets (n,).
 
         Points are the columns (d, n), in cells (n,); the distance is positive inside.
         """
         depth, nearest = np.full(len(cells), np.inf), np.zeros(len(cells), dtype=np.int64)
-        for k, (normal, offset) in enumerate(zip(self._normals, self._offsets, strict=True)):
-            along = -offset[cells]
-            for own, x in zip(normal, columns, strict=True):
-                along += own[cells] * x
+        for k, along in enumerate(self._depths(columns, cells)):
             nearest[along < depth] = k
             np.minimum(depth, along, out=depth)
         return depth, nearest
@@ -57,14 +67,15 @@ class Walk:
         begin: Ints,
         fits: Callable[[Ints, Ints], NDArray[np.bool_]],
         tolerance: float,
-    ) -> Ints:
+    ) -> tuple[Ints, Ints]:
         """Find the cells (n,) that hold points (n, d) more than a `tolerance` deep, or −1.
 
         A walk begins in one of the cells `begin`. ``fits(points, cells)`` tells by their numbers
-        in which cells it may end.
+        in which cells it may end. Also returned are the cells (n,) where points on a facet have
+        ended, or −1.
         """
         found, columns = np.full(len(points), -1), np.ascontiguousarray(points.T)
-        beside = _neighbours(self._corners)
+        on_facet = found.copy()
         centres = self._corners[begin].mean(axis=1)
         tree = cKDTree(centres, balanced_tree=False, compact_nodes=False)
         first = begin[tree.query(points[::_APART])[1]]
@@ -75,12 +86,27 @@ class Walk:
                 depth, nearest = self.depth(columns[:, rows], cells)
                 there = (depth > tolerance) & fits(rows, cells)
                 found[rows[there]] = cells[there]
-                cells, on = beside[cells, nearest], depth < -tolerance
+                beside = np.abs(depth) <= tolerance
+                on_facet[rows[beside]] = cells[beside]
+                cells, on = self._beside[cells, nearest], depth < -tolerance
                 on &= cells >= 0
                 rows, cells = rows[on], cells[on]
                 if not len(rows):
                     break
-        return found
+        return found, on_facet
+
+    def across(self, points: Floats, cells: Ints, tolerance: float) -> Ints:
+        """Find the cells (n,) across the facets that points (n, d) of `cells` (n,) lie on.
+
+        −1 where others than these two may hold the point within the `tolerance`: at an edge, and
+        where nothing lies across.
+        """
+        columns = np.ascontiguousarray(points.T)
+        other = self._beside[cells, self.depth(columns, cells)[1]]
+        alone = other >= 0
+        for one in (cells, other):
+            alone &= sum(~(along > tolerance) for along in self._depths(columns, one)) == 1
+        return np.where(alone, other, -1)
 
 
 def _neighbours(corners: Floats) -> Ints:

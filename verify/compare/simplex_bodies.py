@@ -6,6 +6,7 @@ cut of a membrane the lines in which its triangles are cut.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,12 +55,12 @@ class SimplexBody:
         """Dimension k of the simplices: 3 of a solid, 2 of a membrane."""
         return self.corners.shape[1] - 1
 
-    @property
+    @cached_property
     def measure(self) -> float:
         """Volume, m³, or area, m²."""
         return float(measures(self.corners).sum())
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box, m."""
         return float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))

@@ -157,6 +157,7 @@ class Work:
                 check()
                 while self._has_room():
                     self._start()
+                self._take_from_bundle()
                 for solve, job in list(self.running.items()):
                     if (ending := solve.poll()) is not None:
                         del self.running[solve]
@@ -215,9 +216,22 @@ class Work:
 
     def _start(self) -> None:
         if self._has_room_here():
-            self._judge(self.to_judge.pop(0))
-            return
-        job = self.waiting.pop(0)
+            first = min(self.to_judge, key=list(self.plans).index)
+            self.to_judge.remove(first)
+            self._judge(first)
+        else:
+            self._begin(self.waiting.pop(0))
+
+    def _take_from_bundle(self) -> None:
+        """Unpack one reference while all processes are busy: cases that need one come no later."""
+        for job in self.waiting:
+            if job.solver == REFERENCE and not job.model and self.plans[job.case].bundle:
+                self.waiting.remove(job)
+                self._begin(job)
+                break
+
+    def _begin(self, job: Job) -> None:
+        """Take over what is known of a solve, or start it."""
         if (record := stored_record(job)) is not None:
             self.reused += 1
             self.records[job.folder] = (job.folder / "record.json").read_bytes()
