@@ -241,6 +241,18 @@ def test_the_work_of_supports_that_jump_is_a_word_and_no_verdict_rests_on_it():
     assert verdict_of(held, still) is Verdict.FAIL  # supports that stand still do no work
 
 
+def test_work_of_supports_with_a_kink_at_each_output_time_is_a_word():
+    """No two intervals make a longer one, so nothing tells the error of the work."""
+    table = [[t, t * (20.0 - t) / 100.0] for t in np.linspace(0.0, 9.0, 7)]
+    pulled = {"where": "left", "components": ["x"], "displacement": [0.3], "history": table}
+    case = swinging(supports=[SHEARS[0], pulled], analysis={"duration": 9.0, "outputs": 7})
+    honest = XfemSolver().solve(case, 0, 0)
+    found, sources = energies_of(case, honest)
+    assert "kink" in sources["work_of_supports"]
+    assert found["energy_drift"].value < 1e-10  # as it is, without the interpolated rest
+    assert verdict_of(case, honest) is Verdict.UNDECIDED
+
+
 CURVED = {
     2: ["3 * x * x - 3 * y * y", "-6 * x * y"],
     3: ["3 * x * x - 3 * y * y", "-6 * x * y", "0"],

@@ -112,6 +112,13 @@ def test_the_worst_drift_is_named_with_its_case_and_drawn_at_its_size():
     damped.solves[0].account["damping"] = [0.0, 0.2, 0.3]
     said = answers([*cases, damped])[1].sentence
     assert "(wild). Left out: 1 case in which damping takes energy." in said
+    # nor is a change known whose interval is wider than all energy that moves
+    words = moving("words", 1e-5)
+    words.solves[0].metrics[0] = Metric("energy_drift", 0.5, "1", uncertainty=1000.5)
+    said = answers([*cases, words])[1].sentence
+    assert "in 2 cases in motion" in said
+    assert "(wild). Left out: 1 case in which the energy is not known from the outputs." in said
+    assert "not known from the outputs" in answers([words])[1].sentence
 
 
 def test_slivers_are_held_against_the_largest_epsilon_and_rows_without_slivers_are_left_out():

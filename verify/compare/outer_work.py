@@ -459,6 +459,8 @@ def support_work(
     forces = _forces(scene, solution, weights)
     parts = scene, solution, law, mass, nodes, forces
     smooth = _Work(*parts, Extension(solution, nodes.held))
+    if smooth.all_kinks:
+        raise InputError("each output time is a kink of their path, so nothing tells its error")
     steps = smooth.steps()
     if smooth.extension.is_affine:  # known once the steps have asked it
         return _since(steps), _since(smooth.off(steps))
@@ -514,8 +516,6 @@ class _Work:
         done, twice = _since(steps), _since(self.steps(2))
         pairs = np.flatnonzero(np.diff(second) == 2)
         change = np.abs(np.diff(twice) - np.diff(done[second]))
-        if not len(pairs):
-            return np.abs(steps)
         fours = np.flatnonzero(np.diff(fourth) == 4)
         order = 1.0
         if len(fours):
@@ -528,6 +528,11 @@ class _Work:
         for start, one in zip(second[pairs], each, strict=True):
             width[start : start + 2] = one
         return width
+
+    @property
+    def all_kinks(self) -> bool:
+        """Whether no output time lies between two intervals without a kink."""
+        return not (np.diff(self._picks(2)) == 2).any()
 
     def _picks(self, stride: int) -> NDArray[np.int64]:
         """Choose output times at a stride, apart from times with a kink."""

@@ -84,6 +84,9 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
     return Answer(question, f"Error of the displacement: {'; '.join(parts)}.", example)
 
 
+_ALL = 1.0  # an interval as wide as all energy that moves tells no change of it
+
+
 def energy(results: Sequence[CaseResult]) -> Answer:
     """Answer how far the total energy drifts where nothing is to take any.
 
@@ -91,14 +94,17 @@ def energy(results: Sequence[CaseResult]) -> Answer:
     takes is known from the outputs alone, as a sum over the spans between them: what the sum misses
     is as large as a drift, and no scheme's.
     """
-    drifts = [(s.solver, d, r.case) for r, s in moving(results) if (d := s.metric("energy_drift"))]
+    told = [(s.solver, d, r.case) for r, s in moving(results) if (d := s.metric("energy_drift"))]
+    drifts = [one for one in told if (one[1].uncertainty or 0.0) < _ALL]
     cases = {case for *_, case in drifts}
     worst: dict[str, tuple[Any, str]] = {}
     for name, drift, case in drifts:
         if name not in worst or drift.value > worst[name][0].value:
             worst[name] = drift, case
-    others = {what: {result.case for result, _ in moving(results, what)} for what in _TAKERS}
-    said = [f"{len(c)} case{'s' * (len(c) != 1)} in which {what} takes energy"
+    others = {f"{what} takes energy": {result.case for result, _ in moving(results, what)}
+              for what in _TAKERS}  # fmt: skip
+    others["the energy is not known from the outputs"] = {case for *_, case in told} - cases
+    said = [f"{len(c)} case{'s' * (len(c) != 1)} in which {what}"
             for what, c in others.items() if c]  # fmt: skip
     left = f" Left out: {', '.join(said)}." if said else ""
     if not worst:
@@ -111,8 +117,8 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         inside = f" ({', '.join(bounds)})" if bounds else ""
         parts.append(f"{solver_title(name)} {value}{inside}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
-    told = f"Largest relative change of the total energy in {where}: {'; '.join(parts)}.{left}"
-    return Answer("Energy", told)
+    said_of = f"Largest relative change of the total energy in {where}"
+    return Answer("Energy", f"{said_of}: {'; '.join(parts)}.{left}")
 
 
 def slivers(results: Sequence[CaseResult]) -> Answer:
