@@ -134,6 +134,14 @@ def moves(result: CaseResult) -> bool:
     return (result.scene.get("analysis") or {}).get("kind") == "dynamic"
 
 
+def dimension_of(scene: Mapping[str, Any]) -> int:
+    """Return the dimension of the body of a scene."""
+    geometry = scene.get("geometry") or {}
+    if geometry.get("kind") == "file":
+        return int(geometry.get("dimension") or 2)
+    return 3 if geometry.get("kind") in ("box", "skin") else 2
+
+
 def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Return the results that are compared together: by kind of scene, and the benchmark's scenes.
 

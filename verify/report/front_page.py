@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from verify.report.evidence import (
     Evidence,
     benchmark_scenes,
     beside,
+    dimension_of,
     ends_inside,
     misses_material,
     moves,
@@ -23,7 +25,7 @@ from verify.report.notation import Drawing, number, solver_title
 from verify.report.plots import Bar, Palette, Ranged, Series, bars, loglog, ranges
 from verify.report.rendering import Beside as Pictures
 from verify.report.rendering import in_markdown
-from verify.result import CaseResult, Verdict
+from verify.result import CaseResult, Status, Verdict
 
 PICTURES = "front-pictures"
 _STEPS = (
@@ -70,7 +72,7 @@ def write_front(
 
 
 def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> list[str]:
-    """Return the first lines of the page of the ranked run: answers, coverage, combinations."""
+    """Return the first lines of the page of the ranked run: answers, coverage, kinds of scenes."""
     shown = _pictures(folder, coverage(evidence))
     lines: list[str] = []
     for own in answers:
@@ -86,32 +88,65 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
         f"{sum(name in _CONTROLS for name in failed)} are of the controls "
         f"{' and '.join(_CONTROLS)}."
     )
-    return [*lines, "", " ".join(figure[0] for figure in shown.values()), "", *combined(evidence)]
+    pictures = " ".join(figure[0] for figure in shown.values())
+    return [*lines, "", pictures, "", *answered(evidence), "", *combined(evidence)]
 
 
 def combined(evidence: Evidence) -> list[str]:
     """Return the lines of a table of what scenes combine; where no scene does, nothing is known."""
     lines = ["Scenes by what they combine, a sweep counted once; of **none** nothing is known:", "",
              f"| scenes | {' | '.join(_KINDS)} |", "|---" * (len(_KINDS) + 1) + "|"]  # fmt: skip
-    for where, dimension in (("plane", 2), ("space", 3)):
+    for where, dimension in _WHERE.items():
         for mechanics in _MECHANICS:
             own = [
                 r
                 for r in evidence.results
-                if _dimension(r.scene) == dimension
-                and mechanics == next(n for n, of in _MECHANICS.items() if of(r.scene))
+                if dimension_of(r.scene) == dimension and _mechanics(r) == mechanics
             ]
-            found = [{r.case.partition("[")[0] for r in own if of(r)} for of in _KINDS.values()]
+            found = [{_sweep(r) for r in own if of(r)} for of in _KINDS.values()]
             cells = [str(len(names)) if names else "**none**" for names in found]
             lines.append(f"| {where}, {mechanics} | {' | '.join(cells)} |")
     return lines
 
 
-def _dimension(scene: Mapping[str, Any]) -> int:
-    geometry = scene.get("geometry") or {}
-    if geometry.get("kind") == "file":
-        return int(geometry.get("dimension") or 2)
-    return 3 if geometry.get("kind") in ("box", "skin") else 2
+def answered(evidence: Evidence) -> list[str]:
+    """Return the lines of two tables, plane and space: scenes answered of asked, by solver.
+
+    They are counted as in `Evidence.coverage`, the sum of a row without its last three columns.
+    """
+    columns: dict[str, Callable[[CaseResult], bool]] = dict(_KINDS)
+    columns |= {m: partial(_combines, mechanics=m) for m in list(_MECHANICS)[:-1]}
+    lines = ["Answered of asked, however wrong; the last three columns pick out of the others:"]
+    for where, dimension in _WHERE.items():
+        own = [r for r in evidence.results if dimension_of(r.scene) == dimension]
+        lines += ["", f"| {where} | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
+        for solver in evidence.solvers:
+            cells = [_share([r for r in own if of(r)], solver) for of in columns.values()]
+            lines.append(f"| {solver_title(solver)} | {' | '.join(cells)} |")
+    return lines
+
+
+def _share(results: Sequence[CaseResult], solver: str) -> str:
+    """Count the scenes that a solver answered of those that it was asked; a dash if of none."""
+    members: dict[str, list[bool]] = {}
+    for result in results:
+        if own := [s for s in result.solves if s.solver == solver]:
+            done = any(s.status is Status.SOLVED and s.metrics for s in own)
+            members.setdefault(_sweep(result), []).append(done)
+    answers = sum(2 * sum(each) > len(each) for each in members.values())
+    return f"{answers} of {len(members)}" if members else "–"
+
+
+def _sweep(result: CaseResult) -> str:
+    return result.case.partition("[")[0]
+
+
+def _mechanics(result: CaseResult) -> str:
+    return next(name for name, of in _MECHANICS.items() if of(result.scene))
+
+
+def _combines(result: CaseResult, mechanics: str) -> bool:
+    return _mechanics(result) == mechanics
 
 
 def _asks(scene: Mapping[str, Any], table: str, key: str) -> str:
@@ -122,6 +157,7 @@ def _opens_by_a_blade(result: CaseResult) -> bool:
     return any(cut.get("kind") == "tool_path" for cut in result.scene.get("cuts") or [])
 
 
+_WHERE = {"plane": 2, "space": 3}
 _KINDS: dict[str, Callable[[CaseResult], bool]] = {
     "at rest, cut through": lambda r: not moves(r) and not ends_inside(r.scene),
     "at rest, cut ends inside": lambda r: not moves(r) and ends_inside(r.scene),
