@@ -25,6 +25,15 @@ def commands(page):
     return [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
 
 
+def rows_of_table(page, title):
+    """Return the cells of the rows of a page's table, which is named by its first column."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    (table,) = re.findall(
+        rf"^\| {re.escape(title)} \|.*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE
+    )
+    return [row[2:-2].split(" | ") for row in table.splitlines()]
+
+
 def run_line(line, folder, path=None):
     """Run a command line in a folder, where `path` (default the folder) is on the search path.
 

@@ -13,6 +13,7 @@ from time import monotonic, thread_time
 from types import SimpleNamespace
 
 import pytest
+from doc_pages import rows_of_table
 from stranger_solver import Stranger
 
 from verify.provenance import kernel_seconds
@@ -220,6 +221,11 @@ LOSSES = {
         REST, "strain_energy", "        energy = 0.5 * u", "        u = u * 0.997**0.5\n",
     ),
 }  # fmt: skip
+
+
+def test_the_page_tells_which_scene_names_which_loss():
+    asserted = [[loss, f"`{scene}`", f"`{metric}`"] for loss, (scene, metric, *_) in LOSSES.items()]
+    assert rows_of_table("guide/your-solver.md", "loss") == asserted
 
 
 @pytest.mark.heavy
