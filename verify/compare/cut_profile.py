@@ -32,6 +32,7 @@ from verify.geometry.patches import (
     SpherePatch,
 )
 from verify.geometry.planar import arc_lengths
+from verify.geometry.simplices import determinants
 
 Array = NDArray[np.float64]
 
@@ -170,7 +171,7 @@ def _half_way(patch: PlanePatch, share: Array) -> Array:
 def _longest(patch: PlanePatch, share: Array) -> Array:
     """Draw a line through the centroid of a polygon, as long as it stays inside."""
     edges = patch.cells[:, 1:] - patch.cells[:, :1]
-    area = 0.5 * np.abs(np.linalg.det(edges))
+    area = 0.5 * np.abs(determinants(edges))
     middle = np.average(patch.cells.mean(axis=1), axis=0, weights=area)
     triangles = patch.cells - middle
     whole = triangles.sum(axis=1)

@@ -23,6 +23,7 @@ from verify.compare.locate import Field, SolutionField, difference_squares, squa
 from verify.compare.mass import separated_parts
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
 from verify.errors import InputError
+from verify.geometry.simplices import determinants
 from verify.scene import Material, Scene
 from verify.solution import Solution
 
@@ -228,7 +229,7 @@ def _less_one(excess: Array, gradient: Array) -> Array:
     excess = np.maximum(excess, -1.0)
     found: Array = excess / (1.0 + np.sqrt(1.0 + excess))
     if gradient.shape[1] == gradient.shape[2]:
-        inverted = np.linalg.det(np.eye(gradient.shape[1]) + gradient) < 0.0
+        inverted = determinants(np.eye(gradient.shape[1]) + gradient) < 0.0
         found[inverted, 0] = -2.0 - found[inverted, 0]
     return found
 
@@ -238,7 +239,7 @@ def _volume_change(gradient: Array) -> Array:
     trace = np.einsum("nii->n", gradient)
     minors = 0.5 * (trace**2 - np.einsum("nij,nji->n", gradient, gradient))
     change = trace + minors
-    return change if gradient.shape[1] == 2 else change + np.linalg.det(gradient)
+    return change if gradient.shape[1] == 2 else change + determinants(gradient)
 
 
 def _cofactors(F: Array) -> Array:
@@ -265,7 +266,7 @@ def _rotations(gradient: Array) -> Array:
             turned[here], rest[here] = _by_newton(deformation[here])
     left, _, right = np.linalg.svd(deformation[rest], full_matrices=False)
     if gradient.shape[2] == 3:
-        left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
+        left[:, :, -1] *= np.sign(determinants(left @ right))[:, None]
     turned[rest] = left @ right
     return turned
 

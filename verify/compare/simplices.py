@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
-from verify.geometry.simplices import halves, measures, split_at_zeros
+from verify.geometry.simplices import determinants, halves, measures, split_at_zeros
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def share_inside_out(solution: Solution) -> float:
         return 0.0
     corners = solution.cells[:, : d + 1]
     found = [np.einsum("mka,mkb->mab", u[corners], shape.gradients) for u in solution.displacement]
-    turned = np.array([np.linalg.det(np.eye(d) + slope) < 0.0 for slope in found])
+    turned = np.array([determinants(np.eye(d) + slope) < 0.0 for slope in found])
     share = float((turned @ shape.volume).max() / shape.volume.sum())
     return share if share > _NONE else 0.0
 
