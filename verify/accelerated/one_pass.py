@@ -25,14 +25,13 @@ from verify.accelerated.tetrahedron_batches import (
     rotate,
 )
 from verify.xfem.arrays import Bools, Floats
-from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.block_pattern import BlockPattern, order_by_counting
 from verify.xfem.element import Elements
 from verify.xfem.element import deform as deform_cells
 from verify.xfem.energy_momentum import StepEnds, averaged_stress
 from verify.xfem.polar import rotation_matrix
 
 _WINDOW = 8 * BATCH  # cells among which the cells of a batch are no neighbours
-_FIRST, _SECOND = np.triu_indices(4, 1)
 
 
 class OnePassTetrahedra:
@@ -51,27 +50,22 @@ class OnePassTetrahedra:
     def __init__(self, elements: Elements, pattern: BlockPattern, corotational: bool) -> None:
         count = len(elements.cells)
         batches = -(-count // BATCH)
-        corner = np.argsort(elements.cells, axis=1)
-        nodes = np.take_along_axis(elements.cells, corner, axis=1)
-        cells = np.argsort(nodes[:, 0] << 32 | nodes[:, 1], kind="stable")
+        corner, nodes = _sorted_corners(elements.cells)
+        cells = order_by_counting(nodes[:, 1], pattern.node_count)
+        cells = cells[order_by_counting(nodes[cells, 0], pattern.node_count)]
         whole = count // _WINDOW * _WINDOW
         windows = cells[:whole].reshape(-1, BATCH, _WINDOW // BATCH)
         cells[:whole] = windows.transpose(0, 2, 1).ravel()
-        corner, parent = corner[cells], elements.parent[cells]
         self.pattern, self._corotational = pattern, corotational
         self._elements, self._cells = elements, cells
         # cells beyond the last one fill a batch: they have no stiffness
         self._nodes = np.zeros((batches * BATCH, 4), dtype=np.uint32)
-        self._nodes[:count] = nodes[cells]
         self._targets = np.zeros((batches * BATCH, 6), dtype=np.uint32)
-        rows = cells[:, None]
-        self._targets[:count] = pattern.targets[rows, corner[:, _FIRST], corner[:, _SECOND]]
-        constants = np.zeros((batches * BATCH, 11))
-        gradients = elements.gradients[parent[:, None], corner[:, 1:]]
-        constants[:count, :9] = gradients.reshape(count, 9)
-        constants[:count, 9] = elements.volumes[cells] * elements.lam[parent]
-        constants[:count, 10] = elements.volumes[cells] * elements.mu[parent]
-        self._constants = _by_batch(constants)
+        self._constants = np.zeros((batches, 11 * BATCH))
+        _gather(
+            elements, cells, corner, nodes, pattern.targets, self._nodes, self._targets,
+            self._constants,
+        )  # fmt: skip
         # cells after which nothing is added to a row any more
         ends = np.cumsum(np.bincount(nodes[:, 0], minlength=pattern.node_count))
         self._ends = np.minimum(-(-ends // _WINDOW) * _WINDOW, batches * BATCH)
@@ -155,6 +149,40 @@ class OnePassTetrahedra:
                 whole, force, blocks,
             )
         )  # fmt: skip
+
+
+@njit(cache=True)
+def _sorted_corners(cells):
+    """Sort the corners of each cell (p, 4) by node; return the corners and the nodes."""
+    corner, nodes = np.empty_like(cells), np.empty_like(cells)
+    for p in range(len(cells)):
+        for k in range(4):
+            at = k
+            while at > 0 and nodes[p, at - 1] > cells[p, k]:
+                corner[p, at], nodes[p, at] = corner[p, at - 1], nodes[p, at - 1]
+                at -= 1
+            corner[p, at], nodes[p, at] = k, cells[p, k]
+    return corner, nodes
+
+
+@njit(cache=True)
+def _gather(elements, order, corner, nodes, places, sorted_nodes, targets, constants):
+    """Write nodes, places of pairs and constants of the cells in an order, cells side by side."""
+    _, parents, gradients, volumes, _, lam, mu, _, _, _ = elements
+    for k in range(len(order)):
+        p, batch, l = order[k], k // BATCH, k % BATCH
+        parent, pair = parents[p], 0
+        for i in range(4):
+            sorted_nodes[k, i] = nodes[p, i]
+            for j in range(i + 1, 4):
+                targets[k, pair] = places[p, corner[p, i], corner[p, j]]
+                pair += 1
+            if i > 0:
+                for m in range(3):
+                    entry = (3 * (i - 1) + m) * BATCH + l
+                    constants[batch, entry] = gradients[parent, corner[p, i], m]
+        constants[batch, 9 * BATCH + l] = volumes[p] * lam[parent]
+        constants[batch, 10 * BATCH + l] = volumes[p] * mu[parent]
 
 
 @njit(cache=True)
@@ -261,12 +289,6 @@ def _complete(row, starts, diagonal, mirror, whole, d, blocks):
     for k in range(3):
         for l in range(3):
             blocks[middle, k, l] = 0.5 * (d[k, l] + d[l, k])
-
-
-def _by_batch(values: Floats) -> Floats:
-    """Reshape entries (cells, k) to (batches, k · BATCH), cells of a batch side by side."""
-    entries = values.reshape(-1, BATCH, values.shape[1]).transpose(0, 2, 1)
-    return np.ascontiguousarray(entries).reshape(len(entries), -1)
 
 
 def _by_cell(entries: Floats) -> Floats:

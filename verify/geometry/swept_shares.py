@@ -7,7 +7,7 @@ the cut: on straight parts of a path at one speed. Other cuts are divided.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -86,10 +86,15 @@ class Fading:
     times: Array
     values: Array
     count: int
+    _known: dict[float, Array] = field(default_factory=dict, repr=False, compare=False)
 
     def at(self, time: float) -> Array:
-        """Return the factors (count,) at a time."""
-        return np.bincount(self.row, _left(self.times, self.values, time), self.count)
+        """Return the factors (count,) at a time; repeated calls at one time evaluate them once."""
+        if time not in self._known:
+            self._known.clear()
+            left = _left(self.times, self.values, time)
+            self._known[time] = np.bincount(self.row, left, self.count)
+        return self._known[time]
 
     @cached_property
     def last(self) -> float:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from copy import copy
 
 import numpy as np
-from scipy.sparse import csr_array
+from numba import njit
 
 from verify.simulator.exposed_kernels import cut_elements, exposed_facets, sub_simplices
 from verify.simulator.growing_body import GrowingBody, Increment
@@ -146,8 +146,8 @@ class MovingSurface:
             If `displacement` has fewer rows than there are dof nodes, or another shape or type.
         """
         self._check(displacement)
-        moved = self._mapping @ displacement[: self._mapping.shape[1]]
-        return np.asarray(self.material.rows + moved)
+        rows = self.material.rows, self.nodes.rows, self.weights.rows
+        return np.asarray(_moved(*rows, displacement))
 
     def add_forces(self, facets: Ints, at: Floats, forces: Floats, out: Floats) -> None:
         """Add forces at points of facets to the forces on the dof nodes: Wᵀf.
@@ -179,22 +179,26 @@ class MovingSurface:
         np.add.at(out, self.nodes.rows[vertices], shares[..., None] * forces[:, None, None])
 
     def _check(self, nodal: Floats) -> None:
-        shape = f"(N ≥ {self._mapping.shape[1]}, {self.material.rows.shape[1]})"
-        fits = nodal.ndim == 2 and nodal.shape[1] == self.material.rows.shape[1]
-        if not fits or nodal.dtype != np.float64 or len(nodal) < self._mapping.shape[1]:
-            raise XfemError(f"nodal values {nodal.shape}, {nodal.dtype}; expected {shape}, float64")
+        space, unknowns = self.material.rows.shape[1], int(self.nodes.rows.max(initial=-1)) + 1
+        fits = nodal.ndim == 2 and nodal.shape[1] == space
+        if not fits or nodal.dtype != np.float64 or len(nodal) < unknowns:
+            raise XfemError(
+                f"nodal values {nodal.shape}, {nodal.dtype}; expected (N ≥ {unknowns}, {space}), "
+                "float64"
+            )
 
-    @property
-    def _mapping(self) -> csr_array:
-        """W (v, N), with the dof nodes up to the last from which a vertex moves."""
-        nodes = self.nodes.rows
-        known: csr_array | None = getattr(self, "_known_mapping", None)
-        if known is None or known.shape[0] != len(nodes):
-            starts = np.arange(0, nodes.size + 1, nodes.shape[1])
-            shape = (len(nodes), int(nodes.max(initial=-1)) + 1)
-            known = csr_array((self.weights.rows.ravel(), nodes.ravel(), starts), shape)
-            self._known_mapping = known
-        return known
+
+@njit(cache=True)
+def _moved(material, nodes, weights, displacement):
+    """Add to places (v, s) what nodes (v, c) have moved, by their weights: X + W u."""
+    found = np.empty_like(material)
+    for v in range(len(nodes)):
+        for i in range(material.shape[1]):
+            moved = 0.0
+            for k in range(nodes.shape[1]):
+                moved += weights[v, k] * displacement[nodes[v, k], i]
+            found[v, i] = material[v, i] + moved
+    return found
 
 
 class BodySurface:

@@ -54,41 +54,44 @@ class BoundingTree:
             self._high[level] = np.maximum(self._high[2 * level], self._high[2 * level + 1])
             end = int(level[0])
 
-    def meeting(self, floor: Floats, ceiling: Floats) -> tuple[Ints, Ints]:
+    def meeting(self, floor: Floats, ceiling: Floats, reach: float = 0.0) -> tuple[Ints, Ints]:
         """Find simplices whose boxes meet those from `floor` (q, s) to `ceiling`.
 
-        Returns the first of each box (q + 1,), and all of them one after the other.
+        Returns the first of each box (q + 1,), and all of them one after the other. Boxes are
+        widened by a `reach`; one that is not zero grows for each box until that meets something.
         """
-        return _meeting(self._low, self._high, self._order, floor, ceiling)
+        return _meeting(self._low, self._high, self._order, floor, ceiling, reach)
 
 
 @njit(cache=True)
-def _meeting(low, high, order, floor, ceiling):
+def _meeting(low, high, order, floor, ceiling, reach):
     """Items whose boxes meet those from `floor` (q, s) to `ceiling`: first of each, and all."""
     queries, space = floor.shape
     starts, stack = np.empty(queries + 1, dtype=np.int64), np.empty(_DEEP, dtype=np.int64)
     found, total = np.empty(64 + 8 * queries, dtype=np.int64), 0
     starts[0] = 0
     for q in range(queries):
+        wide = reach
         stack[0], top = 1, min(1, len(order))
         while top > 0:
             top -= 1
             node, apart = stack[top], False
             for i in range(space):
-                apart = apart or low[node, i] > ceiling[q, i] or high[node, i] < floor[q, i]
-            if apart:
-                continue
-            if node < len(order):
+                beyond = low[node, i] > ceiling[q, i] + wide or high[node, i] < floor[q, i] - wide
+                apart = apart or beyond
+            if not apart and node < len(order):
                 stack[top], stack[top + 1] = 2 * node, 2 * node + 1
                 top += 2
-                continue
-            if total == len(found):
-                more = np.empty(2 * total, dtype=np.int64)
-                for k in range(total):
-                    more[k] = found[k]
-                found = more
-            found[total] = order[node - len(order)]
-            total += 1
+            elif not apart:
+                if total == len(found):
+                    more = np.empty(2 * total, dtype=np.int64)
+                    for k in range(total):
+                        more[k] = found[k]
+                    found = more
+                found[total] = order[node - len(order)]
+                total += 1
+            if top == 0 and total == starts[q] and wide > 0.0:
+                stack[0], top, wide = 1, 1, _WIDER * wide
         starts[q + 1] = total
     return starts, found[:total]
 
@@ -156,13 +159,8 @@ class MaterialPlaces:
 
     def _near(self, places: Floats) -> tuple[Ints, Ints]:
         """Find cells to which each place may belong: bounds (q, 2) of each, and all of them."""
-        reach = np.full((len(places), 1), self.reach)
-        while True:
-            starts, cells = self._tree.meeting(places - reach, places + reach)
-            nowhere = starts[1:] == starts[:-1]
-            if not nowhere.any():
-                return np.stack([starts[:-1], starts[1:]], axis=1), cells
-            reach[nowhere] *= _WIDER
+        starts, cells = self._tree.meeting(places, places, self.reach)
+        return np.stack([starts[:-1], starts[1:]], axis=1), cells
 
 
 @njit(cache=True)

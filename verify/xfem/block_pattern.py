@@ -62,7 +62,7 @@ class BlockPattern:
     @cached_property
     def mirror(self) -> _Places:
         """(B,) of each block (i, j), the place of (j, i)."""
-        return np.asarray(_order(self.columns, self.node_count))
+        return np.asarray(order_by_counting(self.columns, self.node_count))
 
     def matrix(self, blocks: Floats) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
@@ -94,13 +94,13 @@ def block_pattern(cells: Ints, node_count: int) -> BlockPattern:
     if not counts.all():
         raise XfemError(f"node {int(np.argmin(counts > 0))} belongs to no cell")
     first = np.concatenate([[0], np.cumsum(counts)])
-    around = _order(cells.ravel(), node_count) // cells.shape[1]
-    return BlockPattern(*_pattern(np.ascontiguousarray(cells), first, around))
+    around, corner = np.divmod(order_by_counting(cells.ravel(), node_count), cells.shape[1])
+    return BlockPattern(*_pattern(np.ascontiguousarray(cells), first, around, corner))
 
 
 @njit(cache=True)
-def _pattern(cells, first, around):
-    """Make rows, columns and targets; `around` holds the cells of node n from first[n] on."""
+def _pattern(cells, first, around, corner):
+    """Make rows, columns and targets; cells of node n, and its corner, come from first[n] on."""
     (count, corners), nodes = cells.shape, len(first) - 1
     mark, used = np.full(nodes, -1), 0
     starts = np.zeros(nodes + 1, dtype=np.int32)
@@ -125,15 +125,13 @@ def _pattern(cells, first, around):
         for k in range(starts[node], starts[node + 1]):
             place[columns[k]] = k
         for k in range(first[node], first[node + 1]):
-            for a in range(corners):
-                if cells[around[k], a] == node:
-                    for b in range(corners):
-                        targets[around[k], a, b] = place[cells[around[k], b]]
+            for b in range(corners):
+                targets[around[k], corner[k], b] = place[cells[around[k], b]]
     return starts, columns, targets
 
 
 @njit(cache=True)
-def _order(keys, count):
+def order_by_counting(keys, count):
     """Sort keys in 0…count − 1 stably, by counting."""
     fill, order = np.zeros(count + 1, dtype=np.int64), np.empty(len(keys), dtype=np.int32)
     for key in keys:
@@ -204,13 +202,27 @@ def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
 
     Entries on the diagonal of the matrix are left out.
     """
-    rows = np.repeat(np.arange(len(fixed)), np.diff(pattern.starts))
-    some = fixed.any(axis=1)
-    at = np.flatnonzero(some[rows] | some[pattern.columns])
-    held = fixed[rows[at]][:, :, None] | fixed[pattern.columns[at]][:, None, :]
-    held[rows[at] == pattern.columns[at]] &= ~np.eye(fixed.shape[1], dtype=bool)
-    block, entry = np.nonzero(held.reshape(len(at), fixed.shape[1] ** 2))
-    return at[block] * fixed.shape[1] ** 2 + entry
+    return np.asarray(_held_entries(pattern.starts, pattern.columns, fixed))
+
+
+@njit(cache=True)
+def _held_entries(starts, columns, fixed):
+    (nodes, d), some, room = fixed.shape, np.zeros(len(fixed), dtype=np.bool_), 0
+    for node in range(nodes):
+        some[node] = fixed[node].any()
+        # an entry is in a row or a column of a fixed component, and there are as many columns
+        room += 2 * d * d * (starts[node + 1] - starts[node]) * some[node]
+    held, count = np.empty(room, dtype=np.int64), 0
+    for node in range(nodes):
+        for at in range(starts[node], starts[node + 1]):
+            other = columns[at]
+            if some[node] or some[other]:
+                for k in range(d):
+                    for l in range(d):
+                        if (fixed[node, k] or fixed[other, l]) and (node != other or k != l):
+                            held[count] = (at * d + k) * d + l
+                            count += 1
+    return held[:count]
 
 
 def constrain(

@@ -32,6 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compiled import njit
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.zero_points import ZeroPoints
@@ -81,7 +82,7 @@ def staircase(corners: int) -> Staircase:
         for sign, vertices, steps in _sub_simplices(above, below) if above and below else ():
             plus.append([a for a, _ in vertices])
             minus.append([b for _, b in vertices])
-            # filled up with s_00, which `divided` sets to one
+            # filled up with s_00, which `_parts` takes for one
             factors.append(steps + [(1, 0, 0)] * (corners - len(steps)))
             side.append(sign)
         start.append(len(side))
@@ -211,27 +212,48 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> S
     number = zero.on_edges(own, ids)
     entry, of = staircase_entries(level >= 0.0)
     stairs = staircase(ids.shape[1])
-    at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
-    kind, a, b = np.moveaxis(stairs.factors[entry], 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # pairs on one side, which no entry uses
-        # z_pm = s p + r m on the edge of p, above, and m, below; f = Π r s along each path
-        r = level[:, :, None] / (level[:, :, None] - level[:, None, :])
-        s = -level[:, None, :] / (level[:, :, None] - level[:, None, :])
-        diagonal = np.arange(ids.shape[1])
-        r[:, diagonal, diagonal], s[:, diagonal, diagonal] = 0.0, 1.0
-        places = s[..., None] * corners[:, :, None] + r[..., None] * corners[:, None]
-    share = np.stack([r, s])[kind, at, a, b].prod(axis=1)
-    swaps = sum(crossed.points[:, i] > crossed.points[:, j] for i, j in combinations(diagonal, 2))
+    points, places, share = _parts(
+        level, corners, number, stairs.plus, stairs.minus, stairs.factors, entry, of
+    )
+    swaps = sum(
+        crossed.points[:, i] > crossed.points[:, j] for i, j in combinations(range(ids.shape[1]), 2)
+    )
     turned = (1 - 2 * (np.asarray(swaps) % 2)).astype(np.int8)
     new = Simplices(
         np.where(stairs.side[entry] > 0, crossed.piece[of], below[crossed.piece[of]]),
-        number[at, p, m],
-        places[at, p, m],
+        points,
+        places,
         crossed.fraction[of] * share,
         crossed.sign[of] * turned[of] * stairs.sign[entry],
     )
     zero.divided(new.points)
     return whole + new
+
+
+@njit(cache=True)
+def _parts(level, corners, number, plus, minus, factors, entry, of):
+    """Points (k, c), their coordinates (k, c, c) and the share (k,) of each part of a simplex.
+
+    z_pm = s p + r m on the edge of p, above, and m, below; the share is Π r s along its path.
+    """
+    count, size = len(entry), level.shape[1]
+    points, share = np.empty((count, size), dtype=np.int64), np.ones(count)
+    places = np.empty((count, size, size))
+    for k in range(count):
+        e, q = entry[k], of[k]
+        for i in range(size):
+            p, m = plus[e, i], minus[e, i]
+            points[k, i] = number[q, p, m]
+            s, r = 1.0, 0.0
+            if p != m:
+                across = level[q, p] - level[q, m]
+                s, r = -level[q, m] / across, level[q, p] / across
+            for j in range(size):
+                places[k, i, j] = s * corners[q, p, j] + r * corners[q, m, j]
+            kind, p, m = factors[e, i]
+            if p != m:
+                share[k] *= (-level[q, m] if kind else level[q, p]) / (level[q, p] - level[q, m])
+    return points, places, share
 
 
 def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices:

@@ -30,6 +30,7 @@ from verify.xfem.element import (
 )
 from verify.xfem.hyperelastic import add_hyperelastic_force, hyperelastic_moduli
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
+from verify.xfem.mesh import cells_at
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 
@@ -179,7 +180,7 @@ class InternalForce:
             return self
         wanted = np.zeros(self._shape[0], dtype=bool)
         wanted[nodes] = True
-        some = np.flatnonzero(wanted[self.phantom.cells].any(axis=1))
+        some = cells_at(self.phantom.cells, wanted)
         part = copy(self)
         part.elements = self.elements.part(some)
         part._unturned, part._quaternions = self._unturned[some], self._quaternions[some]

@@ -27,7 +27,7 @@ import numpy as np
 from verify.compiled import njit
 from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
-from verify.xfem.mesh import SimplexMesh, connected, facets_of, neighbours_across
+from verify.xfem.mesh import SimplexMesh, cells_at, connected, facets_of, neighbours_across
 from verify.xfem.zero_points import ZeroPoints
 
 
@@ -63,7 +63,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNo
     """
     near = np.zeros(len(mesh.points), dtype=bool)
     near[mesh.cells[partition.parent]] = True
-    patch = mesh.cells_at(near)
+    patch = cells_at(mesh.cells, near)
     parent = np.searchsorted(patch, partition.parent)
     whole = np.flatnonzero(np.bincount(parent, minlength=len(patch)) == 0)
     piece_cell = np.concatenate([parent, whole])

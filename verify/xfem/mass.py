@@ -54,8 +54,9 @@ class Mass:
     @cached_property
     def entries(self) -> tuple[Ints, Ints, Floats]:
         """(rows, columns, values) of the non-zeros."""
-        entries = self.matrix.tocoo()
-        return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
+        matrix = self.matrix
+        rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+        return rows, matrix.indices.astype(np.int64), matrix.data
 
     def apply(self, vectors: Floats) -> Floats:
         """Multiply (N, d) vectors by M."""

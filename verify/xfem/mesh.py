@@ -99,11 +99,6 @@ class SimplexMesh:
         """Compute the length (q,) of the longest edge of some cells (q,), in metres."""
         return _sizes(self.points, self.cells[chosen])[0]
 
-    def cells_at(self, marked: Bools) -> Ints:
-        """Find cells (q,), ascending, with one of the marked nodes (n,)."""
-        # corner by corner: many times faster than along the short axis
-        return np.flatnonzero(np.logical_or.reduce([marked[nodes] for nodes in self.cells.T]))
-
     @cached_property
     def measures(self) -> Floats:
         """(m,) areas or volumes, positive whatever the orientation."""
@@ -248,6 +243,12 @@ def facets_of(cells: NDArray) -> NDArray:
     corners = cells.shape[1]
     others = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
     return cells[:, others].reshape(-1, corners - 1)
+
+
+def cells_at(cells: Ints, marked: Bools) -> Ints:
+    """Find cells (q,), ascending, with one of the marked nodes (n,)."""
+    # corner by corner: many times faster than along the short axis
+    return np.flatnonzero(np.logical_or.reduce([marked[nodes] for nodes in cells.T]))
 
 
 def equal_rows(rows: Ints) -> tuple[Ints, Ints]:

@@ -22,7 +22,7 @@ are no part of r: they change with the space, not by the cut.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -195,26 +195,17 @@ class TieForces:
 
     phantom: PhantomMesh
     releases: tuple[Release, ...]
-    _known: dict[float, list[Floats]] = field(default_factory=dict, repr=False, compare=False)
-
-    def _factors(self, time: float) -> list[Floats]:
-        """Evaluate the factors of each release; repeated calls at one time evaluate them once."""
-        if time not in self._known:
-            self._known.clear()
-            self._known[time] = [one.factor(time) for one in self.releases]
-        return self._known[time]
 
     def __call__(self, time: float) -> Floats:
         """Sum the forces at a time."""
         total = np.zeros((self.phantom.corners.node_count, self.phantom.mesh.space))
-        for one, factor in zip(self.releases, self._factors(time), strict=True):
-            total[one.nodes] += factor[:, None] * one.forces
+        for one in self.releases:
+            total[one.nodes] += one.factor(time)[:, None] * one.forces
         return self.phantom.restrict(total)
 
     def still(self, time: float) -> "TieForces | None":
         """Keep the releases whose forces act at a time or later; None if none does."""
-        pairs = zip(self.releases, self._factors(time), strict=True)
-        releases = tuple(one for one, factor in pairs if factor.any())
+        releases = tuple(one for one in self.releases if one.factor(time).any())
         if len(releases) == len(self.releases):
             return self
         return TieForces(self.phantom, releases) if releases else None
@@ -232,9 +223,9 @@ class TieForces:
             Number of cuts.
         """
         taken, change = np.zeros(cuts), self.phantom.extend(change)
-        for one, factor in zip(self.releases, self._factors(time), strict=True):
+        for one in self.releases:
             done = (change[one.nodes] * one.forces).sum(axis=1)
-            taken -= np.bincount(one.cut, factor * done, cuts)
+            taken -= np.bincount(one.cut, one.factor(time) * done, cuts)
         return taken
 
 
