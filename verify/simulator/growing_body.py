@@ -24,6 +24,7 @@ from verify.simulator.division import (
 )
 from verify.simulator.point_numbers import GrowingArray, PointNumbers, distinct, ranges
 from verify.xfem.arrays import Bools, Floats, Ints, Sides, XfemError
+from verify.xfem.block_pattern import order_by_counting
 from verify.xfem.clip import Partition
 from verify.xfem.cuts import Cut
 from verify.xfem.join import join_parts
@@ -353,7 +354,7 @@ def whole_mesh(body: GrowingBody, level_sets: Floats) -> PhantomMesh:
         Nodal level sets, in metres.
     """
     parent = body.piece_parent.rows
-    order = np.argsort(parent, kind="stable")
+    order = order_by_counting(parent, len(body.mesh.cells))
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
     used = np.flatnonzero(body.sub_piece.rows >= 0)

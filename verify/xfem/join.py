@@ -280,9 +280,10 @@ def node_sides(
     own = np.zeros(len(node_parent), dtype=bool)
     piece, cut = np.nonzero(label)
     level = level_sets[node_parent[cells[piece]], cut[:, None]]
-    against = np.zeros(cells.shape, dtype=np.int64)
-    np.add.at(against, piece, label[piece, cut][:, None] * level < 0.0)
-    own[cells[against == 0]] = True
+    within = np.ones(cells.shape, dtype=bool)
+    row, corner = np.nonzero(label[piece, cut][:, None] * level < 0.0)
+    within[piece[row], corner] = False
+    own[cells[within]] = True
     # pieces vote where the node does not tell: for another material than the node's own, or where
     # the node is exactly on a cut
     asks = ~own | on_cut.any(axis=1)[node_parent]
@@ -298,10 +299,7 @@ def node_sides(
     # where all labelled pieces are on one side
     at, of = cells[piece].ravel(), np.repeat(cut, cells.shape[1])
     pairs, number = np.unique(at * label.shape[1] + of, return_inverse=True)
-    sign = np.repeat(label[piece, cut], cells.shape[1])
-    least, most = np.full((2, len(pairs)), [[1], [-1]], dtype=np.int8)
-    np.minimum.at(least, number, sign)
-    np.maximum.at(most, number, sign)
-    told = least == most
-    side[np.divmod(pairs[told], label.shape[1])] = least[told]
+    total = np.bincount(number, np.repeat(label[piece, cut], cells.shape[1]))
+    told = np.abs(total) == np.bincount(number)
+    side[np.divmod(pairs[told], label.shape[1])] = np.sign(total[told])
     return side

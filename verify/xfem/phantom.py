@@ -236,7 +236,9 @@ class PhantomMesh:
         integrals[self.split] = 0.0
         sub = self.sub_cells
         share = sub.fraction[:, None] * sub.barycentric.mean(axis=1)
-        np.add.at(integrals, sub.piece, share * self.mesh.measures[self.parent[sub.piece], None])
+        share *= self.mesh.measures[self.parent[sub.piece], None]
+        for column, values in zip(integrals.T, share.T, strict=True):
+            column += np.bincount(sub.piece, values, len(column))
         return integrals
 
     @cached_property

@@ -29,6 +29,7 @@ import numpy as np
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError
 from verify.xfem.body import DynamicBody, FreeMass, MotionState, check_state
+from verify.xfem.mesh import cells_at
 from verify.xfem.phantom import PhantomMesh
 
 
@@ -310,14 +311,15 @@ def parting_cuts(phantom: PhantomMesh, nodes: Ints, parent: Ints) -> Ints:
     """
     row = np.full(phantom.node_count, -1)
     row[nodes] = np.arange(len(nodes))
-    at = row[phantom.cells]
+    some = cells_at(phantom.cells, row >= 0)
+    at, label = row[phantom.cells[some]], phantom.label[some]
     piece, corner = np.nonzero(at >= 0)
     number = np.unique(parent, return_inverse=True)[1]
     found, parts = np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=bool)
-    for cut in reversed(range(phantom.label.shape[1])):
+    for cut in reversed(range(label.shape[1])):
         there = [np.zeros(len(nodes), dtype=bool) for _ in range(2)]
         for side, here in zip((1, -1), there, strict=True):
-            here[at[piece, corner][phantom.label[piece, cut] == side]] = True
+            here[at[piece, corner][label[piece, cut] == side]] = True
         above, below = there[0] & ~there[1], there[1] & ~there[0]
         apart = (np.bincount(number, above) > 0) & (np.bincount(number, below) > 0)
         beside = np.bincount(number, there[0] | there[1]) > 0
