@@ -378,8 +378,8 @@ def plan_fronts(
     at, column, row = at[lower], column[lower], row[lower]
     return FrontPlan(
         order, bounds, row_start, rows, places(parent[front], rows), parent, level,
-        np.searchsorted(column, np.arange(nodes + 1)), blocks[at],
-        places(np.searchsorted(bounds, column, "right") - 1, row),
+        _starts(np.bincount(column, minlength=nodes)), blocks[at],
+        places(np.repeat(np.arange(len(tops)), np.diff(bounds))[column], row),
     )  # fmt: skip
 
 
