@@ -171,7 +171,8 @@ def _scatter(
     """Return median and 90 % range of a ratio over positions of the mesh, if it was studied."""
     cases = {result.case for result in members}
     rows = evidence.benchmark_positions
-    ratios = mesh_ratios(rows, METRIC, name, best, cases.__contains__)
+    by_scene = mesh_ratios(rows, METRIC, name, best, cases.__contains__)
+    ratios = [ratio for own in by_scene.values() for ratio in own]
     if not ratios:
         return None
     return [float(value) for value in np.quantile(ratios, [0.5, 0.05, 0.95])]

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from verify.errors import InputError
-from verify.report.evidence import MEASURE, Beside, Evidence, beside, dimension_of, moves
+from verify.report.evidence import MEASURE, Beside, Evidence, beside, is_solid, moves
 from verify.report.notation import number
 from verify.result import REFERENCE, finest_of
 
@@ -124,15 +124,20 @@ def _weighed(
     if own is None:
         return None
     side = (own.ratio >= factor) - (own.ratio <= 1 / factor)
-    shown = 0 if own.scatter is None else (own.scatter[1] > 1.0) - (own.scatter[2] < 1.0)
+    shown = own.shown
     if side and own.scatter is None and kind != "motion" and metric != "time":
         return None
     if own.scatter is not None and shown != -side:
         side = shown and side
     needs = f"a difference of {factor:g}, to the same side over positions of the mesh if studied"
-    text = words[side + 1].format(own.over_scenes if own.scatter is None else number(own.ratio, 2))
+    won, tied, lost = own.outcomes
+    text = words[side + 1].format(
+        own.over_scenes if own.scatter is None else number(own.ratio, 2),
+        won=won, lost=lost, scenes=won + tied + lost,
+    )  # fmt: skip
     if own.scatter is not None:
-        text += own.over_positions + (", not told apart." if not shown else ".")
+        untold = "; the scene decides." if own.contradicted else ", not told apart."
+        text += own.over_positions + ("." if shown else untold)
     return Found(text, own.written, needs, not side or shown in (0, side))
 
 
@@ -149,30 +154,26 @@ def _tip_functions(evidence: Evidence) -> Found | None:
 
 
 def _moving_in_space(evidence: Evidence) -> Found | None:
-    """Say how large XFEM's error is; apart where the reference does not tell it from none."""
+    """Say how large XFEM's error is in cut solids; a slab of one layer is none."""
     found = [
         (one.value, one.uncertainty, solve.unknowns, result.case)
         for result in evidence.results
-        if moves(result) and dimension_of(result.scene) == 3
+        if moves(result) and result.scene["cuts"] and is_solid(result.scene)
         for solve in finest_of(s for s in result.solves if s.metric("displacement_l2")).values()
         if solve.solver == "xfem" and solve.unknowns and (one := solve.metric("displacement_l2"))
     ]
     told = [error for error, half, _, _ in found if error > half]
     if len(told) < FEWEST:
         return None
-    middle, least, most = (number(100 * v, 2) for v in (np.median(told), min(told), max(told)))
-    sizes = [unknowns for _, _, unknowns, _ in found]
-    text = (
-        f"In space XFEM's error in motion is {middle} % of the displacement (median of {len(told)} "
-        f"scenes, {least} to {most} %; {number(min(sizes))} to {number(max(sizes))} unknowns)"
-    )
+    least, most = (number(100 * v, 2) for v in (min(told), max(told)))
+    text = f"In {len(told)} cut solids in motion XFEM's error is {least} to {most} %"
     doubted = ", ".join(
         f"{name} below {number(100 * (error + half), 2)} %"
         for error, half, _, name in found if error <= half
     )  # fmt: skip
-    text += f"; known only: {doubted}." if doubted else "."
+    text += f"; {doubted}." if doubted else "."
     numbers = ", ".join(
-        f"{name} {number(error, 2)} ± {number(half, 1)} at {number(unknowns)}"
+        f"{name} {number(error, 2)} ± {number(half, 1)} at {number(unknowns)} unknowns"
         for error, half, unknowns, name in found
     )
     needs = f"at least {FEWEST} errors larger than the half-width of their reference"
@@ -247,9 +248,10 @@ def _step_kept(evidence: Evidence) -> Found | None:
         float(row["value"]) for row in evidence.claims
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
-    text += f"; on meshes with moved nodes at least {number(min(moved), 2)}" if moved else ""
+    text += f", and at least {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
     text += (
-        ", always that of the smallest uncut element. [Ends of cuts](../theory/xfem.md) leave less."
+        "; never less than the smallest uncut element's. [Ends of cuts](../theory/xfem.md) leave "
+        "less."
     )
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
@@ -358,10 +360,11 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("remeshed", "remeshing, on several positions of the mesh", partial(
             _weighed, kind="rest", metric="displacement_l2", solver=_REMESHED, rival="xfem",
             factor=QUARTER, words=tuple(
-                f"{lead}: at rest, with a new mesh for each cut, the error is {{}} times XFEM's."
+                f"{lead}: with a new mesh for each cut the error is {{}} times XFEM's."
                 for lead in (
-                    "Remesh for accuracy", "Remeshing gains no clear accuracy",
-                    "Remeshing loses accuracy")))),
+                    "Remesh for accuracy at rest",
+                    "Remeshing gains accuracy in {won} of {scenes} scenes at rest, loses it in "
+                    "{lost}", "Remeshing loses accuracy at rest")))),
         Sentence("remeshing time", "times of remeshing", partial(
             _weighed, kind="rest", metric="time", solver=_REMESHED, rival="xfem", factor=TWICE,
             words=("At equal error remeshing takes only {} times XFEM's time.",

@@ -142,6 +142,12 @@ def dimension_of(scene: Mapping[str, Any]) -> int:
     return 3 if geometry.get("kind") in ("box", "skin") else 2
 
 
+def is_solid(scene: Mapping[str, Any]) -> bool:
+    """Whether the body of a scene is in space, and no slab of a single layer of elements."""
+    levels = (scene.get("mesh") or {}).get("cells") or [[2]]
+    return dimension_of(scene) == 3 and min(levels[-1]) > 1
+
+
 def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Return the results that are compared together: by kind of scene, and the benchmark's scenes.
 
@@ -199,6 +205,8 @@ class Beside:
         Median and 90 % range over positions of the mesh; None where they were not studied.
     meshes : int
         Ratios behind it.
+    by_scene : mapping of str to tuple of float
+        The same of each scene whose positions were studied.
     outcomes : tuple of int
         Scenes won, tied and lost.
     """
@@ -209,6 +217,7 @@ class Beside:
     count: int
     scatter: tuple[float, float, float] | None = None
     meshes: int = 0
+    by_scene: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     outcomes: tuple[int, int, int] = (0, 0, 0)
 
     def within(self, least: float, most: float) -> bool:
@@ -221,12 +230,27 @@ class Beside:
         return f"{number(self.ratio, 2)} ({number(self.low, 2)} to {number(self.high, 2)})"
 
     @property
+    def shown(self) -> int:
+        """Whether positions of the mesh show more (1) or less (−1) than the rival's, or neither."""
+        return 0 if self.scatter is None else _side(self.scatter)
+
+    @property
     def over_positions(self) -> str:
-        """The ratio over positions of the mesh, as words; none where they were not studied."""
+        """The ratio over positions of the mesh, as words; none where they were not studied.
+
+        Two scenes are told one by one: their common range is that of neither.
+        """
         if self.scatter is None:
             return ""
-        middle, low, high = (number(value, 2) for value in self.scatter)
-        return f" Over positions: {middle} ({low} to {high})"
+        if len(self.by_scene) == 2:
+            told = {name_of(n): own for n, own in self.by_scene.items()}
+            return " Over positions: " + ", ".join(f"{n} {_over(o)}" for n, o in told.items())
+        return f" Over positions: {_over(self.scatter)}"
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether positions of one scene show the opposite of those of another."""
+        return {-1, 1} <= {_side(own) for own in self.by_scene.values()}
 
     @property
     def written(self) -> str:
@@ -242,6 +266,21 @@ class Beside:
             return f"{text}; mesh scatter not studied"
         middle, low, high = (number(v, 3) for v in self.scatter)
         return f"{text}; {middle} [{low}, {high}] over {self.meshes} positions of meshes"
+
+
+def _side(scatter: tuple[float, float, float]) -> int:
+    return (scatter[1] > 1.0) - (scatter[2] < 1.0)
+
+
+def _over(scatter: tuple[float, float, float]) -> str:
+    middle, low, high = (number(value, 2) for value in scatter)
+    return f"{middle} ({low} to {high})"
+
+
+def name_of(case: str) -> str:
+    """Return the label of a scene of the benchmark, the name of another case."""
+    found = _SCENE.match(case)
+    return f"C{found[1]}" if found else case
 
 
 def beside(
@@ -264,14 +303,20 @@ def beside(
     moving = {result.case for result in evidence.results if moves(result)}
     # the protocol's six scenes are at rest, two of the benchmark's move
     rows = evidence.benchmark_positions if kind == "motion" else evidence.positions
-    ratios = mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
+    by_scene = mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
         kind, scene in moving, scene in evidence.tips))  # fmt: skip
-    scatter = None
-    if len(ratios):
-        middle, low, high = (float(v) for v in np.quantile(ratios, [0.5, 0.05, 0.95]))
-        scatter = middle, low, high
+    ratios = [ratio for own in by_scene.values() for ratio in own]
+    scatter = _quantiles(ratios) if ratios else None
+    each = {scene: _quantiles(own) for scene, own in by_scene.items()}
     outcomes = pair.wins, pair.ties, pair.losses
-    return Beside(pair.ratio, pair.low, pair.high, pair.count, scatter, len(ratios), outcomes)
+    own = pair.ratio, pair.low, pair.high, pair.count
+    return Beside(*own, scatter, len(ratios), each, outcomes)
+
+
+def _quantiles(ratios: Sequence[float]) -> tuple[float, float, float]:
+    """Return the median of ratios and the range that holds 90 % of them."""
+    middle, low, high = (float(v) for v in np.quantile(ratios, [0.5, 0.05, 0.95]))
+    return middle, low, high
 
 
 def _is(kind: str, moving: bool, tip: bool) -> bool:
@@ -287,18 +332,18 @@ def pair_in(pairs: Sequence[Pair], metric: str, solver: str, rival: str) -> Pair
 
 def mesh_ratios(
     rows: Sequence[Row], metric: str, solver: str, rival: str, counts: Callable[[str], bool]
-) -> list[float]:
-    """Return ratios of two solvers, one for each position of the mesh of the scenes that count."""
+) -> dict[str, list[float]]:
+    """Return ratios of two solvers by scene that counts, one for each position of the mesh."""
     values: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
         if row["metric"] == metric and counts(row["scene"]) and _is_told(row):
             place = values.setdefault((row["scene"], row["position"]), {})
             place[row["solver"]] = float(row["value"])
-    return [
-        both[solver] / both[rival]
-        for _, both in sorted(values.items())
-        if {solver, rival} <= both.keys()
-    ]
+    ratios: dict[str, list[float]] = {}
+    for (scene, _), both in sorted(values.items()):
+        if {solver, rival} <= both.keys():
+            ratios.setdefault(scene, []).append(both[solver] / both[rival])
+    return ratios
 
 
 def _is_told(row: Row) -> bool:

@@ -83,9 +83,9 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
     failed = [v.solver for v in verdicts if v.verdict is Verdict.FAIL]
     counts = Counter(str(v.verdict) for v in verdicts if v.solver == "xfem")
     lines.append(
-        f"- **Verdicts of XFEM**: of {counts.total()} checks {counts['FAIL']} failed and "
-        f"{counts['UNDECIDED']} are undecided. Of all {len(failed)} failures "
-        f"{sum(name in _CONTROLS for name in failed)} are of the controls "
+        f"- **Verdicts of XFEM**: of {counts.total()} checks {counts['FAIL']} "
+        f"[failed](verdicts.md) and {counts['UNDECIDED']} are undecided. Of all {len(failed)} "
+        f"failures {sum(name in _CONTROLS for name in failed)} are of the controls "
         f"{' and '.join(_CONTROLS)}."
     )
     pictures = " ".join(figure[0] for figure in shown.values())
@@ -120,7 +120,7 @@ def answered(evidence: Evidence) -> list[str]:
     for where, dimension in _WHERE.items():
         own = [r for r in evidence.results if dimension_of(r.scene) == dimension]
         lines += ["", f"| {where} | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
-        for solver in evidence.solvers:
+        for solver in (name for name in evidence.solvers if name not in _CONTROLS):
             cells = [_share([r for r in own if of(r)], solver) for of in columns.values()]
             lines.append(f"| {solver_title(solver)} | {' | '.join(cells)} |")
     return lines
