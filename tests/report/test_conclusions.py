@@ -453,7 +453,7 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     head = "\n".join(arena_head(evidence, answer(evidence), tmp_path))
     assert head.startswith("- **Accuracy at rest**: XFEM or a conforming mesh")
     assert "answered of asked. " in head
-    assert "**Verdicts of XFEM**: of 0 checks 0 [failed](verdicts.md)" in head  # made without checks
+    assert "**Verdicts of XFEM**: of 0 checks 0 [failed](verdicts.md)" in head  # none were made
     assert "SOFA" not in head  # of another run
     assert "snapping 7 of 8" in head  # bars count scenes
     assert "getfem 6 of 7" in head

@@ -238,7 +238,7 @@ class Beside:
     def over_positions(self) -> str:
         """The ratio over positions of the mesh, as words; none where they were not studied.
 
-        Two scenes are told one by one: their common range is that of neither.
+        Two scenes are told one by one: their common range belongs to neither.
         """
         if self.scatter is None:
             return ""
@@ -249,7 +249,7 @@ class Beside:
 
     @property
     def contradicted(self) -> bool:
-        """Whether positions of one scene show the opposite of those of another."""
+        """Whether positions of one scene show the opposite of what another shows."""
         return {-1, 1} <= {_side(own) for own in self.by_scene.values()}
 
     @property

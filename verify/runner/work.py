@@ -231,7 +231,7 @@ class Work:
                 break
 
     def _begin(self, job: Job) -> None:
-        """Take over what is known of a solve, or start it."""
+        """Take over a solve that is known, or start it."""
         if (record := stored_record(job)) is not None:
             self.reused += 1
             self.records[job.folder] = (job.folder / "record.json").read_bytes()
