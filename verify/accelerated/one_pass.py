@@ -50,8 +50,9 @@ class OnePassTetrahedra:
     def __init__(self, elements: Elements, pattern: BlockPattern, corotational: bool) -> None:
         count = len(elements.cells)
         batches = -(-count // BATCH)
-        corner, nodes = _sorted_corners(elements.cells)
-        cells = order_by_counting(nodes[:, 1], pattern.node_count)
+        corner, nodes = np.empty((2, count, 4), dtype=np.int64)
+        _sort_corners(elements.cells, corner, nodes)
+        cells = order_by_counting(nodes[:, 1].copy(), pattern.node_count)
         cells = cells[order_by_counting(nodes[cells, 0], pattern.node_count)]
         whole = count // _WINDOW * _WINDOW
         windows = cells[:whole].reshape(-1, BATCH, _WINDOW // BATCH)
@@ -152,9 +153,8 @@ class OnePassTetrahedra:
 
 
 @njit(cache=True)
-def _sorted_corners(cells):
-    """Sort the corners of each cell (p, 4) by node; return the corners and the nodes."""
-    corner, nodes = np.empty_like(cells), np.empty_like(cells)
+def _sort_corners(cells, corner, nodes):
+    """Sort the corners of each cell (p, 4) by node; write the corners and the nodes."""
     for p in range(len(cells)):
         for k in range(4):
             at = k
@@ -162,7 +162,6 @@ def _sorted_corners(cells):
                 corner[p, at], nodes[p, at] = corner[p, at - 1], nodes[p, at - 1]
                 at -= 1
             corner[p, at], nodes[p, at] = k, cells[p, k]
-    return corner, nodes
 
 
 @njit(cache=True)

@@ -146,8 +146,9 @@ class MovingSurface:
             If `displacement` has fewer rows than there are dof nodes, or another shape or type.
         """
         self._check(displacement)
-        rows = self.material.rows, self.nodes.rows, self.weights.rows
-        return np.asarray(_moved(*rows, displacement))
+        found = self.material.rows.copy()
+        _add_moved(self.nodes.rows, self.weights.rows, displacement, found)
+        return found
 
     def add_forces(self, facets: Ints, at: Floats, forces: Floats, out: Floats) -> None:
         """Add forces at points of facets to the forces on the dof nodes: Wᵀf.
@@ -189,16 +190,14 @@ class MovingSurface:
 
 
 @njit(cache=True)
-def _moved(material, nodes, weights, displacement):
-    """Add to places (v, s) what nodes (v, c) have moved, by their weights: X + W u."""
-    found = np.empty_like(material)
+def _add_moved(nodes, weights, displacement, out):
+    """Add to places (v, s) what nodes (v, c) have moved, by their weights: W u."""
     for v in range(len(nodes)):
-        for i in range(material.shape[1]):
+        for i in range(out.shape[1]):
             moved = 0.0
             for k in range(nodes.shape[1]):
                 moved += weights[v, k] * displacement[nodes[v, k], i]
-            found[v, i] = material[v, i] + moved
-    return found
+            out[v, i] += moved
 
 
 class BodySurface:

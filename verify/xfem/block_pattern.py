@@ -202,18 +202,16 @@ def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
 
     Entries on the diagonal of the matrix are left out.
     """
-    return np.asarray(_held_entries(pattern.starts, pattern.columns, fixed))
+    some = fixed.any(axis=1)
+    # rows and columns of a node have as many blocks
+    most = 2 * int(np.diff(pattern.starts)[some].sum()) * fixed.shape[1] ** 2
+    return np.asarray(_held_entries(pattern.starts, pattern.columns, fixed, some, most))
 
 
 @njit(cache=True)
-def _held_entries(starts, columns, fixed):
-    (nodes, d), some, room = fixed.shape, np.zeros(len(fixed), dtype=np.bool_), 0
-    for node in range(nodes):
-        some[node] = fixed[node].any()
-        # an entry is in a row or a column of a fixed component, and there are as many columns
-        room += 2 * d * d * (starts[node + 1] - starts[node]) * some[node]
-    held, count = np.empty(room, dtype=np.int64), 0
-    for node in range(nodes):
+def _held_entries(starts, columns, fixed, some, most):
+    held, count, d = np.empty(most, dtype=np.int64), 0, fixed.shape[1]
+    for node in range(len(fixed)):
         for at in range(starts[node], starts[node + 1]):
             other = columns[at]
             if some[node] or some[other]:

@@ -82,7 +82,7 @@ def staircase(corners: int) -> Staircase:
         for sign, vertices, steps in _sub_simplices(above, below) if above and below else ():
             plus.append([a for a, _ in vertices])
             minus.append([b for _, b in vertices])
-            # filled up with s_00, which `_parts` takes for one
+            # filled up with s_00, which `_set_parts` takes for one
             factors.append(steps + [(1, 0, 0)] * (corners - len(steps)))
             side.append(sign)
         start.append(len(side))
@@ -212,9 +212,12 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> S
     number = zero.on_edges(own, ids)
     entry, of = staircase_entries(level >= 0.0)
     stairs = staircase(ids.shape[1])
-    points, places, share = _parts(
-        level, corners, number, stairs.plus, stairs.minus, stairs.factors, entry, of
-    )
+    points, share = np.empty((len(of), ids.shape[1]), dtype=np.int64), np.ones(len(of))
+    places = np.empty((*points.shape, ids.shape[1]))
+    _set_parts(
+        level, corners, number, stairs.plus, stairs.minus, stairs.factors, entry, of, points,
+        places, share,
+    )  # fmt: skip
     swaps = sum(
         crossed.points[:, i] > crossed.points[:, j] for i, j in combinations(range(ids.shape[1]), 2)
     )
@@ -231,15 +234,13 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: Ints, below: Ints) -> S
 
 
 @njit(cache=True)
-def _parts(level, corners, number, plus, minus, factors, entry, of):
-    """Points (k, c), their coordinates (k, c, c) and the share (k,) of each part of a simplex.
+def _set_parts(level, corners, number, plus, minus, factors, entry, of, points, places, share):
+    """Write points (k, c), their coordinates (k, c, c), the share (k,) of each part of a simplex.
 
     z_pm = s p + r m on the edge of p, above, and m, below; the share is Π r s along its path.
     """
-    count, size = len(entry), level.shape[1]
-    points, share = np.empty((count, size), dtype=np.int64), np.ones(count)
-    places = np.empty((count, size, size))
-    for k in range(count):
+    size = points.shape[1]
+    for k in range(len(entry)):
         e, q = entry[k], of[k]
         for i in range(size):
             p, m = plus[e, i], minus[e, i]
@@ -253,7 +254,6 @@ def _parts(level, corners, number, plus, minus, factors, entry, of):
             kind, p, m = factors[e, i]
             if p != m:
                 share[k] *= (-level[q, m] if kind else level[q, p]) / (level[q, p] - level[q, m])
-    return points, places, share
 
 
 def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices:
