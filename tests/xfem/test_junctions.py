@@ -5,12 +5,13 @@ from itertools import permutations
 import numpy as np
 import pytest
 from cut_bodies import shaken
+from cut_comparison import same_cut
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
 import verify.xfem as xfem
 from verify.simulator.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import ImplicitCut, PolygonPatch, ToolPath
+from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, ToolPath
 from verify.xfem.faceted_cuts import Polyline
 
 
@@ -83,6 +84,51 @@ def test_half_planes_that_end_on_one_line_in_tetrahedra_leave_a_part_for_each_se
     # facets as thin as round-off measure up to its root, 1e-8 of their length
     assert exterior(divided) == pytest.approx(6.0 + 2.0 * torn, abs=1e-6)
     assert divided.cell_piece.max() + 1 == len(phantom.cells)
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+@pytest.mark.parametrize("tip", ["inside", "extended"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_stroke_that_goes_on_where_another_stopped_parts_the_body(dim, tip, turned):
+    """Exactly straight on, from a point inside an element; the sense of the second is its own."""
+    rng = np.random.default_rng(dim)
+    mesh = shaken(xfem.rectangle_mesh((5, 5)) if dim == 2 else xfem.box_mesh((3, 3, 3)), 4)
+    frame, point = np.linalg.qr(rng.normal(size=(dim, dim)))[0], rng.uniform(0.4, 0.6, dim)
+    if dim == 2:
+        far = point + np.array([[-3.0], [3.0]]) * frame[0]
+        cuts = [Polyline([far[0], point]), Polyline([point, far[1]][::turned])]
+    else:
+        rim = np.array([[0.0, -3.0], [3.0, -3.0], [3.0, 3.0], [0.0, 3.0]])
+        cuts = [
+            PolygonPatch((point + (rim * [sign, sign]) @ frame[:2])[::way])
+            for sign, way in ((-1.0, 1), (1.0, turned))
+        ]
+    for asked in (cuts, cuts[::-1]):
+        phantom = xfem.cut_mesh(mesh, asked, tip)
+        assert zero_modes(phantom)[0] == 2 * (3 if dim == 2 else 6)
+        whole = xfem.cut_mesh(mesh, [Plane(point, frame[-1])], tip)
+        np.testing.assert_allclose(areas(phantom), areas(whole), rtol=1e-12)
+        torn = [facet_measures(xfem.subdivide(one).cut_facets).sum() for one in (phantom, whole)]
+        assert torn[0] == pytest.approx(torn[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_second_stroke_from_the_end_of_the_first_parts_the_body_as_it_grows(dim, way):
+    """Straight on; or it comes from the other side, and ends there."""
+    rng = np.random.default_rng(dim)
+    mesh = shaken(xfem.rectangle_mesh((5, 5)) if dim == 2 else xfem.box_mesh((3, 3, 3)), 4)
+    frame, point = np.linalg.qr(rng.normal(size=(dim, dim)))[0], rng.uniform(0.4, 0.6, dim)
+    deep = None if dim == 2 else 6.0 * frame[1]
+    start = point if dim == 2 else point - 3.0 * frame[1]
+    tips = [start - 3.0 * frame[0], start, start + 3.0 * frame[0]]
+    cutter = SemiProgressiveCutter(mesh)
+    for count, path in ((1, tips[:2]), (2, tips[1:][::way])):
+        cutter.begin(ToolPath.of_tip(path, [count, count + 1.0], deep))
+        for time in np.linspace(count, count + 1.0, 5):
+            cutter.advance(time)
+        assert cutter.phantom_mesh().bodies.max() + 1 == count
+    assert same_cut(cutter.phantom_mesh(), xfem.cut_mesh(mesh, cutter.cuts))
 
 
 @pytest.mark.parametrize("seed", range(5))

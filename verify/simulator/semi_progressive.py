@@ -176,7 +176,12 @@ class Stroke:
         `verify.xfem.crossing` apply, so that every cell that is crossed through is split.
         """
         self.level_sets(distinct(self._mesh.cells[cells]))
-        above = self.values[self._mesh.cells[cells]] >= 0.0
+        values = self.values[self._mesh.cells[cells]]
+        above = values >= 0.0
+        # a face that the blade goes along belongs to the cells on both sides: another stroke, of
+        # the other sense, may end in the one that this stroke does not split
+        whole = above.all(axis=1)
+        above[whole] = values[whole] > 0.0
         mixed = above.any(axis=1) & ~above.all(axis=1)
         cells, above = cells[mixed], above[mixed]
         nodes = self._mesh.cells[cells]

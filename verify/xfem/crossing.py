@@ -289,6 +289,8 @@ def reached(
     its two sides; the end is on the given stem; and the branch just inside its end lies beyond the
     given stem, seen from ×. Plain branches need this as well as junctions.
 
+    Where another cut goes straight on from the end, × lies on both to round-off, and counts.
+
     Parameters
     ----------
     cuts : sequence of Cut
@@ -311,14 +313,19 @@ def reached(
     close = gap <= 2.0 * size[row]
     row, other, at = row[close], other[close], at[close]
     given, realised = levels_and_depths(cuts, other, at)[0], zero.values[points[row], other]
-    between = (given * realised <= 0.0) & (np.abs(given - realised) > AT_END * size[row])
-    row, other, at, given = row[between], other[between], at[between], given[between]
+    nearly = AT_END * size[row]
+    between = (given * realised <= 0.0) & (np.abs(given - realised) > nearly)
+    along = (np.abs(given) <= nearly) & (realised == 0.0)
+    along[along] = levels_and_depths(cuts, other[along], at[along])[1] >= -nearly[along]
+    kept = between | along
+    row, other, at, given, along = (x[kept] for x in (row, other, at, given, along))
     mine, size = own[row], size[row]
     end, inwards = _end(cuts, mine, at, size)
     off = AT_END * size + np.abs(levels_and_depths(cuts, mine, end)[0])
     level, depth = levels_and_depths(cuts, other, end)
     before = levels_and_depths(cuts, other, end + _ASIDE * size[:, None] * inwards)[0]
-    found[row[(np.abs(level) <= off) & (depth >= -off) & (before * given < 0.0)]] = True
+    joined = np.where(along, depth <= off, before * given < 0.0)
+    found[row[(np.abs(level) <= off) & (depth >= -off) & joined]] = True
     return found
 
 
