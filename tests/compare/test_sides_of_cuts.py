@@ -5,13 +5,16 @@ import pytest
 from cut_meshes import scene as plane_scene
 from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, random_square
 
+from reference.exact import exact_of
 from verify.compare.body import body_of
 from verify.compare.body_rule import rules
 from verify.compare.cut_rule import cut_rule_of
-from verify.compare.errors import displacement_jump, nodal_error
+from verify.compare.errors import displacement_jump, jump_error, nodal_error
+from verify.compare.motion import ExactMotion
 from verify.compare.realised import cut_deviation, field_of
 from verify.compare.sides import distance_to_segments
 from verify.scene import load_scene
+from verify.solvers import find_solver
 
 _MOVED = 1e-9  # parts are moved by whole numbers
 
@@ -103,3 +106,20 @@ def test_distances_to_segments_hold_within_a_reach_and_beyond_it_are_no_smaller(
     assert np.abs(found - true)[near].max() < 1e-3  # of the sampling
     assert found[~near].min() > 0.5 - 2e-3
     assert np.isinf(distance_to_segments(points, segments[:0], 0.5)).all()
+
+
+@pytest.mark.parametrize("epsilon", ["1e-09", "1e-12"])
+def test_a_piece_left_to_the_other_half_is_on_the_side_of_its_nodes(epsilon):
+    """Beside a vertex XFEM leaves a corner of 1e-20 of its cell to its neighbour across the cut.
+
+    The jump there is read from the cells around it: its error is that of a cut a little farther.
+    """
+
+    def error(row):
+        scene = load_scene(f"benchmark/c8_slivers[epsilon={row}]")
+        body, solution = body_of(scene), find_solver("xfem").solve(scene, 0, 0)
+        rule = cut_rule_of(body, solution.size, 0)
+        exact = ExactMotion(exact_of(scene)).at(0.0)
+        return jump_error(field_of(solution, body), exact, rule).relative
+
+    assert error(epsilon) == pytest.approx(error("1e-06"), rel=0.01)

@@ -18,6 +18,7 @@ the cuts count, or ahead of a tip on both.
 """
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,9 @@ _STEEP = 0.5
 # Facets are asked in the order of how sure it is which cut they realise.
 _MARGINS = (1.0, 0.5, 0.2, 0.1, 0.0)
 _PLUS, _MINUS, _BOTH = 1, 2, 3
+# Height, over the largest beside a facet, of pieces that solvers leave to the other half: 2⁻⁵² of
+# the cell has at most 1e-5 of its height, as a tetrahedron.
+_TINY = 1e-5
 
 
 def sides_of_cells(
@@ -69,7 +73,7 @@ def sides_of_cells(
     facets = solution.cut_facets
     cell, corner, facet = _cells_on_facets(solution.points, nodes, facets, same)
     normal = np.nan_to_num(unit_normals(facets))  # 0 of a point
-    beside = _beside_facets(shape, cell, corner, facet, facets, normal)
+    beside, sure = _beside_facets(shape, cell, corner, facet, facets, normal)
     cut, along, margin = _orientations(facets, normal, cuts, 0.5 * reach, same)
     centre = shape.corners.mean(axis=1)
     radius = np.linalg.norm(shape.corners - centre[:, None], axis=2).max(axis=1)
@@ -81,8 +85,9 @@ def sides_of_cells(
         near = level <= reach + radius
         bits = np.zeros(len(nodes), dtype=np.int8)
         at_node = np.zeros(len(solution.points), dtype=np.int8)
-        for least in _MARGINS:  # who doubts, is asked where nobody is surer
-            ask = known & (margin[facet] >= least) & (bits[cell] == 0)
+        # who doubts, is asked where nobody is surer; tiny cells have first the side of their nodes
+        for first, least in product((True, False), _MARGINS):
+            ask = known & (margin[facet] >= least) & (bits[cell] == 0) & (sure | (not first))
             asked = np.zeros_like(bits)
             np.bitwise_or.at(asked, cell[ask], np.where(plus[ask], _PLUS, _MINUS).astype(np.int8))
             fresh = np.flatnonzero((asked == _PLUS) | (asked == _MINUS))
@@ -125,8 +130,12 @@ def _cells_on_facets(
 
 def _beside_facets(
     shape: Simplices, cell: Ints, corner: Ints, facet: Ints, facets: Array, normal: Array
-) -> Array:
-    """Find the side (k,) of a facet's own normal of its cells: of two cells, opposite sides."""
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Find the side (k,) of a facet's own normal of its cells: of two cells, opposite sides.
+
+    Which are sure of it (k,) is also returned. A solver may leave a piece within round-off of its
+    cell to the other half: of its facet it then lies on the wrong side, and its nodes tell.
+    """
     off = shape.corners[cell, corner] - facets[facet, 0]
     height = np.sum(off * normal[facet], axis=1)
     # the higher of the two is sure of its side; the other may be as thin as round-off
@@ -136,7 +145,7 @@ def _beside_facets(
     leader = np.sign(height[order[start]])
     side = np.empty(len(height))
     side[order] = np.where(first, leader, -leader)
-    return side
+    return side, np.abs(height) > _TINY * np.abs(height).max(initial=0.0)
 
 
 def _orientations(
