@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from verify.xfem.arrays import Floats, Ints, XfemError, finite_array
-from verify.xfem.faceted_cuts import FacetArrays, FacetCut, facet_arrays
+from verify.xfem.faceted_cuts import FacetArrays, FacetCut, check_triangles, facet_arrays
 from verify.xfem.faceted_cuts import Polyline as Polyline
 from verify.xfem.faceted_cuts import TriangulatedSurface as TriangulatedSurface
 from verify.xfem.mesh import neighbours_across
@@ -231,7 +231,7 @@ class ToolPath:
     ------
     XfemError
         If shapes do not match, a number is not finite or time runs backwards. If the blade turns
-        back on its path, or a path in the plane intersects itself: begin a new stroke instead.
+        back on its path, or its path or sweep intersects itself: begin a new stroke instead.
     """
 
     blades: Floats
@@ -370,6 +370,7 @@ def _sweep_surface(blades: Floats, travel: Floats) -> SweepSurface:
         if back.any():
             where = points[facets[back.any(axis=1)][0]].mean(axis=0)
             raise XfemError(f"the blade turns back on its own sweep near {where.tolist()}")
+        check_triangles(points, facets, "sweep of the blade")
     return SweepSurface(points, facets, arrays)
 
 

@@ -388,6 +388,75 @@ def _side(a, b, x):
     return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0])
 
 
+def check_triangles(points: Floats, triangles: Ints, what: str) -> None:
+    """Refuse triangles (m, 3) that cross each other; where they touch they may.
+
+    Raises
+    ------
+    XfemError
+        With the first two, and what they belong to.
+    """
+    if len(triangles) == 0:
+        return
+    corners = points[triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    axis = int(np.ptp(low, axis=0).argmax())
+    first, second = _first_crossing(corners, triangles, low, high, axis, np.argsort(low[:, axis]))
+    if first < len(triangles):
+        raise XfemError(f"triangles {first} and {second} of the {what} intersect")
+
+
+@njit(cache=True)
+def _first_crossing(corners, triangles, low, high, axis, order):
+    """Find two triangles without a common vertex that cross; their number if there are none."""
+    count = len(corners)
+    for a in range(count):
+        i = order[a]
+        for b in range(a + 1, count):
+            j = order[b]
+            if low[j, axis] > high[i, axis]:
+                break
+            apart = False
+            for k in range(3):
+                apart |= low[j, k] > high[i, k] or low[i, k] > high[j, k]
+                for one in range(3):
+                    apart |= triangles[i, k] == triangles[j, one]
+            if apart:
+                continue
+            for k in range(3):
+                if _pierces(corners[i, k], corners[i, (k + 1) % 3], corners[j]) or _pierces(
+                    corners[j, k], corners[j, (k + 1) % 3], corners[i]
+                ):
+                    return min(i, j), max(i, j)
+    return count, count
+
+
+_TOUCHING = 1e-9  # of the product of three lengths: a volume up to which four points are in a plane
+
+
+@njit(cache=True)
+def _pierces(p, q, triangle):
+    """Tell whether the segment p q goes through the inside of a triangle."""
+    a, b, c = triangle
+    if _volume(p, a, b, c) * _volume(q, a, b, c) >= 0.0:
+        return False
+    sides = _volume(p, q, a, b), _volume(p, q, b, c), _volume(p, q, c, a)
+    return min(sides) > 0.0 or max(sides) < 0.0
+
+
+@njit(cache=True)
+def _volume(a, b, c, d):
+    """Compute six times the volume of a tetrahedron, exactly zero if it is nearly flat."""
+    u, v, w = b - a, c - a, d - a
+    volume = (
+        u[0] * (v[1] * w[2] - v[2] * w[1])
+        + u[1] * (v[2] * w[0] - v[0] * w[2])
+        + u[2] * (v[0] * w[1] - v[1] * w[0])
+    )
+    size = math.sqrt((u * u).sum() * (v * v).sum() * (w * w).sum())
+    return volume if abs(volume) > _TOUCHING * size else 0.0
+
+
 @dataclass(frozen=True)
 class TriangulatedSurface(FacetCut):
     """An oriented triangulated surface, open or closed.
@@ -402,8 +471,8 @@ class TriangulatedSurface(FacetCut):
     Raises
     ------
     XfemError
-        If a triangle has no area, or an edge is used twice in the same direction: orientations
-        differ, or more than two triangles share the edge.
+        If a triangle has no area, two cross, or an edge is used twice in the same direction:
+        orientations differ, or more than two triangles share the edge.
 
     Examples
     --------
@@ -436,6 +505,7 @@ class TriangulatedSurface(FacetCut):
         edges = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
         if len(np.unique(edges, axis=0)) < len(edges):
             raise XfemError("the triangles of the surface are not consistently oriented")
+        check_triangles(vertices, faces, "surface")
 
     @cached_property
     def arrays(self) -> FacetArrays:
