@@ -34,6 +34,7 @@ from verify.geometry.simplices import (
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 _ON = 1e-10  # of an edge: closer points are the same point
+_FLATTER = 2.5e-10  # of an edge: a triangle of less height is too flat to be opened (2e-10)
 Mesh = tuple[Array, Cells, Cells]  # points, cells, facets of the cuts so far
 ON = 3e-5  # of an edge: a closer node counts as on the plane; a corner cut off has its cube
 _SAME = 1e-10  # of the size of the cut: corners this close are one
@@ -81,15 +82,15 @@ def imprint(points: Array, cells: Cells, polylines: list[Array]) -> tuple[Array,
     """
     box = points.min(axis=0), points.max(axis=0)
     segments = [(a, b) for polyline in polylines for a, b in pairwise(polyline)]
-    ends = []
     for a, b in segments:
         for end in (a, b):
             if (end >= box[0]).all() and (end <= box[1]).all():
                 points, cells = _insert(points, cells, end)
+    nodes_on: list[NDArray[np.bool_]] = []
     for a, b in segments:
-        points, cells = _split_crossed(points, cells, a, b)
-    for a, b in segments:
-        ends.append(_facets_on(points, cells, a, b))
+        points, cells, nodes_on = _split_crossed(points, cells, a, b, nodes_on)
+    edges = mesh_edges(cells)
+    ends = [edges[on[edges].all(axis=1)] for on in nodes_on]
     facets = inner_facets(cells, np.concatenate([np.zeros((0, 2), dtype=np.int64), *ends]))
     if polylines and not len(facets):
         raise InputError("cuts: none of them lies inside the mesh")
@@ -115,8 +116,15 @@ def _insert(points: Array, cells: Cells, end: Array) -> tuple[Array, Cells]:
     return np.vstack([points, end]), _replace(cells, inside[:1], parts)
 
 
-def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Array, Cells]:
-    """Give every edge that the segment ab crosses a node there, and split its cells."""
+def _split_crossed(
+    points: Array, cells: Cells, a: Array, b: Array, nodes_on: list[NDArray[np.bool_]]
+) -> tuple[Array, Cells, list[NDArray[np.bool_]]]:
+    """Give every edge that the segment ab crosses a node there, and split its cells.
+
+    `nodes_on` are the nodes on earlier segments; those on this one come last. Whether a node is on
+    it is decided once, for all of its edges: the long ones else would pass through a node that
+    the short ones pass by, and a cell between the two would be set free.
+    """
     edges, owner = _edges(cells, len(points))
     along = b - a
     length = float(np.hypot(*along))
@@ -124,8 +132,11 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
     place = ((points - a) @ along) / length
     p, q = edges.T
     step = np.linalg.norm(points[q] - points[p], axis=1)
-    hp = np.where(np.abs(height[p]) <= _ON * step, 0.0, height[p])
-    hq = np.where(np.abs(height[q]) <= _ON * step, 0.0, height[q])
+    near = np.zeros(len(points))
+    np.maximum.at(near, edges.ravel(), _FLATTER * step.repeat(2))
+    level = np.where(np.abs(height) <= near, 0.0, height)
+    on = (level == 0.0) & (place >= -near) & (place <= length + near)
+    hp, hq = level[p], level[q]
     crossing = hp * hq < 0
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(crossing, hp / (hp - hq), 0.0)
@@ -133,7 +144,9 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
     crossing &= (at > _ON * step) & (at < length - _ON * step)
     chosen = np.flatnonzero(crossing)
     if not len(chosen):
-        return points, cells
+        return points, cells, [*nodes_on, on]
+    nodes_on = [np.append(one, one[p[chosen]] & one[q[chosen]]) for one in nodes_on]
+    nodes_on.append(np.append(on, np.ones(len(chosen), dtype=bool)))
     number = np.full(len(edges), -1, dtype=np.int64)
     number[chosen] = len(points) + np.arange(len(chosen))
     points = np.vstack(
@@ -142,7 +155,7 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
     on_edge = number[owner]  # (m, 3): new node on the edge opposite each corner, or −1
     touched = np.flatnonzero((on_edge >= 0).any(axis=1))
     pieces = [_parts(points, cells[c], on_edge[c]) for c in touched]
-    return points, _replace(cells, touched, pieces)
+    return points, _replace(cells, touched, pieces), nodes_on
 
 
 def _parts(points: Array, cell: Cells, new: Cells) -> list[list[int]]:
@@ -174,20 +187,6 @@ def _edges(cells: Cells, count: int) -> tuple[Cells, Cells]:
     pairs = np.sort(cells[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
     keys, owner = np.unique(pairs[:, 0] * count + pairs[:, 1], return_inverse=True)
     return np.column_stack(np.divmod(keys, count)), owner.reshape(-1, 3)
-
-
-def _facets_on(points: Array, cells: Cells, a: Array, b: Array) -> Cells:
-    """Find edges whose both ends lie on the segment ab."""
-    edges = mesh_edges(cells)
-    along = b - a
-    length = float(np.hypot(*along))
-    height = np.abs((points - a) @ np.array([-along[1], along[0]])) / length
-    place = ((points - a) @ along) / length
-    step = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-    tolerance = 4 * _ON * np.maximum(step, 1e-6 * length)
-    on = (height[edges] <= tolerance[:, None]) & (place[edges] >= -tolerance[:, None])
-    on &= place[edges] <= length + tolerance[:, None]
-    return edges[on.all(axis=1)]
 
 
 def structured_tetrahedra(
