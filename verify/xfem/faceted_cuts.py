@@ -437,7 +437,7 @@ _TOUCHING = 1e-9  # of the product of three lengths: a volume up to which four p
 @njit(cache=True)
 def _pierces(p, q, triangle):
     """Tell whether the segment p q goes through the inside of a triangle."""
-    a, b, c = triangle
+    a, b, c = triangle[0], triangle[1], triangle[2]
     if _volume(p, a, b, c) * _volume(q, a, b, c) >= 0.0:
         return False
     sides = _volume(p, q, a, b), _volume(p, q, b, c), _volume(p, q, c, a)
@@ -447,13 +447,12 @@ def _pierces(p, q, triangle):
 @njit(cache=True)
 def _volume(a, b, c, d):
     """Compute six times the volume of a tetrahedron, exactly zero if it is nearly flat."""
-    u, v, w = b - a, c - a, d - a
-    volume = (
-        u[0] * (v[1] * w[2] - v[2] * w[1])
-        + u[1] * (v[2] * w[0] - v[0] * w[2])
-        + u[2] * (v[0] * w[1] - v[1] * w[0])
-    )
-    size = math.sqrt((u * u).sum() * (v * v).sum() * (w * w).sum())
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    wx, wy, wz = d[0] - a[0], d[1] - a[1], d[2] - a[2]
+    volume = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx)
+    u, v, w = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
+    size = math.sqrt(u * v * w)
     return volume if abs(volume) > _TOUCHING * size else 0.0
 
 
