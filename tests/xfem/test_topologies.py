@@ -123,6 +123,13 @@ NOT_CUT = {
         SPACE: lambda x, _, z: sheet([-1.0, z], [x, z], [x, z + 1e-3], [-1.0, z + 1e-3]),
     },
 }  # fmt: skip
+# a strip of elements holds together what the cuts together would part
+BRIDGED = {
+    "overlaps one of its plane by less than an element": {
+        PLANE: [line([-1.0, 0.31], [0.5, 0.52]), line([0.495, 0.5193], [2.0, 0.73])],
+        SPACE: [patch((-3.0, 0.03), (-3.0, 3.0)), patch((0.02, 3.0), (-3.0, 3.0))],
+    },
+}
 REFUSED = {
     "crosses or touches itself": {
         PLANE: (lambda: line([0.1, 0.1], [0.9, 0.8], [0.8, 0.2], [0.2, 0.9]),
@@ -240,6 +247,15 @@ def test_what_lies_between_the_nodes_of_an_element_cuts_nothing(where, kind, see
         assert not xfem.cut_mesh(mesh, [cut], tip).split.any()
 
 
+@pytest.mark.parametrize("tip", ["inside", "extended"])
+@pytest.mark.parametrize(("where", "kind"), rows(BRIDGED))
+def test_strokes_that_overlap_a_little_leave_a_bridge(where, kind, tip):
+    """Known, and said on the page: each ends in the same element, and neither at an end."""
+    phantom = xfem.cut_mesh(mesh_of(where, 0), BRIDGED[kind][where], tip)
+    assert phantom.bodies.max() == 0
+    assert phantom.split.any()
+
+
 @pytest.mark.parametrize(("where", "kind"), rows(REFUSED))
 def test_a_cut_that_comes_back_to_itself_is_refused(where, kind):
     made, said = REFUSED[kind][where]
@@ -273,7 +289,13 @@ def areas(phantom):
 
 def test_the_page_says_of_each_kind_what_is_asserted_here():
     """No second list: rows are kinds, and cells begin with how they are taken."""
-    taken = {"exact": EXACT, "approximated": APPROXIMATED, "not cut": NOT_CUT, "refused": REFUSED}
+    taken = {
+        "exact": EXACT,
+        "approximated": APPROXIMATED,
+        "not cut": NOT_CUT,
+        "bridged": BRIDGED,
+        "refused": REFUSED,
+    }
     asserted = {(kind, where): how for how, kinds in taken.items() for where, kind in rows(kinds)}
     told = {
         (kind, where): how
