@@ -206,6 +206,12 @@ def _has_a_region(scene: Scene, solve: SolveRecord) -> bool:
     return any(set(str(part.get("where") or "")) & set("<>") for part in parts)
 
 
+def _left_a_piece(scene: Scene, solve: SolveRecord) -> bool:
+    """Whether a piece within round-off went to the other half; virtual nodes do not state it."""
+    stated = any("left to its neighbour" in one.kind for one in solve.regularisations)
+    return stated or solve.solver.startswith("virtual_node")
+
+
 CHANGES = (
     Change(
         2,
@@ -250,6 +256,13 @@ CHANGES = (
         "what a blade opens is held by forces that fade as it is swept, of the reference and of "
         "own solvers; it was let go at once when it was passed",
         _opens_swept,
+    ),
+    Change(
+        4,
+        ("jump_*", "opening_*"),
+        "a piece that the solver left to the other half is read on that half; it was read on the "
+        "side of the cut where it lies",
+        _left_a_piece,
     ),
 )  # fmt: skip
 REVISION = max(change.revision for change in CHANGES)
