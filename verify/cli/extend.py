@@ -104,6 +104,9 @@ def import_(
 
     Exit codes as of `verify run`.
     """
+    from verify.processes import start_server
+
+    start_server()  # it loads while this process does
     from verify.cli.progress import progress_on
     from verify.cli.ranking import rank_run
     from verify.cli.run import say_results
