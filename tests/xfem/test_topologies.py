@@ -305,3 +305,14 @@ def test_the_page_says_of_each_kind_what_is_asserted_here():
         if how != "–"
     }
     assert told == asserted
+
+
+@pytest.mark.parametrize("x", [0.5, 1.5])
+def test_triangles_with_a_common_vertex_are_refused_where_they_cross_beside_it(x):
+    """The far edge of one goes through the other, at half or two thirds of its length."""
+    turn = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+    first, triangles = [[0, 0, 0], [1, -1, 0], [1, 1, 0]], [[0, 1, 2], [0, 3, 4]]
+    across, above = ([[x, 0, low], [x, 0.1, 0.4]] for low in (-0.3, 0.1))
+    TriangulatedSurface(np.array([*first, *above]) @ turn, triangles)
+    with pytest.raises(XfemError, match="triangles 0 and 1 of the surface intersect"):
+        TriangulatedSurface(np.array([*first, *across]) @ turn, triangles)

@@ -161,7 +161,7 @@ def difference_squares(found: Floats, expected: Floats) -> Floats:
 
 
 def _difference_squares_in_numpy(found: Floats, expected: Floats) -> Floats:
-    """Sum entry by entry: four times as fast as matrix by matrix."""
+    """Do the same entry by entry: nearly twice as fast as matrix by matrix."""
     rows = np.zeros((5, len(found)))
     off = found - expected
     for k, one in ((0, off), (2, expected)):

@@ -9,7 +9,8 @@ that it moved back), nothing is changed: the error is real.
 Sides of cells come from doubled nodes. No coordinate is compared across the cut. A cell with a
 facet of the realised cut lies on the side of its opposite corner, and its nodes belong to that
 side. From there the side goes on from node to node, never across the cut, because nodes are doubled
-there. So a sliver has the right side however thin it is, and so has a corner of the cut.
+there. So a sliver has the right side however thin it is, and so has a corner of the cut. A cell so
+tiny that a solver may have left it to the other half takes the side of its nodes.
 
 A point of a membrane belongs to the nearest triangle of the solution: on the same surface, the
 triangle that holds it. Two triangulations of one curved surface lie a sagitta apart, and the foot

@@ -40,7 +40,7 @@ def frame(normal: ArrayLike, axis: ArrayLike | None = None) -> Array:
 
 
 def determinants(matrices: Array) -> Array:
-    """Compute determinants (m,) of matrices (m, d, d), d ≤ 3, five times as fast as by factors."""
+    """Compute determinants (m,) of matrices (m, d, d), d ≤ 3: several times as fast as by LU."""
     rows = np.moveaxis(matrices, (1, 2), (0, 1))
     if len(rows) == 1:
         return np.asarray(rows[0, 0])

@@ -391,6 +391,8 @@ def _side(a, b, x):
 def check_triangles(points: Floats, triangles: Ints, what: str) -> None:
     """Refuse triangles (m, 3) that cross each other; where they touch they may.
 
+    Two with a common edge are not held against each other: they meet there alone, or lie folded.
+
     Raises
     ------
     XfemError
@@ -408,7 +410,7 @@ def check_triangles(points: Floats, triangles: Ints, what: str) -> None:
 
 @njit(cache=True)
 def _first_crossing(corners, triangles, low, high, axis, order):
-    """Find two triangles without a common vertex that cross; their number if there are none."""
+    """Find two triangles without a common edge that cross; their number if there are none."""
     count = len(corners)
     for a in range(count):
         i = order[a]
@@ -416,14 +418,14 @@ def _first_crossing(corners, triangles, low, high, axis, order):
             j = order[b]
             if low[j, axis] > high[i, axis]:
                 break
-            apart = False
+            apart, common = False, 0
             for k in range(3):
                 apart |= low[j, k] > high[i, k] or low[i, k] > high[j, k]
                 for one in range(3):
-                    apart |= triangles[i, k] == triangles[j, one]
-            if apart:
+                    common += triangles[i, k] == triangles[j, one]
+            if apart or common > 1:
                 continue
-            for k in range(3):
+            for k in range(3):  # an edge at a common vertex lies in the plane of both: no volume
                 if _pierces(corners[i, k], corners[i, (k + 1) % 3], corners[j]) or _pierces(
                     corners[j, k], corners[j, (k + 1) % 3], corners[i]
                 ):
