@@ -129,35 +129,37 @@ def lock_of(root):
     return (root / ".ci/requirements.lock").read_text()
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("place", ["plane", "all"])  # continuous integration has the first
-def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_path, light, place):
-    """At most 350 MB with pip itself and what its use has compiled; 60 s on two cores for all.
-
-    Seconds are scaled to a machine whose calibration kernel takes 6 ms. The plane takes a third,
-    of the processor: there other programs run beside it.
-    """
-    for name in FORBIDDEN:
-        code = f"import {name}"
-        assert subprocess.run([light.python, "-c", code], capture_output=True).returncode
-    # fields of bundles are rounded to 7e-9: their energies do not balance to the 1e-10 of C6; a
-    # corner of 1e-4 elements weighs 2.5e-7 N, its stiffness times its fall is rounded to 1e-12 N
-    may_fail = {
-        ("benchmark/c6_block", "ledger_mismatch"),
-        ("benchmark/c8_slivers_corner[epsilon=0.0001]", "fall_of_the_corner"),
-    }
+def judged(light, folder, place):
+    """Let it judge answers to the benchmark; return the answer, scenes, and whose FAIL is known."""
+    known = set()
     every = select_cases(["benchmark"], weight="heavy")
     scenes = [one for one in every if place == "all" or one.dimension == 2]
     for scene in scenes:
-        like = answers_of_another(scene, tmp_path / place / scene.name)
-        may_fail |= {(scene.name, k.metric) for k in scene.known_findings if k.solver == like}
+        like = answers_of_another(scene, folder / place / scene.name)
+        known |= {(scene.name, k.metric) for k in scene.known_findings if k.solver == like}
     asked = ["import", "benchmark", place, "--solver", "mine", "--out", "out"]
-    kernels = kernel_seconds(clock=thread_time)
-    answer = said(light.python, tmp_path, *asked, "-j", 2, "--json")
-    faster = 0.006 / median([*kernels, *kernel_seconds(clock=thread_time)])
+    return said(light.python, folder, *asked, "-j", 2, "--json"), scenes, known
+
+
+PLACES = pytest.mark.parametrize("place", ["plane", "all"])  # continuous integration has the first
+
+
+@pytest.mark.heavy
+@PLACES
+def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_path, light, place):
+    """At most 350 MB with pip itself and what its use has compiled."""
+    for name in FORBIDDEN:
+        code = f"import {name}"
+        assert subprocess.run([light.python, "-c", code], capture_output=True).returncode
+    answer, scenes, known = judged(light, tmp_path, place)
+    # fields of bundles are rounded to 7e-9: their energies do not balance to the 1e-10 of C6; a
+    # corner of 1e-4 elements weighs 2.5e-7 N, its stiffness times its fall is rounded to 1e-12 N
+    may_fail = known | {
+        ("benchmark/c6_block", "ledger_mismatch"),
+        ("benchmark/c8_slivers_corner[epsilon=0.0001]", "fall_of_the_corner"),
+    }
     found = {n: one for n, one in verdicts(answer).items() if (tmp_path / place / n).is_dir()}
-    took = f"{answer.wall:.0f} s, {answer.seconds:.0f} s of processor, times {faster:.2f}"
-    print(f"{took} at a kernel of 6 ms", list(found))
+    print(f"{answer.wall:.0f} s, {answer.seconds:.0f} s of processor", list(found))
     assert set(found) == {scene.name for scene in scenes}
     failed = {
         (name, metric): verdict
@@ -168,13 +170,24 @@ def test_an_environment_of_pip_install_is_small_and_judges_the_benchmark(tmp_pat
     print(failed)
     assert set(failed.values()) <= {"FAIL"}
     assert set(failed) <= may_fail
+    size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())
+    print(f"{size / 1e6:.0f} MB")
+    assert size < 350e6
+
+
+@pytest.mark.heavy
+@pytest.mark.timing
+@PLACES
+def test_the_benchmark_is_judged_in_a_minute(tmp_path, light, place):
+    """On two cores; the plane in 40 s of the processor. Both at a calibration kernel of 6 ms."""
+    kernels = kernel_seconds(clock=thread_time)
+    answer, _, _ = judged(light, tmp_path, place)
+    faster = 0.006 / median([*kernels, *kernel_seconds(clock=thread_time)])
+    print(f"{answer.wall:.0f} s, {answer.seconds:.0f} s of processor, times {faster:.2f}")
     if place == "plane":
         assert faster * answer.seconds < 40.0
     else:
         assert faster * answer.wall < 60.0
-    size = sum(path.lstat().st_size for path in light.venv.rglob("*") if path.is_file())
-    print(f"{size / 1e6:.0f} MB")
-    assert size < 350e6
 
 
 @pytest.mark.heavy
