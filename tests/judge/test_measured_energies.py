@@ -34,7 +34,7 @@ DRIFT = {"check": "error", "metric": "energy_drift", "at_most": 4e-3}
 def plate():
     """A plate that is cut while it vibrates, and an honest lumped answer."""
     case = load_scene("dynamics/plate_cut_vibrating")
-    return case, XfemSolver().solve(case, 0, 0)
+    return case, XfemSolver().solve(case, 0, 0, mass="sidewise")
 
 
 def judgement_of(case, solution, check=DRIFT):
@@ -163,12 +163,13 @@ def swinging(**changes):
 def test_what_damping_takes_is_known_from_its_rate_at_the_output_times():
     """Half as much kinetic energy again that hides in damping is seen; the true loss is kept."""
     case = swinging(
-        analysis={"damping": [0.05, 0.03], "kinematics": "corotational", "outputs": 46},
+        # sixty outputs to a period of the lowest mode: thirty miss what shorter waves lose
+        analysis={"damping": [0.05, 0.03], "kinematics": "corotational", "outputs": 91},
         loads=[{"kind": "gravity", "acceleration": [0.2, -0.1]}],
     )
     honest = XfemSolver().solve(case, 0, 0)
     assert honest.ledger["damping"][-1] > 0.1 * np.ptp(honest.ledger["gravity"])
-    check = {**DRIFT, "at_most": 5e-3}  # outputs thirty to a period of the lowest mode
+    check = {**DRIFT, "at_most": 5e-3}
     assert verdict_of(case, honest, check) is Verdict.PASS
     found, _ = energies_of(case, honest)
     mismatch = found["ledger_mismatch"]

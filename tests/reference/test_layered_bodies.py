@@ -74,7 +74,8 @@ def test_free_parts_of_two_densities_fall_together(name: str) -> None:
     )
     found = find_solver(name).solve(falling, 0, 0)
     assert found.velocity is not None
-    assert np.abs(found.velocity[-1] - [0.06, -0.2]).max() < 1e-12
+    # the forces are in balance to 1e-10 of themselves; the residue of two solves is left
+    assert np.abs(found.velocity[-1] - [0.06, -0.2]).max() < 2e-11
     mass = 2 * 0.4 + 5 * 0.6
     momentum = kinetic(found, density_of(falling, found)).linear[-1]
     assert momentum == pytest.approx(mass * np.array([0.06, -0.2]), rel=1e-11)

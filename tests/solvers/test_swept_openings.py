@@ -270,8 +270,10 @@ def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, openings, scheme
     ledger = found.ledger
     assert len(openings) >= 6
     scale = ledger["strain"].max() + np.abs(ledger["work_of_supports"]).max()
-    for name in ("total", "unbalanced"):  # Newton's method: 1e-10 of the forces
-        assert np.ptp(ledger[name]) <= (1e-12 if kinematics == "linear" else 1e-10) * scale, name
+    assert np.ptp(ledger["total"] - ledger["unbalanced"]) <= 1e-12 * scale
+    # Newton's method: 1e-10 of the forces; one correction of what is linear, to round-off
+    left = 1e-11 if kinematics == "linear" else 1e-10
+    assert np.abs(ledger["unbalanced"]).max() <= left * scale
     if scheme != "forward_euler":
         assert ledger["cut_work"][-1] > 1e-3 * ledger["strain"][0]
     if kinematics == "linear":

@@ -249,3 +249,33 @@ def test_cuts_that_cross_open_in_any_order_and_no_energy_is_lost(tmp_path, times
     assert slivers != "keep" or np.abs(ledger["algorithmic"]).max() <= 1e-8 * scale
     assert np.abs(ledger["algorithmic"]).max() <= 1e-2 * scale
     assert len(np.unique(found.cell_sides)) >= 4
+
+
+@pytest.mark.parametrize("mass", ["sidewise", "consistent"])
+def test_accelerations_of_supports_move_what_they_are_coupled_to(tmp_path, mass):
+    """Outputs of every step: accelerations are the differences of velocities around them."""
+    moved = '[[supports]]\nwhere = "top"\ndisplacement = ["4 * t * t * t", "-3 * t * t * t"]\n'
+    often = ("duration = 0.5\ntime_step = 0.01\noutputs = 6",
+             "duration = 0.05\ntime_step = 0.0005\noutputs = 101")  # fmt: skip
+    found = solve(tmp_path, SQUARE + moved + CUT, often, mass=mass, scheme="newmark")
+    differences = (found.velocity[2:] - found.velocity[:-2]) / 1e-3
+    held = found.points[:, 1] > 1 - 1e-9
+    at = 24 * found.times[1:-1, None] * np.array([1.0, -0.75])
+    np.testing.assert_allclose(found.acceleration[1:-1, held], np.repeat(at[:, None], held.sum(), 1),
+                               rtol=1e-6)  # fmt: skip
+    off = np.abs(found.acceleration[1:-1] - differences)[50:]
+    assert off.max() < 2e-3 * np.abs(differences).max()
+
+
+@pytest.mark.parametrize("name", ["xfem", "virtual_node", "subdivision"])
+def test_implicit_schemes_have_the_consistent_mass_and_explicit_ones_a_diagonal(tmp_path, name):
+    (tmp_path / "motion.toml").write_text(SQUARE + HELD + WEIGHT + CUT)
+    scene = load_scene(tmp_path / "motion.toml")
+    implicit, explicit = (
+        find_solver(name).solve(scene, 0, 0, scheme=scheme)
+        for scheme in ("newmark", "central_differences")
+    )
+    assert implicit.mass == implicit.notes["mass"] == "consistent"
+    assert explicit.notes["mass"] == "sidewise"
+    for found, fallen in ((implicit, -1.225), (explicit, -1.225)):
+        np.testing.assert_allclose(below(found)[-1][:, 1], fallen, rtol=1e-9)

@@ -353,7 +353,19 @@ def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Suppor
         speed = [one.velocities(time) for one in held]
         return _filled(phantom, held, where)[1], _filled(phantom, held, speed)[1]
 
-    return MovingSupports(fixed, motion)
+    def acceleration(time: float) -> _Floats:
+        # velocities are those after a kink: so are differences with later ones
+        lag = _LAG * scene.analysis.duration
+        now, next_, last = (
+            _filled(phantom, held, [one.velocities(time + k * lag) for one in held])[1]
+            for k in range(3)
+        )
+        return (4.0 * next_ - 3.0 * now - last) / (2.0 * lag)
+
+    return MovingSupports(fixed, motion, acceleration)
+
+
+_LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
 
 
 def _filled(

@@ -26,7 +26,6 @@ from verify.solvers.body_of_scene import (
     Openings,
     background_mesh,
     cuts_of,
-    density_of,
     errors_of_scene,
     material_of,
     openings_of,
@@ -40,6 +39,8 @@ from verify.solvers.xfem_system import (
     SCHEMES,
     Law,
     elasticity_of,
+    mass_for,
+    mass_of,
     solution_on,
     solve_equilibrium,
     springs_left_out,
@@ -49,7 +50,7 @@ from verify.system import System
 from verify.xfem.arrays import XfemError
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.mass import Mass, side_wise_mass
+from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.release import ancestors
@@ -90,6 +91,8 @@ class MethodOpening(OpeningBody):
         Internal force and mass of a cut body.
     mesh : SimplexMesh
     openings : Openings
+    mass : str
+        One of `MASSES`.
 
     Attributes
     ----------
@@ -102,9 +105,9 @@ class MethodOpening(OpeningBody):
     inertia_of: Callable[[CutBody], tuple[InternalForce, Mass]]
     mesh: SimplexMesh
     openings: Openings
+    mass: str
     final: CutBody = field(init=False)
 
-    mass = "sidewise"
     phase = "cutting"
 
     def __post_init__(self) -> None:
@@ -231,6 +234,7 @@ class MethodSolver:
 
     choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES, "opening": OPENINGS}
     _law: Law = InternalForce
+    _mass: str | None = None  # by the scheme
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -336,15 +340,16 @@ class MethodSolver:
         """Cut, load, move."""
         record, (mesh, size) = Record(), made
         forces: list[InternalForce] = []
+        mass = self._mass or mass_for(how.scheme)
 
         def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
             material = material_of(scene, body.resisting.mesh)
             law = self._law(body.resisting, material, scene.analysis.kinematics, kernels=FAST)
             forces.append(law)
-            return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
+            return forces[-1], mass_of(scene, body.phantom, mass, None)
 
         openings = openings_of(scene, size, rule)
-        opening = MethodOpening(self._method, given, inertia, mesh, openings)
+        opening = MethodOpening(self._method, given, inertia, mesh, openings, mass)
         motion = CutMotion(scene, opening, how, exact_of(scene), record)
         phantom, fields = motion.run(trial)
         record.regularisations.append(springs_left_out(forces[-1]))
@@ -389,6 +394,8 @@ class MassSpringSolver(MethodSolver):
     choices: Mapping[str, Collection[str]] = {
         "scheme": SCHEMES, "opening": OPENINGS, "cut": METHODS, "fit": ("fitted", "van_gelder"),
     }  # fmt: skip
+
+    _mass = "sidewise"  # springs have their masses at nodes
 
     def __init__(self) -> None:
         super().__init__("mass_spring")

@@ -319,9 +319,8 @@ class CutMotion:
     def put_out(self) -> None:
         """Keep the state, with its acceleration where that is to be had."""
         body = self.body
-        alone = body.mass.diagonal is not None or not body.moving
         linear = self.scene.analysis.kinematics == "linear"
-        acceleration = acceleration_of(body, self.state) if linear and alone else None
+        acceleration = acceleration_of(body, self.state) if linear else None
         self._outputs.append(_Output(body.force.phantom, self.state.copy(), acceleration))
         taken = work_of_blades(self.opening.openings.asked, self._by_cut)
         self._instants.append((self._taken, taken))

@@ -33,6 +33,7 @@ from verify.solvers.xfem_system import (
     SCHEMES,
     elasticity_of,
     joined,
+    mass_for,
     mass_of,
     penalised,
     solution_on,
@@ -77,7 +78,7 @@ class _Parameters:
     slivers: str = "keep"
     load_steps: int = 0
     scheme: str = "newmark"
-    mass: str = "sidewise"
+    mass: str | None = None
     step_factor: float = 0.9
     spectral_radius: float = 0.8
     kernels: str = "fast"
@@ -95,6 +96,11 @@ class _Parameters:
         loaded = any(load.kind == "cut_faces" for load in scene.loads)
         default = "extended" if mesh.dim == 3 or loaded else "partial"
         return self if self.tip else replace(self, tip=default)
+
+    @property
+    def inertia(self) -> str:
+        """Name of the mass of a motion: the one that was asked for, or that suits the scheme."""
+        return self.mass or mass_for(self.scheme, self.slivers)
 
     def integration(self) -> Integration:
         """Return the options of the time integration."""
@@ -124,7 +130,7 @@ class XfemOpening(OpeningBody):
     phase = "enrichment"
 
     def __post_init__(self) -> None:
-        self.mass, self.rule = self.given.mass, OPENINGS[self.openings.rule]
+        self.mass, self.rule = self.given.inertia, OPENINGS[self.openings.rule]
         self._to_cut = to_cut(self.mesh, self.openings.cuts, self.given.tip)
         self._opened: Opened
         self._slivers: list[Regularisation] = []
@@ -206,8 +212,9 @@ class XfemSolver:
     spectral_radius : float
         Dynamics: spectral radius of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}
-        Dynamics: the last three are the lumpings of the thesis; EVS and GEVS raise eigenvalues of
-        the consistent mass of cut cells, see `verify.methods.mass_variants`.
+        Dynamics: "consistent" by default, "sidewise" for explicit schemes and a ghost penalty. The
+        last three are the lumpings of the thesis; EVS and GEVS raise eigenvalues of the consistent
+        mass of cut cells, see `verify.methods.mass_variants`. A `system` has the side-wise one.
     step_factor : float
         Dynamics: share of the critical step that an explicit scheme takes at most, and an
         implicit one if the scene states no time step.
@@ -252,7 +259,7 @@ class XfemSolver:
             raise UnsupportedSceneError(reason)
         given, exact = _Parameters(**parameters), exact_of(scene)
         if given.slivers == "penalise":
-            _check_penalty(scene, given.mass)
+            _check_penalty(scene, given.inertia)
         with errors_of_scene(scene):
             return repeated(
                 repetitions, lambda: background_mesh(scene, level),
@@ -274,7 +281,7 @@ class XfemSolver:
             mesh, size = background_mesh(scene, level)
             phantom, _ = _cut(scene, mesh, size, exact, given.on(scene, mesh))
             resisting = elasticity_of(scene, phantom, "linear", given.slivers == "penalise")
-            return system_of(scene, phantom, *resisting, exact, given.mass)
+            return system_of(scene, phantom, *resisting, exact, given.mass or "sidewise")
 
 
 def _cut(

@@ -78,10 +78,14 @@ class MovingSupports:
     fixed : (N, d) bool array
     motion : callable
         Displacement and velocity, (N, d) each, at a time; read where fixed.
+    acceleration : callable, optional
+        (N, d) at a time, after what jumps then; read where fixed. A mass that couples nodes hands
+        it on to free ones.
     """
 
     fixed: Bools
     motion: Callable[[float], tuple[Floats, Floats]]
+    acceleration: Callable[[float], Floats] | None = None
 
     def at(self, time: float) -> tuple[Floats, Floats]:
         """Evaluate the prescribed displacement and velocity (N, d).
@@ -275,6 +279,16 @@ class DynamicBody:
         assert self.supports is not None
         return self.supports.values, np.zeros(self.shape)
 
+    def held_acceleration(self, time: float) -> Floats | None:
+        """Compute the acceleration (N, d) of supports that move, zero where free; None if unknown.
+
+        Supports that stand still have none, and None too.
+        """
+        supports = self.supports
+        if not isinstance(supports, MovingSupports) or supports.acceleration is None:
+            return None
+        return np.where(self.fixed, supports.acceleration(time), 0.0)
+
     def external(self, time: float) -> Floats:
         """Sum weight, load and tie forces (N, d) at a time, in newtons.
 
@@ -408,13 +422,24 @@ class FreeMass:
         if body.mass.diagonal is None and body.fixed.any():
             self._solvers = [_supported(body, k) for k in range(body.shape[1])]
 
-    def solve(self, forces: Floats) -> Floats:
-        """Compute accelerations (N, d) of forces (N, d), zero where held; writes on the forces."""
+    def solve(self, forces: Floats, held: Floats | None = None) -> Floats:
+        """Compute accelerations (N, d) of forces (N, d); writes on the forces.
+
+        Parameters
+        ----------
+        forces : (N, d) float array
+        held : (N, d) float array, optional
+            Acceleration of held components, zero elsewhere; by default they have none.
+        """
+        if held is not None:
+            forces -= self._body.mass.apply(held)
         forces[self._body.fixed] = 0.0
         if self._solvers is None:
-            return self._body.mass.solve(forces)
-        columns = [solver.solve(forces[:, k]) for k, solver in enumerate(self._solvers)]
-        return np.stack(columns, axis=1)
+            found = self._body.mass.solve(forces)
+        else:
+            columns = [solver.solve(forces[:, k]) for k, solver in enumerate(self._solvers)]
+            found = np.stack(columns, axis=1)
+        return found if held is None else found + held
 
 
 def couples_supports(body: DynamicBody) -> bool:

@@ -46,7 +46,7 @@ class _Explicit:
             check_no_contact(body, type(self).__name__)
         self.body = body
         self.step_size = check_step(step_size)
-        if body.moving and couples_supports(body):
+        if body.moving and couples_supports(body) and not at_once:
             raise XfemError(
                 "explicit step with moving supports whose nodes the mass couples to free ones; "
                 "use the side-wise mass, and hold slivers there on their own or keep them"
@@ -54,7 +54,7 @@ class _Explicit:
         self._mass = FreeMass(body)
 
     def _acceleration(
-        self, displacement: Floats, velocity: Floats, time: float
+        self, displacement: Floats, velocity: Floats, time: float, held: Floats | None = None
     ) -> tuple[Floats, StepForces]:
         body = self.body
         at = body.force.configuration(displacement)
@@ -62,7 +62,7 @@ class _Explicit:
         if body.contact is not None:
             internal += body.contact.force(displacement)
         forces = StepForces(internal, body.external(time), body.viscous(velocity, at))
-        return self._mass.solve(forces.external - forces.internal - forces.viscous), forces
+        return self._mass.solve(forces.external - forces.internal - forces.viscous, held), forces
 
     def _finish(
         self, state: MotionState, displacement: Floats, velocity: Floats, time: float
@@ -80,17 +80,25 @@ class _Explicit:
 
 
 def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
-    """Compute the acceleration (N, d) in m/s² that balances all forces of a state; zero where held.
+    """Compute the acceleration (N, d) in m/s² that balances all forces of a state.
+
+    Where it is held it is that of the supports, zero if they do not say it.
 
     Raises
     ------
     XfemError
-        If supports move and the mass couples their nodes to free ones, or the state is not one of
-        the body.
+        If the mass couples free nodes to supports that move and do not say their acceleration, or
+        the state is not one of the body.
     """
     check_state(state, body.shape)
+    held = body.held_acceleration(state.time)
+    if body.moving and held is None and couples_supports(body):
+        raise XfemError(
+            "acceleration of a body whose mass couples free nodes to moving supports; expected "
+            "supports that say their acceleration"
+        )
     return _Explicit(body, 1.0, at_once=True)._acceleration(
-        state.displacement, state.velocity, state.time
+        state.displacement, state.velocity, state.time, held
     )[0]
 
 

@@ -231,8 +231,8 @@ class TieForces:
 
 
 def acceleration_at_corners(body: DynamicBody, state: MotionState) -> Floats:
-    """Return the acceleration (N_corners, d) of a body at its corners, zero where held."""
-    found = FreeMass(body).solve(-_resisting(body, state))
+    """Return the acceleration (N_corners, d) of a body at its corners, of supports where held."""
+    found = FreeMass(body).solve(-_resisting(body, state), body.held_acceleration(state.time))
     return body.force.phantom.extend(found)
 
 

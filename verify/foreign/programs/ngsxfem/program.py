@@ -149,7 +149,7 @@ class Body:
 
 def solve(case):
     """Divide the mesh along the cut; solve statics or a motion."""
-    ghost = float(case.parameters.get("ghost", 0.1))
+    ghost = float(case.parameters.get("ghost", 0.01))
     if ghost < 0:
         raise RefusedError(f"ghost = {ghost}; expected a number from 0 on")
     enriched = case.parameters.get("space") == "xfe"
