@@ -298,8 +298,10 @@ class GrowingBody:
         for new, old in zip(place[more].tolist(), source.tolist(), strict=True):
             chain[new], chain[old] = chain[old], new
         changed = np.flatnonzero(division.changed & division.solid)
-        self.piece_fraction.rows[place[changed]] = division.fraction[changed]
         self.piece_label.rows[place[changed]] = division.label[changed]
+        # beside a piece that changes another may take what is left of it, of round-off size
+        renewed = np.flatnonzero(_among(division.cell, division.changed_cells) & division.solid)
+        self.piece_fraction.rows[place[renewed]] = division.fraction[renewed]
         return place
 
     def _store_simplices(self, division: Division, cells: Ints, place: Ints) -> None:
