@@ -257,6 +257,9 @@ class Stepper:
         if np.isnan(norm):  # what the supports have moved by has turned elements inside out
             a = self._spread(start)
             forces, residual, norm = self._residual(start, a)
+        if np.isnan(norm):  # what travels fast in small elements: the body begins where it was
+            a = self._first(start, 0.0)
+            forces, residual, norm = self._residual(start, a)
         last, leaps = np.inf, 0
         for _ in range(_MOST_ITERATIONS):
             scale = self._scale(forces)

@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 _JUST = 1e-12  # of the duration: loads are taken that much later, after a jump
 _MOST_TIES = 6000  # of which the dense factor has 0.3 GB
 _SOLVES = 20  # that take as long as a factorisation
+_HALVINGS = 4  # of a step that is not solved
 SCHEMES = ("newmark", "energy_momentum", "implicit_euler", "generalised_alpha")
 
 
@@ -139,6 +140,7 @@ class TiedMotion:
         self.outputs: list[State] = []
         self.pressures: list[Array] = []  # of contact, at the outputs
         self.openings = 0
+        self.halved = 0  # steps that were not solved as a whole
         self.begun = False  # whether something has jumped since the last step
         self.scheme, self.averaged = marching.scheme()
         # of others the old acceleration has no part in the step, or only with the forces of then
@@ -169,6 +171,8 @@ class TiedMotion:
         record.iterations |= {"steps": sizes.total(), "newton": newton}
         steps = notes_of_steps(self.scene, sizes, marching.name, CONSISTENT, marching.element)
         record.notes |= {**steps, "unknowns": self.unknowns}
+        if self.halved:
+            record.notes["steps in halves"] = f"{self.halved}, which were not solved as a whole"
         if self.waves is not None:
             record.notes["openings"] = str(self.openings)
         linear = self.scene.analysis.kinematics == "linear"
@@ -235,8 +239,12 @@ class TiedMotion:
         energies = ledger.state(self.body, self.state)
         self.rows.enter(energies, done, *momenta, ledger.turned + 0.0 * momenta[1])
 
-    def step(self, size: float) -> None:
-        """Advance the state by a time, s, and account for it."""
+    def step(self, size: float, halvings: int = _HALVINGS) -> None:
+        """Advance the state by a time, s, and account for it.
+
+        A step that is not solved is taken in halves, and these again: a node that a blade has let
+        go beside its end moves fast in small elements.
+        """
         if size not in self.steppers:
             self.steppers[size] = Stepper(self.body, self.scheme, self.averaged, size)
         if self.begun and self.softly:
@@ -245,7 +253,17 @@ class TiedMotion:
         self.begun = False
         with self.record.timed("steps"):
             before = self.state.copy()
-            forces = self.steppers[size].step(self.state)
+            try:
+                forces = self.steppers[size].step(self.state)
+            except RuntimeError:
+                if not halvings:
+                    raise
+                forces = None
+        if forces is None:
+            self.halved += halvings == _HALVINGS
+            for _ in range(2):
+                self.step(0.5 * size, halvings - 1)
+            return
         with self.record.timed("accounting"):
             self.ledger.record(self.body, before, self.state, forces)
             if self.waves is not None:
