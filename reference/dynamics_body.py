@@ -404,6 +404,11 @@ class MovingBody:
             solid and self.law.unknowns is self.space and self.space.node_points.size > _SMALL
         )
 
+    @property
+    def planned(self) -> bool:
+        """Whether one factorisation lasts while ties go."""
+        return self._lasting is not None
+
     def plan(self, lasting: NDArray[np.int64] | None) -> None:
         """Take ties (p, 2) of `lasting_ties` for all that will ever be tied; see `step_solver`."""
         self._lasting = lasting
@@ -419,8 +424,16 @@ class MovingBody:
             iterates = self.iterates and kind == "symmetric"
             few = ties.projected(matrix)
             return NodalSolver(few, ties, self.held, kind, largest=1e-3, iterates=iterates)
+        spare = matrix.copy()
         whole = NodalSolver(matrix, self.law.unknowns, self._own_held, kind, largest=1e-3)
-        return TiedSolver(whole, self.ties, self._lasting, self._own_held)
+        try:
+            found = TiedSolver(whole, self.ties, self._lasting, self._own_held)
+        except np.linalg.LinAlgError:  # a sliver beside ties: their compliance is lost in round-off
+            whole.destroy()
+            self._lasting = None
+            return self.step_solver(spare, kind)
+        spare.destroy()
+        return found
 
     def _linear_equilibrium(self, factors: list[float], load: Array) -> Array:
         u = np.zeros_like(load)

@@ -203,15 +203,18 @@ class Stepper:
         right[self.body.held] = 0.0
         state.acceleration = (1 - self.scheme.alpha_m) * self._solver.solve(right)
 
-    def _first(self, start: State, share: float = 1.0) -> Array:
+    def _first(self, start: State, share: float = 1.0, far: Array | float | None = None) -> Array:
         """Acceleration at which Newton's method starts: the body travels on as in the last step.
+
+        Or as `far` as asked. Supports go where they are prescribed; of all, a `share`.
 
         Not by Δt v: stiff modes ring, their velocity changes sign with every step and cancels in
         the mean over one. Nor by the acceleration, which a jump of the loads leaves behind:
         elements smaller than Δt² a would begin inside out.
         """
         scheme, h = self.scheme, self.size
-        far = h * start.velocity if self._travelled is None else self._travelled
+        if far is None:
+            far = h * start.velocity if self._travelled is None else self._travelled
         still = self._end(start, 0.0 * start.acceleration)[0]
         guess = start.displacement + far
         guess[self.body.held] = self.body.prescribed(start.time + h)[0]
@@ -258,7 +261,7 @@ class Stepper:
             a = self._spread(start)
             forces, residual, norm = self._residual(start, a)
         if np.isnan(norm):  # what travels fast in small elements: the body begins where it was
-            a = self._first(start, 0.0)
+            a = self._first(start, far=0.0)
             forces, residual, norm = self._residual(start, a)
         last, leaps = np.inf, 0
         for _ in range(_MOST_ITERATIONS):

@@ -165,5 +165,14 @@ def test_supports_may_move_by_more_than_an_element_in_a_step():
 
 
 def test_a_body_that_its_supports_press_inside_out_is_an_error_that_names_place_and_time():
-    with pytest.raises(RuntimeError, match=r"step from 0 s by 0\.1 s .* det F = .* at \(.*inside"):
+    """The step is taken in halves, while they are solved: the body is pressed flat at 0.09 s."""
+    told = r"step from 0\.0[0-9]+ s by .* s .* det F = -.* at \(.*inside"
+    with pytest.raises(RuntimeError, match=told):
         solved(pressed(1.1, 0.1, 4))
+
+
+def test_a_corner_of_a_millionth_of_an_element_that_is_cut_off_on_the_way_is_solved():
+    """The compliance of ties beside it is lost in round-off: then each opening factorises anew."""
+    scene = load_scene("benchmark/c8_slivers_corner[epsilon=1e-06]")
+    ledger = solved(scene).ledger
+    assert np.ptp(ledger["total"]) <= 1e-9 * np.abs(ledger["gravity"]).max()

@@ -132,7 +132,7 @@ class TiedMotion:
             swept = marching.opening == "swept"
             self.opening = facet_openings(scene, space, self.facing, swept, marching.delay)
             self.closed = np.ones(self.opening.times.shape, dtype=bool)
-            self.planned = self._plan()
+            self._plan()
         self.ledger, self.rows = Ledger(), LedgerRows()
         blades = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
         self.waves = ShortWaves(self.body, marching.element) if blades else None
@@ -269,24 +269,22 @@ class TiedMotion:
             if self.waves is not None:
                 self.waves.enter(self.state)
 
-    def _plan(self) -> bool:
+    def _plan(self) -> None:
         """Choose between one factorisation with all that is ever tied, and one per opening.
 
         The first takes as many solves as there are ties, once. Where nothing is factorised at
         first neither is planned.
         """
         if self.scene.analysis.kinematics != "linear" or self.body.iterates:
-            return False
+            return
         if self.body.contact is not None:  # whose compliance changes with the ties
-            return False
+            return
         lasting = lasting_ties(self.facing, self.opening.times)
         ties = lasting.size // 2 * self.space.dimension
         step = self.marching.largest / 2**self.marching.halvings
         openings = len(np.unique(np.ceil(self.opening.times / step)))
-        if not 0 < ties <= min(_MOST_TIES, _SOLVES * openings):
-            return False
-        self.body.plan(lasting)
-        return True
+        if 0 < ties <= min(_MOST_TIES, _SOLVES * openings):
+            self.body.plan(lasting)
 
     def _untie(self, times: Array, time: float) -> bool:
         """Untie the pairs of nodes whose times have come; hold those that are let go."""
@@ -317,7 +315,7 @@ class TiedMotion:
     def _tie(self, closed: NDArray[np.bool_]) -> None:
         self.closed = closed
         self.body.tie(self.facing[closed])
-        for stepper in self.steppers.values() if not self.planned else ():
+        for stepper in self.steppers.values() if not self.body.planned else ():
             stepper.close()
 
     def _initial(self) -> State:
