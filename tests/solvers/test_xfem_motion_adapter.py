@@ -251,13 +251,17 @@ def test_cuts_that_cross_open_in_any_order_and_no_energy_is_lost(tmp_path, times
     assert len(np.unique(found.cell_sides)) >= 4
 
 
-@pytest.mark.parametrize("mass", ["sidewise", "consistent"])
-def test_accelerations_of_supports_move_what_they_are_coupled_to(tmp_path, mass):
+@pytest.mark.parametrize(
+    ("mass", "slivers"),
+    [("sidewise", "keep"), ("consistent", "keep"), ("gevs", "keep"), ("consistent", "merge")],
+)
+def test_accelerations_of_supports_move_what_they_are_coupled_to(tmp_path, mass, slivers):
     """Outputs of every step: accelerations are the differences of velocities around them."""
     moved = '[[supports]]\nwhere = "top"\ndisplacement = ["4 * t * t * t", "-3 * t * t * t"]\n'
     often = ("duration = 0.5\ntime_step = 0.01\noutputs = 6",
              "duration = 0.05\ntime_step = 0.0005\noutputs = 101")  # fmt: skip
-    found = solve(tmp_path, SQUARE + moved + CUT, often, mass=mass, scheme="newmark")
+    near = ("[1.1, 0.41]", "[1.1, 0.502]")  # its parts of cells are slivers on the right
+    found = solve(tmp_path, SQUARE + moved + CUT, often, near, mass=mass, slivers=slivers)
     differences = (found.velocity[2:] - found.velocity[:-2]) / 1e-3
     held = found.points[:, 1] > 1 - 1e-9
     at = 24 * found.times[1:-1, None] * np.array([1.0, -0.75])
