@@ -134,13 +134,13 @@ def _of_the_others(
     return f"{name} is not adequate on any mesh tried ({100 * least:.3g} % at best)."
 
 
-_STANDARD = "trapezoidal, side-wise mass"
+_STANDARD = "trapezoidal, consistent mass"
 # in words, and the parameters of the solver; the last ones are left out by --quick
 _MOTIONS: list[tuple[str, dict[str, Any]]] = [
-    ("implicit Euler, side-wise mass", {"scheme": "implicit_euler"}),
+    ("implicit Euler, consistent mass", {"scheme": "implicit_euler"}),
     ("central differences, side-wise mass", {"scheme": "central_differences"}),
-    ("trapezoidal, consistent mass", {"mass": "consistent"}),
-    ("energy–momentum, side-wise mass", {"scheme": "energy_momentum"}),
+    ("trapezoidal, side-wise mass", {"mass": "sidewise"}),
+    ("energy–momentum, consistent mass", {"scheme": "energy_momentum"}),
 ]
 _QUICK = 1
 

@@ -516,7 +516,7 @@ class _Maker:
     _cut = ""
 
     def _move(self, place: Scene) -> None:
-        """Change mesh and method at the fine time step, then mass, step and scheme."""
+        """Change mesh and method at the fine time step, then step and scheme."""
         scheme = "newmark" if self._own == "linear" else "energy_momentum"
         step, own_step = self._fine_step(), "fine → own time step"
         own = on_one_level(with_kinematics(self._scene, self._own), self._level)
@@ -524,20 +524,16 @@ class _Maker:
         self._try("conforming P1 at the same h, the same time step", _MESH,
                   lambda: self._one(with_time_step(place, step), "mesh", CONFORMING,
                                     scheme=scheme))  # fmt: skip
-        self._method("XFEM with consistent mass, the same time step",
-                     lambda: self._one(fine, "fine-consistent", JUDGED, scheme=scheme,
-                                       mass="consistent"))  # fmt: skip
         scenes = [fine] if scheme == "newmark" else [fine, own]
-        lumped = self._solve(scenes, "fine-lumped", (JUDGED,), {JUDGED: {"scheme": scheme}})
+        found = self._solve(scenes, "fine", (JUDGED,), {JUDGED: {"scheme": scheme}})
         words = scheme.replace("_", "–")
-        self.chain.fine.append((f"{words}, step {step:.3g} s", lumped[0]))
-        self._try("XFEM with side-wise lumped mass", "consistent → lumped mass",
-                  lambda: lumped[0].solution(JUDGED, 0))  # fmt: skip
+        self.chain.fine.append((f"{words}, step {step:.3g} s", found[0]))
+        self._method("XFEM, the same time step", lambda: found[0].solution(JUDGED, 0))
         if scheme == "newmark":
             self._take("XFEM at the scene's time step", own_step, self._judged)
         else:
             self._try("the same at the scene's time step", own_step,
-                      lambda: lumped[1].solution(JUDGED, 0))  # fmt: skip
+                      lambda: found[1].solution(JUDGED, 0))  # fmt: skip
             self._take("XFEM, trapezoidal rule", f"{words} → trapezoidal", self._judged)
 
     def _method(self, name: str, make: Callable[[], Solution]) -> None:
