@@ -299,7 +299,7 @@ class GrowingBody:
             chain[new], chain[old] = chain[old], new
         changed = np.flatnonzero(division.changed & division.solid)
         self.piece_label.rows[place[changed]] = division.label[changed]
-        # beside a piece that changes another may take what is left of it, of round-off size
+        # beside a piece that changes another may take its rest of round-off size
         renewed = np.flatnonzero(_among(division.cell, division.changed_cells) & division.solid)
         self.piece_fraction.rows[place[renewed]] = division.fraction[renewed]
         return place

@@ -355,6 +355,7 @@ def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Suppor
 
     def acceleration(time: float) -> _Floats:
         # velocities are those after a kink: so are differences with later ones
+        assert scene.analysis.duration is not None
         lag = _LAG * scene.analysis.duration
         now, next_, last = (
             _filled(phantom, held, [one.velocities(time + k * lag) for one in held])[1]

@@ -82,7 +82,7 @@ class _Explicit:
 def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
     """Compute the acceleration (N, d) in m/s² that balances all forces of a state.
 
-    Where it is held it is that of the supports, zero if they do not say it.
+    Where it is held it moves with the supports: zero if they do not say their acceleration.
 
     Raises
     ------
