@@ -252,14 +252,14 @@ class TiedMotion:
                 self.steppers[size].restart(self.state, self._unbalanced(self._later))
         self.begun = False
         with self.record.timed("steps"):
-            before = self.state.copy()
+            before, whole = self.state.copy(), True
             try:
                 forces = self.steppers[size].step(self.state)
             except RuntimeError:
                 if not halvings:
                     raise
-                forces = None
-        if forces is None:
+                whole = False
+        if not whole:
             self.halved += halvings == _HALVINGS
             for _ in range(2):
                 self.step(0.5 * size, halvings - 1)
