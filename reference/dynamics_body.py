@@ -33,6 +33,7 @@ Numbers = NDArray[np.int64]
 _SAME = 1e-6  # of a facet: points that are one
 _ROUND_OFF = 1e-14  # of the accelerations
 _MOST_ITERATIONS = 1000
+_LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
 _SMALL = 5000  # unknowns of a solid that are factorised in a tenth of a second
 
 
@@ -363,8 +364,27 @@ class MovingBody:
         )
         return found.displacement.ravel()
 
-    def accelerations(self, forces: Array) -> Array:
-        """Solve M a = forces, with a = 0 where held.
+    @property
+    def moves(self) -> bool:
+        """Whether a support moves."""
+        return any(one.moves for one in self._supports)
+
+    def held_accelerations(self, time: float) -> Array:
+        """Return accelerations (k,) of supports, zero elsewhere; after a kink there.
+
+        By differences of velocities with later ones, which are those after a kink too.
+        """
+        found = np.zeros(self.space.node_points.size)
+        if self.moves:
+            lag = _LAG * float(self.scene.analysis.duration or 0.0)
+            now, then, last = (self.prescribed(time + k * lag)[1] for k in range(3))
+            found[self.held] = (4.0 * then - 3.0 * now - last) / (2.0 * lag)
+        return self.ties.spread(found)
+
+    def accelerations(self, forces: Array, time: float | None = None) -> Array:
+        """Solve M a = forces, where held with the accelerations of supports at a time.
+
+        Without a time they have none.
 
         By conjugate gradients: scaled by its diagonal a consistent mass has a condition number of a
         few tens, whatever the mesh. A factorisation would last only until a facet opens.
@@ -379,12 +399,14 @@ class MovingBody:
         free[self.held] = 0.0
         free.reshape(-1, d)[ties.followers] = 0.0
         scale = 1.0 / np.where(free > 0.0, ties.summed(self._mass_diagonal), 1.0)
+        own = np.zeros_like(forces) if time is None else self.held_accelerations(time)
+        forces = forces - self.mass @ own if own.any() else forces
         a, left = np.zeros_like(forces), free * ties.summed(forces)
         along = scale * left
         size = first = float(left @ along)
         for _ in range(_MOST_ITERATIONS):
             if size <= _ROUND_OFF**2 * first:
-                return ties.spread(a)
+                return ties.spread(a) + own
             product = free * ties.summed(self.mass @ ties.spread(along))
             share = size / float(along @ product)
             a += share * along

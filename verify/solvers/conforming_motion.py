@@ -218,19 +218,23 @@ class TiedMotion:
                 taken += body.accelerations(-(body.mass @ taken))
                 state.velocity = state.velocity + taken
             self.ledger.started(body, state)
-            state.acceleration = body.accelerations(self._unbalanced(self._later))
+            unbalanced = self._unbalanced(self._later)
+            state.acceleration = body.accelerations(unbalanced, state.time)
         self.begun = True
 
     def put_out(self) -> None:
         """Keep the state, with the acceleration that balances its forces.
 
         Where a scheme takes accelerations and forces at the same share of a step, it has it
-        already: balance at the start of a step gives balance at its end.
+        already: balance at the start of a step gives balance at its end. But beside supports that
+        move accelerations by the average rule change their sign from step to step.
         """
         found = self.state.copy()
         linear = self.scene.analysis.kinematics == "linear"
-        if linear and not self.begun and self.scheme.alpha_m != self.scheme.alpha_f:
-            found.acceleration = self.body.accelerations(self._unbalanced(found.time))
+        other = self.body.moves or self.scheme.alpha_m != self.scheme.alpha_f
+        if linear and other and not self.begun:
+            unbalanced = self._unbalanced(found.time)
+            found.acceleration = self.body.accelerations(unbalanced, found.time)
         self.outputs.append(found)
         body = self.body  # undamped, pressures alternate from step to step about their mean
         self.pressures.append(0.5 * (body.pressure_before + body.pressure))
@@ -303,7 +307,8 @@ class TiedMotion:
         """Untie the nodes that are due, and hold them by their tie forces of before."""
         body, shares = self.body, self.opening.shares
         assert shares is not None
-        before, acceleration = body.ties.leader, body.accelerations(self._unbalanced(self._later))
+        before = body.ties.leader
+        acceleration = body.accelerations(self._unbalanced(self._later), time)
         self._tie(self.closed & ~due)
         nodes, cut = self.opening.parted(before, body.ties.leader, self.facing, due)
         forces = body.mass @ acceleration - self._unbalanced(self._later)
