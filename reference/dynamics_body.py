@@ -33,7 +33,6 @@ Numbers = NDArray[np.int64]
 _SAME = 1e-6  # of a facet: points that are one
 _ROUND_OFF = 1e-14  # of the accelerations
 _MOST_ITERATIONS = 1000
-_LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
 _SMALL = 5000  # unknowns of a solid that are factorised in a tenth of a second
 
 
@@ -370,15 +369,13 @@ class MovingBody:
         return any(one.moves for one in self._supports)
 
     def held_accelerations(self, time: float) -> Array:
-        """Return accelerations (k,) of supports, zero elsewhere; after a kink there.
-
-        By differences of velocities with later ones, which are those after a kink too.
-        """
+        """Return accelerations (k,) of supports, zero elsewhere; after a kink there."""
         found = np.zeros(self.space.node_points.size)
         if self.moves:
-            lag = _LAG * float(self.scene.analysis.duration or 0.0)
-            now, then, last = (self.prescribed(time + k * lag)[1] for k in range(3))
-            found[self.held] = (4.0 * then - 3.0 * now - last) / (2.0 * lag)
+            duration = self.scene.analysis.duration
+            assert duration is not None
+            values = [one.accelerations(time, duration) for one in self._supports]
+            found[self.held] = self._filled(values)
         return self.ties.spread(found)
 
     def accelerations(self, forces: Array, time: float | None = None) -> Array:

@@ -335,6 +335,9 @@ class Support(Strict):
         return speed
 
 
+_LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
+
+
 @dataclass(frozen=True)
 class PrescribedMotion:
     """Prescribed motion of the points that a support holds, by its own values or an exact field.
@@ -379,6 +382,15 @@ class PrescribedMotion:
         if slope:
             speed = speed + slope * field.displacement(self.points, self.near)
         return self._held(speed)
+
+    def accelerations(self, time: float, duration: float) -> Array:
+        """Prescribed acceleration (k, held), m/s², at a time in s; after a kink there.
+
+        By differences of velocities with later ones, in a motion of that duration in s.
+        """
+        lag = _LAG * duration
+        now, then, last = (self.velocities(time + k * lag) for k in range(3))
+        return np.asarray((4.0 * then - 3.0 * now - last) / (2.0 * lag))
 
     def _held(self, values: Array) -> Array:
         return np.asarray(values[:, list(self.support.held(values.shape[1]))])

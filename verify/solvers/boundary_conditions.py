@@ -354,19 +354,11 @@ def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Suppor
         return _filled(phantom, held, where)[1], _filled(phantom, held, speed)[1]
 
     def acceleration(time: float) -> _Floats:
-        # velocities are those after a kink: so are differences with later ones
-        assert scene.analysis.duration is not None
-        lag = _LAG * scene.analysis.duration
-        now, next_, last = (
-            _filled(phantom, held, [one.velocities(time + k * lag) for one in held])[1]
-            for k in range(3)
-        )
-        return (4.0 * next_ - 3.0 * now - last) / (2.0 * lag)
+        duration = scene.analysis.duration
+        assert duration is not None
+        return _filled(phantom, held, [one.accelerations(time, duration) for one in held])[1]
 
     return MovingSupports(fixed, motion, acceleration)
-
-
-_LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
 
 
 def _filled(
