@@ -11,20 +11,16 @@ room until it is removed.
                  solution.json|.vtu    as `verify.solution.write_solution` wrote them
 
 A bundle is a zip file, to be committed, so that runs that judge by it need no FEniCSx:
-``bundle.json`` with such entries, and the files of each in one ``<key>.tar.xz``, since output times
-repeat their mesh (in bundles of schema 1 below ``<key>/``). A run is given it by name
-(``--references``). Its entries are therefore found by the physics of the scene alone, and the
-report states the code and the versions that made them. If the physics of a scene has changed, that
-is an error.
+``bundle.json`` with such entries, and ``<key>.xz`` for each (`verify.runner.packing`). A run is
+given it by name (``--references``). Its entries are therefore found by the physics of the scene
+alone, and the report states the code and the versions that made them. If the physics of a scene
+has changed, that is an error.
 """
 
-import io
 import json
-import lzma
 import os
 import re
 import shutil
-import tarfile
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -35,11 +31,8 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from verify.errors import InputError
-from verify.files import asked_place, parse_json, read_json, whole_file, write_json, write_whole
+from verify.files import asked_place, parse_json, read_json, whole_file, write_json
 from verify.printable import one_line, shown, words_of
 from verify.provenance import provenance
 from verify.result import REFERENCE, SolveRecord, Status, checked
@@ -51,6 +44,7 @@ from verify.runner.fingerprint import (
     file_digest,
     reference_digest,
 )
+from verify.runner.packing import packed, unpacked
 from verify.scene import Scene
 from verify.scene.acceptance import FractureQuantity
 from verify.solution import read_solution, write_solution
@@ -59,16 +53,11 @@ BESIDE = "references"  # folder beside a case in which its own bundle lies
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"
 _HOUR = 3600.0
-# random digits below what a reference knows take half of the room: at rest eight are kept, in
-# motion six: the best of those beside cases is known to 5e-6 of the displacement (C7)
-_BITS, _BITS_IN_MOTION = 27, 20
-BUNDLE_SCHEMA = 2
+BUNDLE_SCHEMA = 3
 _CONTENTS = "bundle.json"
-_PACKED = ".tar.xz"
-# limits for bundles of others: one of ours unpacks to some ten times its size
-_LARGEST_CONTENTS, _LARGEST_FILE, _MOST_TIMES = 2**26, 2**31, 200
-# arrays stand in base64: 32 characters for three numbers; a copy of the mesh for each output time
-_XZ = [{"id": lzma.FILTER_LZMA2, "preset": 6, "lc": 0, "lp": 4, "pb": 4, "dict_size": 2**25}]
+_PACKED = ".xz"
+# limits for bundles of others
+_LARGEST_CONTENTS, _LARGEST_FILE = 2**26, 2**28
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same references give the same bytes
 
 
@@ -85,7 +74,7 @@ class Entry:
     level : int
     record : SolveRecord
     files : dict of str to str
-        Digest of each file of the solution.
+        Digest of each file of the solution; in a bundle of the one that it is packed into.
     origin : dict
         Provenance of the solve.
     made : str
@@ -149,7 +138,7 @@ def read_entry(content: Any, where: str) -> Entry:
     entry = checked(Entry, fields, "stored reference", where)
     if not re.fullmatch(r"[0-9a-f]{8,64}", entry.key):
         raise InputError(f"not a stored reference (key {shown(entry.key)})", where)
-    if entry.level < 0 or "solution.json" not in entry.files:
+    if entry.level < 0 or not entry.files:
         raise InputError(f"not a stored reference (level {entry.level}, no solution)", where)
     for name in entry.files:
         if not is_file_name(name):
@@ -325,60 +314,18 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
         whole_file(path) as partial,
         zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
     ):
-        packed = [_packed(entry, cache.root / entry.key, kept) for entry, kept in entries]
-        contents = {"schema": BUNDLE_SCHEMA, "entries": [entry.as_json() for entry, _ in packed]}
+        files = {}
+        for number, (entry, inertia) in enumerate(entries):
+            solution = read_solution(cache.root / entry.key / "solution")
+            name = entry.key + _PACKED
+            files[name] = packed(solution, inertia)
+            entries[number] = replace(entry, files={name: bytes_digest(files[name])}), inertia
+        contents = {"schema": BUNDLE_SCHEMA, "entries": [entry.as_json() for entry, _ in entries]}
         text = json.dumps(contents, indent=1, sort_keys=True)
         archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
-        for entry, data in packed:
-            archive.writestr(_member(entry.key + _PACKED), data, zipfile.ZIP_STORED)
-    return [entry for entry, _ in packed]
-
-
-def _packed(entry: Entry, folder: Path, inertia: bool) -> tuple[Entry, bytes]:
-    """Files of an entry in one compressed archive; the same give the same bytes.
-
-    Fields are rounded; accelerations are kept if `inertia` is.
-    """
-    solution, packed = read_solution(folder / "solution"), io.BytesIO()
-    digests: dict[str, str] = {}
-    bits = _BITS if len(solution.times) == 1 else _BITS_IN_MOTION
-    fields: dict[str, Any] = {
-        name: _rounded(values, bits)
-        for name in ("displacement", "velocity", "acceleration")
-        if (values := getattr(solution, name)) is not None
-    }
-    if not inertia:
-        fields["acceleration"] = None
-    with (
-        tempfile.TemporaryDirectory() as place,
-        lzma.open(packed, "wb", filters=_XZ) as squeezed,
-        tarfile.open(fileobj=squeezed, mode="w:") as archive,
-    ):
-        write_solution(replace(solution, **fields), Path(place) / "solution", compression=None)
-        for file in sorted(Path(place).iterdir()):
-            data = file.read_bytes()
-            member = tarfile.TarInfo(file.name)
-            member.size = len(data)
-            archive.addfile(member, io.BytesIO(data))
-            digests[file.name] = bytes_digest(data)
-    return replace(entry, files=digests), packed.getvalue()
-
-
-def _rounded(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
-    """Round to 2^-`bits` of the largest of each time: below what a reference knows."""
-    largest = np.abs(values).max(axis=(1, 2), keepdims=True)
-    unit = np.exp2(np.floor(np.log2(np.where(largest > 0.0, largest, 1.0))) - bits)
-    return np.asarray(np.round(values / unit) * unit)
-
-
-def _unpacked(packed: bytes) -> dict[str, bytes]:
-    """Contents of the plain files of such an archive; empty if it is cut off, or far too large."""
-    plain = lzma.LZMADecompressor()
-    data = plain.decompress(packed, _MOST_TIMES * len(packed) + _LARGEST_CONTENTS)
-    if not plain.eof:
-        return {}
-    with tarfile.open(fileobj=io.BytesIO(data), mode="r:") as archive:
-        return {one.name: file.read() for one in archive if (file := archive.extractfile(one))}
+        for name, data in files.items():
+            archive.writestr(_member(name), data, zipfile.ZIP_STORED)
+    return [entry for entry, _ in entries]
 
 
 def _member(name: str) -> zipfile.ZipInfo:
@@ -399,14 +346,10 @@ class ReferenceBundle:
         where = str(path)
         with _opened(path) as archive:
             contents = parse_json(_read(archive, _CONTENTS, _LARGEST_CONTENTS), where)
-            unpacked = sum(member.file_size for member in archive.infolist())
-        if unpacked > _MOST_TIMES * path.stat().st_size + _LARGEST_CONTENTS:
-            text = f"unpacks to {unpacked / 1e6:.3g} MB, more than {_MOST_TIMES} times its size"
-            raise InputError(f"not a bundle of references ({text})", where)
         self.digest = file_digest(path)
-        self._schema = contents.get("schema")
-        if self._schema not in range(1, BUNDLE_SCHEMA + 1):
-            raise InputError(f"not a bundle of schema 1 to {BUNDLE_SCHEMA}", where)
+        if (schema := contents.get("schema")) != BUNDLE_SCHEMA:
+            text = f"a bundle of references of schema {shown(schema)}; expected {BUNDLE_SCHEMA}"
+            raise InputError(f"{text}, as `verify cache export` writes it", where)
         entries = contents.get("entries")
         if not isinstance(entries, list):
             raise InputError("not a bundle of references ('entries' is no list)", where)
@@ -449,21 +392,21 @@ class ReferenceBundle:
             If the bundle is damaged.
         """
         entry = self._of(scene)[job.level]
-        for name, data in self._read(entry).items():
-            write_whole(job.folder / Path(name).name, data)
+        try:
+            solution = unpacked(self._read(entry))
+        except InputError as error:
+            raise InputError(f"'{entry.key}{_PACKED}': {error.what}", str(self.path)) from None
+        write_solution(solution, job.folder / "solution", compression=None)
         return entry.record_for(job, f"from the bundle {self.path.name}")
 
-    def _read(self, entry: Entry) -> dict[str, bytes]:
-        """Contents of its files, all whole."""
+    def _read(self, entry: Entry) -> bytes:
+        """Return the packed solution of an entry, whole."""
+        name = entry.key + _PACKED
         with _opened(self.path) as archive:
-            if self._schema == 1:
-                whole = {n: _read(archive, f"{entry.key}/{n}", _LARGEST_FILE) for n in entry.files}
-            else:
-                whole = _unpacked(_read(archive, entry.key + _PACKED, _LARGEST_FILE))
-        for name, digest in entry.files.items():
-            if name not in whole or bytes_digest(whole[name]) != digest:
-                raise InputError(f"'{entry.key}/{name}' is damaged", str(self.path))
-        return {name: whole[name] for name in entry.files}
+            data = _read(archive, name, _LARGEST_FILE)
+        if bytes_digest(data) != entry.files.get(name):
+            raise InputError(f"'{name}' is damaged", str(self.path))
+        return data
 
     def _of(self, scene: Scene) -> list[Entry]:
         physics = reference_digest(scene)
