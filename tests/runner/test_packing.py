@@ -51,7 +51,7 @@ def moving(points, cells, order, rng, **more):
 
 
 def plain(value):
-    """Return what is compared, with its own type: arrays bit by bit, NaN as itself."""
+    """Return a value in a form that can be compared."""
     if isinstance(value, ContactPressure | Regularisation):
         return vars(value)
     return value.toarray() if isinstance(value, csr_array) else value
@@ -96,7 +96,7 @@ def test_what_is_packed_comes_back(solution):
 
 
 def test_packing_again_changes_nothing():
-    """What is rounded stays as it is, and the bytes are the same."""
+    """Rounded fields stay as they are, and the bytes are the same."""
     for case in cases():
         once = packed(case.values[0], inertia=True)
         assert packed(unpacked(once), inertia=True) == once

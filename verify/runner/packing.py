@@ -1,10 +1,9 @@
 """A reference's solution in few bytes: what a bundle keeps of one level.
 
-Fields are rounded to whole multiples of a power of two, far below what a reference knows. Of a
-quadratic field what stands at the middle of an edge is kept as its difference from the mean of the
-ends, which is small; of straight edges the difference of the points is zero. All whole numbers are
-stored byte by byte, the lowest of all first, and compressed as one (LZMA). Points, cells and cuts
-come back as they were, bit by bit.
+Fields are rounded to whole multiples of a power of two, far below what a reference knows. At the
+middle of an edge, a quadratic field is kept as its difference from the mean of both ends: a small
+number, and zero for the points of straight edges. Whole numbers are stored byte by byte, the lowest
+bytes of all first, and compressed as one (LZMA). Points, cells and cuts come back bit by bit.
 """
 
 import io
