@@ -229,9 +229,11 @@ def test_newton_does_not_see_slivers():
     assert max(counts) - min(counts) <= 2
 
 
-@pytest.mark.parametrize(("limit", "kernels"), [(10_000, FAST), (3, PLAIN)])
+@pytest.mark.parametrize(
+    ("limit", "kernels", "large"), [(10_000, FAST, 1000), (10_000, FAST, 0), (3, PLAIN, 0)]
+)
 def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(
-    monkeypatch, limit, kernels
+    monkeypatch, limit, kernels, large
 ):
     """Also where the tangent is indefinite on the way, and where iterations run out."""
     v = cut_cube(3)
@@ -246,6 +248,7 @@ def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(
     force = InternalForce(v, material(3))
     direct = static_equilibrium(force, fixed, twisted, load_steps=2)
     monkeypatch.setattr(statics, "ITERATE_FROM", 0)
+    monkeypatch.setattr(statics, "LARGE_FROM", large)
     monkeypatch.setattr(statics, "_MOST", limit)
     iterated = static_equilibrium(
         InternalForce(v, material(3), kernels=kernels), fixed, twisted, load_steps=2

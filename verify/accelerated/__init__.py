@@ -4,6 +4,9 @@ from verify.accelerated.cholesky import NearlySymmetric
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.accelerated.one_pass import OnePassTetrahedra
 from verify.accelerated.solver_by_cost import DirectBySize, SolverByCost
+from verify.accelerated.two_level import TwoLevel
 from verify.xfem.linear_solvers import Kernels
 
-FAST = Kernels(DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)
+FAST = Kernels(
+    DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra, TwoLevel
+)

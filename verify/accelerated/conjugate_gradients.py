@@ -101,15 +101,10 @@ class ConjugateGradients(LinearSolver):
             return x
         guess, residual = self._work[:2, :, : self._block]
         guess[:], residual[:] = x, load
-        iterations, square = conjugate_gradients(
-            self._rows, self._columns, self._upper, self._diagonal, self._inverse, not x.any(),
-            self._work, self._work.reshape(len(self._work), -1), self.tolerance**2 * size,
-            self.limit,
-        )  # fmt: skip
+        iterations, square = self._improve(not x.any(), self.tolerance**2 * size)
         if iterations < 0:
             raise SingularStiffnessError(None)
-        if iterations > 0:
-            x[:] = guess
+        x[:] = guess
         if square > self.tolerance**2 * size:
             raise NotConvergedError(
                 f"conjugate gradients: residual {np.sqrt(square / size):.3g} after {iterations} "
@@ -117,6 +112,13 @@ class ConjugateGradients(LinearSolver):
             )
         self.iterations = iterations
         return x
+
+    def _improve(self, is_zero: bool, target: float) -> tuple[int, float]:
+        """Improve the first of the work vectors; see `conjugate_gradients`."""
+        return conjugate_gradients(
+            self._rows, self._columns, self._upper, self._diagonal, self._inverse, is_zero,
+            self._work, self._work.reshape(len(self._work), -1), target, self.limit,
+        )  # fmt: skip
 
 
 _FUSED = {"contract"}  # multiply and add in one, rounded once

@@ -288,6 +288,10 @@ class Kernels:
     step : callable
         (pattern, block, held, solid, tolerance) → whichever of the two is quicker for steps in
         time and large statics; `solid` says whether the body fills space, where factors are large.
+    large : callable, optional
+        (pattern, points, fixed, tolerance, limit) → iterations with such a matrix of blocks of
+        three, whose number does not grow with the body: for the statics of large solids, with
+        nodes `points` (N, 3) and components (N, 3) that are `fixed`. Without it `step` is taken.
     general : callable
         (pattern, block) → solver for any regular matrix, nearly symmetric as a rule.
     one_pass : callable, optional
@@ -300,6 +304,7 @@ class Kernels:
     step: Callable[[BlockPattern, int, Bools, bool, float], LinearSolver]
     general: Callable[[BlockPattern, int], LinearSolver]
     one_pass: Callable[[Elements, BlockPattern, bool], OnePass] | None = None
+    large: Callable[[BlockPattern, Floats, Bools, float, int], LinearSolver] | None = None
 
 
 def _direct(pattern: BlockPattern, block: int, held: Bools | None) -> LinearSolver:

@@ -31,7 +31,8 @@ from verify.xfem.phantom import PhantomMesh
 
 Method = Literal["auto", "direct", "iterative"]
 
-ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
+# nodes in space, from which iterations are faster, and from which those with a coarse space are
+ITERATE_FROM, LARGE_FROM = 2000, 10_000  # (measured)
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 _PHASES = ("analysis", "assembly", "factorisation", "solve")
 _MOST = 10_000  # iterations, where no factorisation may follow
@@ -92,8 +93,8 @@ def solve_static(
     solver : {"auto", "direct", "iterative"}
         Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
         ``auto`` takes the faster one. For solids of 2000 nodes and more, without a ghost penalty,
-        that is the solver of the kernels for steps. If it does not converge, a factorisation
-        follows.
+        that is the solver of the kernels for steps, from 10 000 on their solver for large ones. If
+        it does not converge, a factorisation follows.
     ghost : Penalty, optional
         A `verify.xfem.ghost_penalty`, added to the stiffness.
     kernels : Kernels
@@ -188,11 +189,13 @@ class StaticSolver:
         kernels, block, phantom = force.kernels, fixed.shape[1], force.phantom
         held = fixed.all(axis=1)
         self._make_direct = partial(kernels.direct, pattern, block, held)
-        is_large = phantom.mesh.dim == 3 and phantom.node_count >= ITERATE_FROM
+        nodes = phantom.node_count if phantom.mesh.dim == 3 and force.ghost is None else 0
         self._large: LinearSolver | None = None
         if method == "iterative":
             self._large = kernels.iterative(pattern, block, tolerance, _MOST)
-        elif method == "auto" and is_large and force.ghost is None:
+        elif method == "auto" and kernels.large is not None and nodes >= LARGE_FROM:
+            self._large = kernels.large(pattern, phantom.node_points, fixed, tolerance, _MOST)
+        elif method == "auto" and nodes >= ITERATE_FROM:
             self._large = kernels.step(pattern, block, held, True, tolerance)
         self._insists = method == "iterative"
         self.used: set[str] = set()
