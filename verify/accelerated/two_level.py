@@ -1,9 +1,9 @@
 """Conjugate gradients with a coarse space: the rigid motions of parts of the body.
 
-Gauß–Seidel alone leaves what is smooth, so that iterations grow with the number of nodes across a
-body. The nodes are therefore divided into parts of some hundred, each connected and compact, and
-what the rigid motions Z of all parts can do is solved for exactly, with E = Zᵀ K Z. With M the
-Gauß–Seidel sweeps forth and back, a residual r is preconditioned by
+Gauß–Seidel alone leaves smooth errors, so that iterations grow with the number of nodes across a
+body. The nodes are therefore divided into parts of some hundred, each connected and compact. Let Z
+be the rigid motions of all parts, E = Zᵀ K Z, and M the sweeps of Gauß–Seidel forth and back. A
+residual r is preconditioned by
 
     z = M r + Z E⁻¹ Zᵀ (r − K M r)
 
@@ -23,7 +23,7 @@ from verify.xfem.mesh import connected
 
 _NODES = 4.0  # of a part, times N^⅓: the coarse solution then costs less than a sweep
 _FEW = 0.1  # of them: what a cut leaves of a part goes to a neighbour
-_LOST = 1e4  # times the square of the residual that is asked for: 1e-11 of the load for 1e-13
+_LOST = 1e4  # times the square of the wanted residual: 1e-11 of the load for 1e-13
 _SEEN = 1e-6  # of a residual: its share in rigid motions is more than round-off
 _ALIKE = 1e-8  # of the largest: a rigid motion that moves the nodes of a part less is none
 # displacement axes of rotations about z, x, y, and the axes of the arms that they are made of
@@ -61,7 +61,7 @@ class TwoLevel(ConjugateGradients):
         self._independent = _independent(self._modes, self._part)
 
     def factorize(self, blocks: Floats) -> None:
-        """Take the matrix, and factorise that of the parts; see `LinearSolver`."""
+        """Take the matrix, and factorise E; see `LinearSolver`."""
         super().factorize(blocks)
         pattern, ways = self._sparsity, self._independent
         coarse = np.zeros((len(pattern.columns), 6, 6))
@@ -113,8 +113,8 @@ class TwoLevel(ConjugateGradients):
                 return -1, square
             x += t
             r -= w
-            is_zero, rho = False, np.inf
-            while (square := float(np.vdot(r, r))) > target and iteration < self.limit:
+            is_zero, rho, square = False, np.inf, float(np.vdot(r, r))
+            while square > target and iteration < self.limit:
                 s[:] = r
                 solve_lower(*matrix, self._inverse, s, t)
                 sweep_back(*matrix, self._inverse, s, t, w)  # t = M r, w = K t
@@ -122,15 +122,10 @@ class TwoLevel(ConjugateGradients):
                 t += moved
                 add_product(*matrix, self._diagonal, moved, w)
                 old, rho = rho, float(np.vdot(r, t))
-                p *= rho / old
-                p += t
-                q *= rho / old
-                q += w
-                curvature = float(np.vdot(p, q))
+                curvature = turn(t, w, p, q, rho / old)
                 if not (curvature > 0.0 and rho > 0.0):
                     return -1, square
-                x += np.multiply(p, rho / curvature, out=s)
-                r -= np.multiply(q, rho / curvature, out=s)
+                square = advance(x, r, p, q, rho / curvature)
                 iteration += 1
         return iteration, square
 
@@ -267,3 +262,31 @@ def add_coarse(starts, columns, upper, diagonal, modes, place, own, out):
                 for b in range(6):
                     for k in range(3):
                         out[to, a, b] += modes[row, k, a] * half[k, b]
+
+
+# sums in any order, over long vectors, where it lets the compiler use the vector unit
+_SUMS = {"reassoc", "contract", "nsz"}
+
+
+@njit(cache=True, fastmath=_SUMS)
+def turn(t, w, p, q, beta):
+    """Set p to t + β p and q to w + β q, and return p·q."""
+    a, b, c, d = t.ravel(), w.ravel(), p.ravel(), q.ravel()
+    product = 0.0
+    for i in range(len(a)):
+        c[i] = a[i] + beta * c[i]
+        d[i] = b[i] + beta * d[i]
+        product += c[i] * d[i]
+    return product
+
+
+@njit(cache=True, fastmath=_SUMS)
+def advance(x, r, p, q, alpha):
+    """Add α p to x, take α q from r, and return r·r."""
+    a, b, c, d = x.ravel(), r.ravel(), p.ravel(), q.ravel()
+    square = 0.0
+    for i in range(len(a)):
+        a[i] += alpha * c[i]
+        b[i] -= alpha * d[i]
+        square += b[i] * b[i]
+    return square

@@ -133,7 +133,8 @@ def solve_static(
     inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, solver)
     clock.append(perf_counter())
     blocks = stiffness.stiffness(pattern)
-    right = np.where(supports.fixed, 0.0, force - stiffness.evaluate(supports.values)[0])
+    lifted = stiffness.evaluate(supports.values)[0] if supports.values.any() else 0.0
+    right = np.where(supports.fixed, 0.0, force - lifted)
     stiffest = float(np.abs(blocks).max())
     constrain(pattern, supports.fixed, blocks)
     clock.append(perf_counter())
