@@ -22,8 +22,9 @@ import numpy as np
 
 from verify.errors import InputError, instead
 from verify.printable import one_line, shown, words_of
-from verify.scene import Scene
+from verify.scene import Equilibrium, Scene
 from verify.scene.strict import nearest
+from verify.scene.tables import starts_open
 from verify.solution import Solution
 
 _LONGEST = 400  # characters of a refusal: it stands in every record of the solver
@@ -101,13 +102,21 @@ def refused_contact(solver: Any, scene: Scene) -> str | None:
     """Say which contact of the faces of cuts a solver lacks that a scene asks for, or None.
 
     A solver offers contact by its attribute ``contact``: the analyses that have it, "static" and
-    "dynamic", and "finite_rotation" where they have it in these kinematics too.
+    "dynamic", and of those that have it at finite rotation too "static finite_rotation" and
+    "dynamic finite_rotation"; "finite_rotation" is both. Of other laws than Hooke's none has it.
     """
     if not scene.contact.closed:
         return None
-    asked = [scene.analysis.kind, scene.analysis.kinematics]
-    lacking = {*asked} - {*getattr(solver, "contact", ()), "linear"}
-    where = " and ".join(f"'{word}'" for word in asked if word in lacking)
+    analysis, offered = scene.analysis, {*getattr(solver, "contact", ())}
+    if "finite_rotation" in offered:
+        offered |= {f"{kind} finite_rotation" for kind in offered}
+    begins = isinstance(scene.initial, Equilibrium) and starts_open(scene.initial)
+    asked = [analysis.kind, *(["static"] if begins and analysis.kind != "static" else [])]
+    if analysis.kinematics != "linear":
+        asked = [f"{kind} finite_rotation" for kind in asked]
+    if scene.material.model != "hooke":
+        asked.append(scene.material.model)
+    where = " and ".join(f"'{word}'" for word in asked if word not in offered)
     name = getattr(solver, "name", type(solver).__name__)
     return f"contact of the faces of a cut ({where}) is not offered by {name}" if where else None
 

@@ -226,7 +226,7 @@ class XfemSolver:
     """
 
     name = "xfem"
-    contact = ("static", "dynamic")
+    contact = ("static", "dynamic", "dynamic finite_rotation")
     choices = _CHOICES
     parameters = tuple(one.name for one in fields(_Parameters))
 

@@ -60,6 +60,7 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import Fragments, treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.subdivision import Subdivision, extrapolation, subdivide
+from verify.xfem.turning_faces import TurningFaces
 
 _Floats = NDArray[np.float64]
 _FINE = 0.1  # of an element: arcs are sampled so for their normals
@@ -111,6 +112,8 @@ def faces_of(
             "contact of the faces of a cut is for slivers = 'keep' or 'drop': it needs no others"
         )
     mesh = phantom.mesh
+    if scene.analysis.kinematics != "linear":
+        return TurningFaces(phantom, material_of(scene, mesh))
     cuts = cuts_of(scene, _FINE * float(mesh.measures.mean()) ** (1.0 / mesh.dim))
     return ClosingFaces(phantom, material_of(scene, mesh), cuts, moving)
 
@@ -304,7 +307,9 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
         if not isinstance(entry, Gravity):
             load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
     path = path_of_supports(scene, phantom, exact)
-    if (faces := faces_of(scene, phantom)) is not None:
+    # at finite rotation cuts are closed in it: see `refused_contact`
+    faces = None if body.force.is_corotational else faces_of(scene, phantom)
+    if faces is not None:
         return solve_closed(body.force, faces, path(1.0), load).displacement
     check_bodies(phantom, path(1.0))
     return static_equilibrium(

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError, check_floats, finite_array
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.internal_force import Configuration, InternalForce
+from verify.xfem.internal_force import Configuration, InternalForce, Kinematics
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.loads_and_supports import Supports, check_fixed
 from verify.xfem.mass import Mass
@@ -111,9 +111,12 @@ class Contact(Protocol):
 
     Attributes
     ----------
+    kinematics : {"corotational", "linear"}
     couplings : (k, 2) int array
         Dof nodes that contact couples.
     """
+
+    kinematics: Kinematics
 
     @property
     def couplings(self) -> Ints: ...  # noqa: D102
@@ -122,8 +125,11 @@ class Contact(Protocol):
         """Compute the energy in joules at a displacement (N, d)."""
         ...
 
-    def force(self, displacement: Floats) -> Floats:
-        """Compute the slope (N, d) of the energy, in newtons."""
+    def force_of_step(self, before: Floats, after: Floats) -> Floats:
+        """Compute the force (N, d) of a step between two displacements, in newtons.
+
+        Its work is at least the change of the energy, and it turns nothing.
+        """
         ...
 
     def touching(self, displacement: Floats) -> Bools:
@@ -131,7 +137,13 @@ class Contact(Protocol):
         ...
 
     def add_stiffness(self, pattern: BlockPattern, blocks: Floats, touching: Bools | bool) -> None:
-        """Add the second derivative of the energy to nodal blocks."""
+        """Add the second derivative of the energy at rest to nodal blocks."""
+        ...
+
+    def add_stiffness_of_step(
+        self, pattern: BlockPattern, blocks: Floats, before: Floats, after: Floats
+    ) -> None:
+        """Add the derivative of the force of a step by its end, or one near it, to nodal blocks."""
         ...
 
 
@@ -154,7 +166,7 @@ class DynamicBody:
         Nodal forces (N, d) at a time that still hold what a cut has parted; see
         `verify.xfem.release`. Their work has an entry of its own.
     contact : Contact, optional
-        Of linear kinematics; its energy counts as strain energy.
+        Of the same kinematics; its energy counts as strain energy.
 
     Attributes
     ----------
@@ -212,8 +224,11 @@ class DynamicBody:
             self.supports = Supports.none(phantom)
         pairs = self.force.couplings
         if self.contact is not None:
-            if self.force.is_corotational or pairs is not None:
-                raise XfemError("contact at finite rotation or with a penalty; expected neither")
+            if self.contact.kinematics != self.force.kinematics or pairs is not None:
+                raise XfemError(
+                    f"contact of {self.contact.kinematics} kinematics with a force of "
+                    f"{self.force.kinematics} kinematics or a penalty; expected the same, and none"
+                )
             pairs = self.contact.couplings
         self.pattern = self.mass.pattern(phantom, pairs)
         self._hold(self.supports)

@@ -59,7 +59,7 @@ from verify.xfem.arrays import (
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, pattern_places
 from verify.xfem.cuts import Cut
 from verify.xfem.element import Material
-from verify.xfem.internal_force import InternalForce
+from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.loads_and_supports import Supports, check_bodies, simplex_rule
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import StaticSolver
@@ -75,6 +75,8 @@ _SMOOTH = np.cos(np.pi / 6.0)  # a resolved arc turns by at most half a radian f
 
 class ClosingFaces:
     """Faces of the cuts of a body, which cannot overlap; linear kinematics.
+
+    `verify.xfem.turning_faces` has those of finite rotation.
 
     Parameters
     ----------
@@ -92,6 +94,12 @@ class ClosingFaces:
         Dof nodes of both pieces at each facet of the cut.
     gap : (f, q, 2 (d + 1), d) float array
         Normal jump at the quadrature points of each facet, by the displacement of these nodes.
+    normal : (f, d) float array
+        Of each facet, out of the material that comes first in `nodes`.
+    shapes : (f, q, 2 (d + 1)) float array
+        What the displacement jumps by, second side less first, by that of each node.
+    gradients : (f, 2 (d + 1), d) float array
+        Of the displacement, the mean of both sides, in 1/m; weighted as the stress.
     stress : (f, 2 (d + 1), d) float array
         Mean normal stress there, in Pa/m.
     stiffness : (f,) float array
@@ -106,6 +114,8 @@ class ClosingFaces:
     XfemError
         If cells are aggregated, the body is a membrane, or its law not Hooke's.
     """
+
+    kinematics: Kinematics = "linear"
 
     def __init__(
         self,
@@ -143,7 +153,8 @@ class ClosingFaces:
         flexible = phantom.part_fraction[pieces] * mesh.measures[phantom.parent[pieces]]
         flexible /= lam + 2.0 * mu
         share = flexible / flexible.sum(axis=1, keepdims=True)
-        normal = normal[:, None, None]
+        self.normal, normal = normal, normal[:, None, None]
+        self.gradients = _flat(share[..., None, None] * gradients, 1)
         stress = lam[..., None, None] * gradients + 2.0 * mu[..., None, None] * (
             along[..., None] * normal
         )
@@ -152,10 +163,11 @@ class ClosingFaces:
         shapes = np.einsum("fsid,fqsd->fqsi", gradients, self.points[:, :, None] - first[:, None])
         shapes[..., 0] += 1.0
         shapes[:, :, 0] *= -1.0
-        self.gap = _flat(shapes[..., None] * normal[:, None], 2)
+        self.shapes = _flat(shapes[..., None], 2)[..., 0]
+        self.gap = self.shapes[..., None] * self.normal[:, None, None]
         step = 0.25 * largest ** (1.0 / (mesh.dim - 1))
-        smooth = _curved(normal[:, 0, 0], self.points, step, cuts)
-        turned = _flat(shapes[..., None] * (smooth[:, :, None, None] - normal[:, None]), 2)
+        smooth = _curved(self.normal, self.points, step, cuts)
+        turned = self.shapes[..., None] * (smooth - self.normal[:, None])[:, :, None]
         self.nodes: Ints = np.concatenate(list(phantom.cells[pieces.T]), axis=1)
         self.stiffness = (
             (FIRMNESS if moving else STABILITY)
@@ -223,6 +235,11 @@ class ClosingFaces:
         total = self._turned[0] @ (self._per_stiffness * traction).ravel() - self._turned[1] @ own
         return total.reshape(displacement.shape)
 
+    def force_of_step(self, before: Floats, after: Floats) -> Floats:
+        """Return the force (N, d) of a step from one displacement (N, d) to another, in newtons."""
+        del before  # normals do not turn
+        return self.force(after)
+
     def touching(self, displacement: Floats, slide: Floats | float = 0.0) -> Bools:
         """Tell whether faces press on each other, (f, q)."""
         return self.trial_stress(displacement, slide) < 0.0
@@ -245,6 +262,13 @@ class ClosingFaces:
         _, of_points, own = self._entries
         closed = np.broadcast_to(touching, self.weights.shape).ravel()
         blocks += (of_points @ closed.astype(float) - own).reshape(blocks.shape)
+
+    def add_stiffness_of_step(
+        self, pattern: BlockPattern, blocks: Floats, before: Floats, after: Floats
+    ) -> None:
+        """Add the derivative of the force of a step by its end to the nodal blocks (B, d, d)."""
+        del before
+        self.add_stiffness(pattern, blocks, self.touching(after))
 
     def _stiffness_of_points(self, pattern: BlockPattern, space: int) -> tuple[csc_array, Floats]:
         """Find entries (B d², f q) of blocks by each point that touches, and of −∫ σ²/γ (B d²,)."""

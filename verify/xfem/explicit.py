@@ -60,7 +60,7 @@ class _Explicit:
         at = body.force.configuration(displacement)
         internal, _ = body.force.evaluate_at(at)
         if body.contact is not None:
-            internal += body.contact.force(displacement)
+            internal += body.contact.force_of_step(displacement, displacement)
         forces = StepForces(internal, body.external(time), body.viscous(velocity, at))
         return self._mass.solve(forces.external - forces.internal - forces.viscous, held), forces
 

@@ -229,8 +229,8 @@ class NewtonIntegrator(ABC):
         velocity, end = self._velocity(displacement), self._resistance(displacement)
         forces = self._forces(end, velocity, self._start.time + self.step_size)
         if self.body.contact is not None:
-            # at the end in every scheme: the work of that force is at least its energy
-            pressed = self.body.contact.force(displacement)
+            # alike in every scheme: the work of that force is at least its energy
+            pressed = self.body.contact.force_of_step(self._start.displacement, displacement)
             forces = replace(forces, internal=forces.internal + pressed)
         inertia = forces.inertia
         if inertia is None:
@@ -391,8 +391,9 @@ class NewtonIntegrator(ABC):
                 scale, at = per_velocity * body.damping.stiffness, self._configuration(end)
                 body.force.add_stiffness(at, body.pattern, self._blocks, scale)
         if body.contact is not None:
-            touching = body.contact.touching(end.displacement)
-            body.contact.add_stiffness(body.pattern, self._blocks, touching)
+            body.contact.add_stiffness_of_step(
+                body.pattern, self._blocks, self._start.displacement, end.displacement
+            )
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern, body.fixed, self._blocks, self._held)

@@ -1,0 +1,138 @@
+"""Contact of the faces of cuts in motion at finite rotation: normals turn with the faces.
+
+Let F be the mean of the deformation gradients on both sides of a facet, N the normal of the facet
+and Δ the jump of the displacement. With C = FᵀF and d = FᵀΔ the gap along the deformed normal
+n ∝ F⁻ᵀN is
+
+    g = n·Δ = m·d,   m = y/s,   y = C⁻¹N,   s = √(N·y).
+
+It depends on C and d alone, which no rigid motion changes. The energy is the penalty of
+`verify.xfem.closing`, ∫ γ [g]₋²/2 dS over the undeformed faces, with the same γ. The mean of both
+sides is weighted as the stress is there: a sliver does not turn the normal of its neighbour.
+
+The force of a step is −p G with the pressure p at its end. G is a discrete gradient of g: with the
+means (bars) of both ends of the step, δ their difference, Fₘ and Δₘ the means of F and Δ, and
+r = ½ (1/s₀ + 1/s₁) d̄ − (d̄·ȳ) N / (s₀ s₁ (s₀ + s₁)),
+
+    δg = m̄·δd + d̄·δm = m̄·δd + r·δy,   δy = −C₁⁻¹ δC C₀⁻¹ N,
+    δC = Fₘᵀ δF + δFᵀ Fₘ,   δd = Fₘᵀ δΔ + δFᵀ Δₘ,
+
+without a quotient that is 0/0. So G·δu = δg. As the energy is convex in g the work of the force
+is at least the change of the energy: an impact gains nothing. C and d are quadratic in positions
+and invariant, so that G, taken in the middle of the step, turns nothing (Simo & Tarnow, ZAMP 43,
+1992; Gonzalez, Comput. Methods Appl. Mech. Engrg. 190, 2000): contact leaves the momentum of a body
+and its angular momentum as they are, whatever the step.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from verify.xfem.arrays import Floats
+from verify.xfem.block_pattern import BlockPattern, pattern_places
+from verify.xfem.closing import ClosingFaces
+from verify.xfem.element import Material
+from verify.xfem.internal_force import Kinematics
+from verify.xfem.phantom import PhantomMesh
+
+
+class _Faces(NamedTuple):
+    """Faces in a configuration; letters as in the docstring of the module."""
+
+    F: Floats  # (f, d, d)
+    jump: Floats  # Δ (f, q, d)
+    inverse: Floats  # C⁻¹ (f, d, d)
+    y: Floats  # (f, d)
+    s: Floats  # (f, 1)
+    d: Floats  # (f, q, d)
+
+    @property
+    def m(self) -> Floats:
+        return self.y / self.s
+
+
+class TurningFaces(ClosingFaces):
+    """Faces of the cuts of a body in motion at finite rotation.
+
+    Parameters
+    ----------
+    phantom : PhantomMesh
+    material : Material
+
+    Raises
+    ------
+    XfemError
+        As `ClosingFaces`.
+    """
+
+    kinematics: Kinematics = "corotational"
+
+    def __init__(self, phantom: PhantomMesh, material: Material) -> None:
+        super().__init__(phantom, material, moving=True)
+        self._places: tuple[BlockPattern, Floats] | None = None
+
+    def gaps(self, displacement: Floats) -> Floats:
+        """Compute the gap g (f, q) in metres along the deformed normals; negative: overlap."""
+        at = self._at(displacement)
+        return np.einsum("fa,fqa->fq", at.m, at.d)
+
+    def trial_stress(self, displacement: Floats, slide: Floats | float = 0.0) -> Floats:
+        """Compute γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
+        return self.stiffness[:, None] * (self.gaps(displacement) + slide)
+
+    def force_of_step(self, before: Floats, after: Floats) -> Floats:
+        """Return the force (N, d) of a step; with equal ends it is the slope of the energy."""
+        pressures = self.weights * self.pressure(after)
+        forces = -np.einsum("fq,fqka->fka", pressures, self.slopes(before, after))
+        count, nodes = len(before), self.nodes.ravel()
+        columns = forces.reshape(-1, forces.shape[2]).T
+        return np.stack([np.bincount(nodes, one, count) for one in columns], axis=1)
+
+    def slopes(self, before: Floats, after: Floats) -> Floats:
+        """Compute G (f, q, 2 (d + 1), d) by displacements (N, d) at both ends of a step."""
+        first, last = self._at(before), self._at(after)
+        F, jump = 0.5 * (first.F + last.F), 0.5 * (first.jump + last.jump)
+        m, d, y = (0.5 * (a + b) for a, b in zip((first.m, first.d, first.y),
+                                                 (last.m, last.d, last.y), strict=True))  # fmt: skip
+        share = 0.5 * (1.0 / first.s + 1.0 / last.s)
+        fall = np.einsum("fqa,fa->fq", d, y) / (first.s * last.s * (first.s + last.s))
+        r = share[..., None] * d - fall[..., None] * self.normal[:, None]
+        # −r·δy, as a form in δC; then its slope by F, Fₘ times twice its symmetric part
+        form = np.einsum("fab,fqb,fc->fqac", last.inverse, r, first.y)
+        form += np.einsum("fab,fqb,fc->fqac", first.inverse, r, last.y)
+        by_F = jump[..., None] * m[:, None, None]
+        by_F -= 0.5 * F[:, None] @ (form + form.swapaxes(2, 3))
+        by_jump = np.einsum("fab,fb->fa", F, m)
+        slopes: Floats = by_F @ self.gradients[:, None].swapaxes(2, 3)
+        return slopes.swapaxes(2, 3) + self.shapes[..., None] * by_jump[:, None, None]
+
+    def add_stiffness_of_step(
+        self, pattern: BlockPattern, blocks: Floats, before: Floats, after: Floats
+    ) -> None:
+        """Add γ ∇g ∇gᵀ, at the end of a step and where faces touch, to nodal blocks (B, d, d).
+
+        It has no negative mode. Beside the derivative of the force it leaves out the turn of G, of
+        the order of p g, and that G is of the middle of the step.
+        """
+        del before
+        if self._places is None or self._places[0] is not pattern:
+            rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
+            found = pattern_places(pattern, rows.ravel(), columns.ravel())
+            self._places = pattern, found.reshape(rows.shape)
+        space = blocks.shape[1]
+        slopes = self.slopes(after, after)
+        share = self.weights * self.stiffness[:, None] * self.touching(after)
+        added = np.einsum("fq,fqia,fqjb->fijab", share, slopes, slopes).reshape(-1, space**2)
+        places = self._places[1].ravel()
+        for k, entries in enumerate(added.T):
+            blocks.reshape(len(blocks), -1)[:, k] += np.bincount(places, entries, len(blocks))
+
+    def _at(self, displacement: Floats) -> _Faces:
+        """Find the faces as a displacement (N, d) has them."""
+        moved = displacement[self.nodes]
+        F = np.eye(moved.shape[2]) + np.einsum("fka,fkb->fab", moved, self.gradients)
+        jump = self.shapes @ moved
+        inverse = np.linalg.inv(F.swapaxes(1, 2) @ F)
+        y = np.einsum("fab,fb->fa", inverse, self.normal)
+        s = np.sqrt(np.einsum("fa,fa->f", self.normal, y))[:, None]
+        return _Faces(F, jump, inverse, y, s, jump @ F)
