@@ -13,12 +13,13 @@ of the dense compliance S = B A⁻¹ Bᵀ. A is the matrix of the body with its 
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import nnls
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array, diags_array, kron
 
 from reference.nodal_algebra import facing_nodes, sides_of_cut
 from reference.space import ConformingSpace
@@ -77,36 +78,49 @@ class FaceContact:
         self.pairs = found[:, :2]
         number = np.full(hats.shape, -1)
         number[hats > 0.0] = row.ravel()
-        facet, i, j = np.nonzero(shares)
-        size = (shares * sizes[:, None, None])[facet, i, j]
-        which, along = number[facet, i], size[:, None] * normals[facet]
-        columns = facing[facet, j][:, :, None] * d + np.arange(d)
-        values = np.stack([along, -along], axis=1)
-        rows = np.broadcast_to(which[:, None, None], values.shape)
-        shape = (len(self.pairs), space.node_points.size)
-        entries = coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
-        self.gaps = entries.tocsr()
+        # what each facet adds to each pressure: shares of the jumps at its nodes
+        self._shape = len(self.pairs), space.node_points.size
+        self._facet, i = np.nonzero(hats > 0.0)
+        self._row = number[self._facet, i]
+        self._shares = (shares * sizes[:, None, None])[self._facet, i]
+        self._facing, self._normals = facing[self._facet], normals[self._facet]
+        along = self._shares[..., None] * self._normals[:, None]
+        columns = self._facing[..., None] * d + np.arange(d)
+        rows = self._row[:, None, None, None]
+        self.gaps = _entries(np.stack([along, -along], axis=2), rows, columns, self._shape)
         weights = (hats * sizes[:, None])[hats > 0.0]
         self.weights = np.bincount(row.ravel(), weights, minlength=len(self.pairs))
         self.points = space.node_points[self.pairs[:, 0]]
 
-    def compliance(self, solve: Callable[[Array], Array]) -> Array:
+    def opened(self, displacement: Array) -> Array:
+        """Compute weighted gaps (m,) at a displacement (k,)."""
+        return np.asarray(self.gaps @ displacement)
+
+    def slopes(self, before: Array, after: Array) -> csr_array:
+        """Return G (m, k) whose transpose passes pressures on over a step between two (k,)."""
+        del before, after  # normals do not turn
+        return self.gaps
+
+    def compliance(
+        self, solve: Callable[[Array], Array], gaps: csr_array | None = None
+    ) -> Array:
         """Return S (m, m): the weighted gaps that unit pressures make, m² or m³ per Pa.
 
         Parameters
         ----------
         solve : function of (k, c) arrays
             Gives displacements, zero where held, of columns of nodal forces.
+        gaps : (m, k) csr_array, optional
+            In place of those of undeformed normals.
         """
+        gaps = self.gaps if gaps is None else gaps
         blocks = range(0, len(self.weights), _BLOCK)
-        columns = [solve(self.gaps[i : i + _BLOCK].toarray().T) for i in blocks]
-        found = self.gaps @ np.hstack(columns) if columns else np.zeros((0, 0))
+        columns = [solve(gaps[i : i + _BLOCK].toarray().T) for i in blocks]
+        found = gaps @ np.hstack(columns) if columns else np.zeros((0, 0))
         return np.asarray(0.5 * (found + found.T))
 
-    def pressed(
-        self, gaps: Array, compliance: Array, leader: NDArray[np.int64]
-    ) -> tuple[Array, Array]:
-        """Return pressures (m,), Pa, and their nodal forces (k,), N; none where nodes are tied.
+    def pressed(self, gaps: Array, compliance: Array, leader: NDArray[np.int64]) -> Array:
+        """Return pressures (m,), Pa; none where nodes are tied.
 
         Parameters
         ----------
@@ -119,7 +133,85 @@ class FaceContact:
         apart = np.flatnonzero(leader[self.pairs[:, 0]] != leader[self.pairs[:, 1]])
         found = np.zeros(len(self.weights))
         found[apart] = pressures(compliance[np.ix_(apart, apart)], gaps[apart])[0]
-        return found, np.asarray(self.gaps.T @ found)
+        return found
+
+
+class TurningContact(FaceContact):
+    """Gaps along normals that turn with the faces, at finite rotation.
+
+    Let F be the mean of the deformation gradients, of the corners alone, of the cells that have a
+    node of the facet. A tiny facet turns with its surroundings. Its deformed normal is that of
+    F⁻ᵀN, so that a jump D has the gap μ·FᵀD with μ = y/s, y = (FᵀF)⁻¹N, s = √(N·y): functions of
+    FᵀF and FᵀD. A discrete gradient by these gives forces that turn nothing, and whose work in a
+    step is pressure times change of the gap (O. Gonzalez, Comput. Methods Appl. Mech. Engrg. 190,
+    2000). `slopes` with the same displacement twice is the derivative of the gaps.
+    """
+
+    def __init__(self, space: ConformingSpace, held: NDArray[np.int32]) -> None:
+        super().__init__(space, held)
+        mesh, d, count = space.mesh, space.dimension, len(self._facet)
+        points, corners = mesh.points[mesh.cells], space.cell_nodes[:, : d + 1]
+        slopes = np.linalg.inv(points[:, 1:] - points[:, :1])  # (c, d, d), of corners 1…
+        slopes = np.concatenate([-slopes.sum(axis=2, keepdims=True), slopes], axis=2)
+        each = np.arange(corners.size).reshape(corners.shape)
+        ones, cell, nodes = np.ones(corners.size), each // (d + 1), len(space.node_points)
+        of_cells = _entries(
+            slopes, cell[:, None] * d + np.arange(d)[:, None],
+            np.broadcast_to(corners[:, None], slopes.shape), (len(corners) * d, nodes),
+        )  # fmt: skip
+        has = coo_array((ones, (corners.ravel(), cell.ravel())), shape=(nodes, len(corners)))
+        beside = self._facing.reshape(count, -1)
+        row = np.broadcast_to(np.arange(count)[:, None], beside.shape)
+        around = _entries(np.ones(beside.shape), row, beside, (count, nodes)) @ has.tocsr()
+        around.data[:] = measures(points)[around.indices]
+        around = diags_array(1.0 / around.sum(axis=1)) @ around
+        # Fᵀ − I (p d d,) and D (p d,) of displacements (k,)
+        self._mean = kron(kron(around, np.eye(d)) @ of_cells, np.eye(d)).tocsr()
+        shares = np.stack([self._shares, -self._shares], axis=2).reshape(count, -1)
+        self._jump = kron(_entries(shares, row, beside, (count, nodes)), np.eye(d)).tocsr()
+
+    def _at(self, displacement: Array) -> tuple[Array, ...]:
+        """Find F (p, d, d), D (p, d), (FᵀF)⁻¹ (p, d, d), y (p, d) and s (p, 1)."""
+        d = self._normals.shape[1]
+        F = np.eye(d) + np.swapaxes((self._mean @ displacement).reshape(-1, d, d), 1, 2)
+        inverse = np.linalg.inv(np.swapaxes(F, 1, 2) @ F)
+        y = np.einsum("pkl,pl->pk", inverse, self._normals)
+        s = np.sqrt(np.sum(self._normals * y, axis=1, keepdims=True))
+        return F, (self._jump @ displacement).reshape(-1, d), inverse, y, s
+
+    def opened(self, displacement: Array) -> Array:
+        """Compute weighted gaps (m,) at a displacement (k,)."""
+        F, D, _, y, s = self._at(displacement)
+        gaps = np.einsum("pa,pak,pk->p", D, F, y / s)
+        return np.bincount(self._row, gaps, minlength=self._shape[0])
+
+    def slopes(self, before: Array, after: Array) -> csr_array:
+        """Return G (m, k), whose product with the change between two (k,) is that of the gaps."""
+        (F0, D0, inverse0, y0, s0), (F1, D1, inverse1, y1, s1) = self._at(before), self._at(after)
+        F, D, mu = 0.5 * (F0 + F1), 0.5 * (D0 + D1), 0.5 * (y0 / s0 + y1 / s1)
+        along = 0.5 * (np.einsum("pak,pa->pk", F0, D0) + np.einsum("pak,pa->pk", F1, D1))
+        # along · δμ = by_y · δy, with δy = −(F₁ᵀF₁)⁻¹ δ(FᵀF) y₀, and the same from the other end
+        fall = 0.5 * np.sum(along * (y0 + y1), axis=1, keepdims=True) / (s0 * s1 * (s0 + s1))
+        by_y = 0.5 * (1.0 / s0 + 1.0 / s1) * along - fall * self._normals
+        form = np.einsum("pkl,pl,pm->pkm", inverse1, by_y, y0)
+        form += np.einsum("pkl,pl,pm->pkm", inverse0, by_y, y1)
+        by_F = np.einsum("pa,pk->pak", D, mu) - 0.5 * F @ (form + np.swapaxes(form, 1, 2))
+        by_D = np.einsum("pak,pk->pa", F, mu)
+        found = self._sums(np.swapaxes(by_F, 1, 2)) @ self._mean + self._sums(by_D) @ self._jump
+        return csr_array(found)
+
+    def _sums(self, values: Array) -> csr_array:
+        """Make the matrix (m, …) that sums products with values (p, …) over each pressure."""
+        flat = values.reshape(len(values), -1)
+        columns = np.arange(flat.size).reshape(flat.shape)
+        rows = np.broadcast_to(self._row[:, None], flat.shape)
+        return _entries(flat, rows, columns, (self._shape[0], flat.size))
+
+
+def _entries(values: Array, rows: Any, columns: Any, shape: tuple[int, int]) -> csr_array:
+    """Make a matrix; entries at one place are summed."""
+    rows = np.broadcast_to(rows, values.shape)
+    return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsr()
 
 
 def _faces(pairs: NDArray[np.int64], normals: Array) -> NDArray[np.int64]:

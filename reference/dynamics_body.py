@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_conditions import load_forces, nodes_on_part
-from reference.contact import FaceContact
+from reference.contact import FaceContact, TurningContact
 from reference.large_strain import solve_large_strain
 from reference.law import energy_of, law_of, mass_matrix
 from reference.linear_solvers import Kind
@@ -300,8 +300,9 @@ class MovingBody:
         diagonal = self.mass.petsc.getDiagonal()
         self._mass_diagonal = space.everywhere(diagonal.array).ravel()
         diagonal.destroy()
+        of_kinematics = FaceContact if self.law.linear else TurningContact
         closed = scene.contact.closed
-        self.contact = FaceContact(space, self._own_held) if closed else None
+        self.contact = of_kinematics(space, self._own_held) if closed else None
         self.pressure = np.zeros(0 if self.contact is None else len(self.contact.weights))
         self.pressure_before = self.pressure
         self.tie(np.zeros((0, 2), dtype=np.int64))
@@ -463,51 +464,27 @@ class MovingBody:
         matrix = self.ties.projected(self.law.tangent(u))
         solver = NodalSolver(matrix, self.ties, self.held, "symmetric")
         found = u + solver.solve(left)
-        found += self.press(found, solver, 1.0)[0]
+        if (faces := self.contact) is not None:
+            compliance = self.compliance(solver, faces.gaps)
+            gaps = faces.opened(found)
+            self.pressure_before = self.pressure = faces.pressed(gaps, compliance, self.ties.leader)
+            found += solver.solve(self.freed(faces.gaps.T @ self.pressure))
         solver.destroy()
         return found
 
-    def press(
-        self, displacement: Array, solver: NodalSolver | TiedSolver, share: float,
-        compliance: Array | None = None,
-    ) -> tuple[Array, Array, Array]:  # fmt: skip
-        """Find the pressures on faces that would overlap.
+    def freed(self, forces: Array) -> Array:
+        """Sum forces (k,) over ties, without those on what is held."""
+        right = self.ties.summed(forces).copy()
+        right[self.held] = 0.0
+        return right
 
-        Parameters
-        ----------
-        displacement : (k,) array
-            Without them, m.
-        solver : NodalSolver or TiedSolver
-            What it solves for, times `share`, is a displacement.
-        compliance : (m, m) array, optional
-            As it was found before with the same solver and share.
-
-        Returns
-        -------
-        correction : (k,) array
-            Of what the solver solves for.
-        forces : (k,) array
-            Of the pressures, N.
-        compliance : (m, m) array
-        """
-        faces, none = self.contact, np.zeros_like(displacement)
-        if faces is None:
-            return none, none, np.zeros((0, 0))
-
-        def free(forces: Array) -> Array:
-            right = self.ties.summed(forces).copy()
-            right[self.held] = 0.0
-            return right
-
-        if compliance is None:
-            compliance = share * faces.compliance(
-                lambda columns: np.column_stack([solver.solve(free(one)) for one in columns.T])
-            )
-        self.pressure_before = self.pressure
-        self.pressure, forces = faces.pressed(
-            faces.gaps @ displacement, compliance, self.ties.leader
+    def compliance(self, solver: NodalSolver | TiedSolver, gaps: Any) -> Array:
+        """Return the weighted gaps (m, m) of what a solver finds for unit pressures on faces."""
+        assert self.contact is not None
+        return self.contact.compliance(
+            lambda columns: np.column_stack([solver.solve(self.freed(one)) for one in columns.T]),
+            gaps,
         )
-        return (solver.solve(free(forces)) if forces.any() else none), forces, compliance
 
     def _first_loads(self) -> Array:
         """Sum the nodal forces (k,) of all loads with their first factors, N."""

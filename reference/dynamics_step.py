@@ -167,17 +167,51 @@ class Stepper:
         Their work over the step is p·(g₊ − g) with p·g₊ = 0, and g is not negative: contact never
         adds energy, whatever the step (C. Kane, E. A. Repetto, M. Ortiz, J. E. Marsden, Comput.
         Methods Appl. Mech. Engrg. 180, 1999).
+
+        Of a law that is not linear each iteration is one of Newton's method. The compliance S is
+        that of the factorisation: only the change of pressures is seen through it, so that an old
+        one does for as long as it contracts the residual.
         """
-        if self._solver is None:
-            self._factorise(start.displacement, self._end(start, a)[0])
-        assert self._solver is not None
-        share = self.size**2 * self.scheme.beta
-        more, contact, self._compliance = self.body.press(
-            self._end(start, a)[0], self._solver, share, self._compliance
-        )
-        self._load = self._load + contact
-        forces, _, _ = self._residual(start, a + more)
-        return a + more, replace(forces, contact=contact)
+        body, faces = self.body, self.body.contact
+        assert faces is not None
+        share, load = self.size**2 * self.scheme.beta, self._load
+        pressure, contact, last = np.zeros_like(body.pressure), np.zeros_like(load), np.inf
+        for _ in range(_MOST_ITERATIONS):
+            u = self._end(start, a)[0]
+            slopes = faces.slopes(start.displacement, u)
+            if self._solver is None:
+                self._factorise(start.displacement, u)
+            assert self._solver is not None
+            if self._compliance is None:
+                self._compliance = share * body.compliance(self._solver, slopes)
+            contact = slopes.T @ pressure
+            self._load = load + contact
+            forces, residual, norm = self._residual(start, a)
+            more = 0.0 if body.law.linear else self._solver.solve(residual)
+            gaps = faces.opened(self._end(start, a + more)[0]) - self._compliance @ pressure
+            new = faces.pressed(gaps, self._compliance, body.ties.leader)
+            change = body.freed(slopes.T @ (new - pressure))
+            left, scale = norm + float(np.linalg.norm(change)), self._scale(forces)
+            stuck = left > 0.1 * last
+            if left <= _TOLERANCE * scale or (stuck and left <= _GOOD_ENOUGH * scale):
+                break
+            a, pressure = a + more + self._solver.solve(change), new
+            if body.law.linear:
+                contact = slopes.T @ pressure
+                self._load = load + contact
+                forces = self._residual(start, a)[0]
+                break
+            if left > _SLOW * last:
+                self.close()
+            last = left
+        else:
+            raise RuntimeError(
+                f"contact in the step from {start.time:.6g} s by {self.size:.6g} s is not found: "
+                f"{left:.3g} N are left of forces of {scale:.3g} N; a smaller analysis.time_step "
+                "may help"
+            )
+        body.pressure_before, body.pressure = body.pressure, pressure
+        return a, replace(forces, contact=contact)
 
     def restart(self, state: State, forces: Array) -> None:
         """Give a state, of which something has jumped, an acceleration to go on with.

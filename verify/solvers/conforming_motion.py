@@ -366,7 +366,8 @@ class TiedMotion:
         forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
         if body.contact is not None:
-            forces += body.contact.gaps.T @ body.pressure
+            slopes = body.contact.slopes(state.displacement, state.displacement)
+            forces += slopes.T @ body.pressure
         if stiffness:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
         return forces
