@@ -97,13 +97,11 @@ class FaceContact:
         return np.asarray(self.gaps @ displacement)
 
     def slopes(self, before: Array, after: Array) -> csr_array:
-        """Return G (m, k) whose transpose passes pressures on over a step between two (k,)."""
+        """Return G (m, k): by its transpose pressures act on nodes, in a step between two (k,)."""
         del before, after  # normals do not turn
         return self.gaps
 
-    def compliance(
-        self, solve: Callable[[Array], Array], gaps: csr_array | None = None
-    ) -> Array:
+    def compliance(self, solve: Callable[[Array], Array], gaps: csr_array | None = None) -> Array:
         """Return S (m, m): the weighted gaps that unit pressures make, m² or m³ per Pa.
 
         Parameters
@@ -111,7 +109,7 @@ class FaceContact:
         solve : function of (k, c) arrays
             Gives displacements, zero where held, of columns of nodal forces.
         gaps : (m, k) csr_array, optional
-            In place of those of undeformed normals.
+            By default of undeformed normals.
         """
         gaps = self.gaps if gaps is None else gaps
         blocks = range(0, len(self.weights), _BLOCK)
@@ -139,12 +137,12 @@ class FaceContact:
 class TurningContact(FaceContact):
     """Gaps along normals that turn with the faces, at finite rotation.
 
-    Let F be the mean of the deformation gradients, of the corners alone, of the cells that have a
-    node of the facet. A tiny facet turns with its surroundings. Its deformed normal is that of
-    F⁻ᵀN, so that a jump D has the gap μ·FᵀD with μ = y/s, y = (FᵀF)⁻¹N, s = √(N·y): functions of
-    FᵀF and FᵀD. A discrete gradient by these gives forces that turn nothing, and whose work in a
-    step is pressure times change of the gap (O. Gonzalez, Comput. Methods Appl. Mech. Engrg. 190,
-    2000). `slopes` with the same displacement twice is the derivative of the gaps.
+    F is the mean deformation gradient, by their corners, of the cells that have a node of a facet:
+    a tiny facet turns with its surroundings. Its deformed normal is along F⁻ᵀN. So a jump D has
+    the gap μ·FᵀD with μ = y/s, y = (FᵀF)⁻¹N, s = √(N·y), functions of FᵀF and FᵀD. A discrete
+    gradient by these gives forces that turn nothing. Their work in a step is pressure times change
+    of the gap (O. Gonzalez, Comput. Methods Appl. Mech. Engrg. 190, 2000). `slopes` with the same
+    displacement twice is the derivative of the gaps.
     """
 
     def __init__(self, space: ConformingSpace, held: NDArray[np.int32]) -> None:
@@ -165,7 +163,7 @@ class TurningContact(FaceContact):
         around = _entries(np.ones(beside.shape), row, beside, (count, nodes)) @ has.tocsr()
         around.data[:] = measures(points)[around.indices]
         around = diags_array(1.0 / around.sum(axis=1)) @ around
-        # Fᵀ − I (p d d,) and D (p d,) of displacements (k,)
+        # give Fᵀ − I (p d d,) and D (p d,) of displacements (k,)
         self._mean = kron(kron(around, np.eye(d)) @ of_cells, np.eye(d)).tocsr()
         shares = np.stack([self._shares, -self._shares], axis=2).reshape(count, -1)
         self._jump = kron(_entries(shares, row, beside, (count, nodes)), np.eye(d)).tocsr()
@@ -186,7 +184,7 @@ class TurningContact(FaceContact):
         return np.bincount(self._row, gaps, minlength=self._shape[0])
 
     def slopes(self, before: Array, after: Array) -> csr_array:
-        """Return G (m, k), whose product with the change between two (k,) is that of the gaps."""
+        """Return G (m, k): times the change from one (k,) to another it is how gaps change."""
         (F0, D0, inverse0, y0, s0), (F1, D1, inverse1, y1, s1) = self._at(before), self._at(after)
         F, D, mu = 0.5 * (F0 + F1), 0.5 * (D0 + D1), 0.5 * (y0 / s0 + y1 / s1)
         along = 0.5 * (np.einsum("pak,pa->pk", F0, D0) + np.einsum("pak,pa->pk", F1, D1))

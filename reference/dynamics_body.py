@@ -473,13 +473,13 @@ class MovingBody:
         return found
 
     def freed(self, forces: Array) -> Array:
-        """Sum forces (k,) over ties, without those on what is held."""
+        """Sum forces (k,) over ties, and leave out the held unknowns."""
         right = self.ties.summed(forces).copy()
         right[self.held] = 0.0
         return right
 
     def compliance(self, solver: NodalSolver | TiedSolver, gaps: Any) -> Array:
-        """Return the weighted gaps (m, m) of what a solver finds for unit pressures on faces."""
+        """Return weighted gaps (m, m) of the answers of a solver to unit pressures on faces."""
         assert self.contact is not None
         return self.contact.compliance(
             lambda columns: np.column_stack([solver.solve(self.freed(one)) for one in columns.T]),

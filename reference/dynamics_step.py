@@ -168,9 +168,9 @@ class Stepper:
         adds energy, whatever the step (C. Kane, E. A. Repetto, M. Ortiz, J. E. Marsden, Comput.
         Methods Appl. Mech. Engrg. 180, 1999).
 
-        Of a law that is not linear each iteration is one of Newton's method. The compliance S is
-        that of the factorisation: only the change of pressures is seen through it, so that an old
-        one does for as long as it contracts the residual.
+        If the law is not linear these are iterations of Newton's method. The compliance belongs to
+        the factorisation. Only changes of pressures are seen through it: an old one does while it
+        contracts the residual.
         """
         body, faces = self.body, self.body.contact
         assert faces is not None

@@ -122,8 +122,8 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum``
     per step; the state of a body that is cut on the way, and the tie forces behind the cut
 `subdivision`
     the cut body as a conforming mesh
-`closing`
-    contact of the faces of cuts
+`closing`, `turning_faces`
+    contact of the faces of cuts; at finite rotation
 """
 
 from verify.xfem.arrays import XfemError

@@ -76,7 +76,7 @@ _SMOOTH = np.cos(np.pi / 6.0)  # a resolved arc turns by at most half a radian f
 class ClosingFaces:
     """Faces of the cuts of a body, which cannot overlap; linear kinematics.
 
-    `verify.xfem.turning_faces` has those of finite rotation.
+    At finite rotation: `verify.xfem.turning_faces`.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class ClosingFaces:
     normal : (f, d) float array
         Of each facet, out of the material that comes first in `nodes`.
     shapes : (f, q, 2 (d + 1)) float array
-        What the displacement jumps by, second side less first, by that of each node.
+        Jump of the displacement, second side less first, for a unit one of each node.
     gradients : (f, 2 (d + 1), d) float array
         Of the displacement, the mean of both sides, in 1/m; weighted as the stress.
     stress : (f, 2 (d + 1), d) float array

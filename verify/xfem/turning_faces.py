@@ -1,7 +1,7 @@
 """Contact of the faces of cuts in motion at finite rotation: normals turn with the faces.
 
-Let F be the mean of the deformation gradients on both sides of a facet, N the normal of the facet
-and Δ the jump of the displacement. With C = FᵀF and d = FᵀΔ the gap along the deformed normal
+F is the mean of the deformation gradients on both sides of a facet, N its undeformed normal and Δ
+the jump of the displacement. With C = FᵀF and d = FᵀΔ the gap along the deformed normal
 n ∝ F⁻ᵀN is
 
     g = n·Δ = m·d,   m = y/s,   y = C⁻¹N,   s = √(N·y).
@@ -10,25 +10,23 @@ It depends on C and d alone, which no rigid motion changes. The energy is the pe
 `verify.xfem.closing`, ∫ γ [g]₋²/2 dS over the undeformed faces, with the same γ. The mean of both
 sides is weighted as the stress is there: a sliver does not turn the normal of its neighbour.
 
-The force of a step is −p G with the pressure p at its end. G is a discrete gradient of g: with the
-means (bars) of both ends of the step, δ their difference, Fₘ and Δₘ the means of F and Δ, and
-r = ½ (1/s₀ + 1/s₁) d̄ − (d̄·ȳ) N / (s₀ s₁ (s₀ + s₁)),
+The force of a step is −p G with the pressure p at its end. G is a discrete gradient of g, with
+G·δu = δg. Bars and the index m are means of both ends of the step, δ is their difference:
 
-    δg = m̄·δd + d̄·δm = m̄·δd + r·δy,   δy = −C₁⁻¹ δC C₀⁻¹ N,
-    δC = Fₘᵀ δF + δFᵀ Fₘ,   δd = Fₘᵀ δΔ + δFᵀ Δₘ,
+    δg = m̄·δd + d̄·δm,   d̄·δm = r·δy,   r = ½ (1/s₀ + 1/s₁) d̄ − (d̄·ȳ) N / (s₀ s₁ (s₀ + s₁)),
+    δy = −C₁⁻¹ δC C₀⁻¹ N,   δC = Fₘᵀ δF + δFᵀ Fₘ,   δd = Fₘᵀ δΔ + δFᵀ Δₘ,
 
-without a quotient that is 0/0. So G·δu = δg. As the energy is convex in g the work of the force
-is at least the change of the energy: an impact gains nothing. C and d are quadratic in positions
-and invariant, so that G, taken in the middle of the step, turns nothing (Simo & Tarnow, ZAMP 43,
-1992; Gonzalez, Comput. Methods Appl. Mech. Engrg. 190, 2000): contact leaves the momentum of a body
-and its angular momentum as they are, whatever the step.
+without a quotient that is 0/0. As the energy is convex in g the work of the force is at least the
+change of the energy: an impact gains nothing. C and d are invariant and quadratic in positions. So
+G, taken in the middle of the step, turns nothing (Simo & Tarnow, ZAMP 43, 1992; Gonzalez, Comput.
+Methods Appl. Mech. Engrg. 190, 2000): momenta of a body stay, whatever the step.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Floats
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.block_pattern import BlockPattern, pattern_places
 from verify.xfem.closing import ClosingFaces
 from verify.xfem.element import Material
@@ -69,7 +67,7 @@ class TurningFaces(ClosingFaces):
 
     def __init__(self, phantom: PhantomMesh, material: Material) -> None:
         super().__init__(phantom, material, moving=True)
-        self._places: tuple[BlockPattern, Floats] | None = None
+        self._places: tuple[BlockPattern, Ints] | None = None
 
     def gaps(self, displacement: Floats) -> Floats:
         """Compute the gap g (f, q) in metres along the deformed normals; negative: overlap."""
@@ -92,8 +90,7 @@ class TurningFaces(ClosingFaces):
         """Compute G (f, q, 2 (d + 1), d) by displacements (N, d) at both ends of a step."""
         first, last = self._at(before), self._at(after)
         F, jump = 0.5 * (first.F + last.F), 0.5 * (first.jump + last.jump)
-        m, d, y = (0.5 * (a + b) for a, b in zip((first.m, first.d, first.y),
-                                                 (last.m, last.d, last.y), strict=True))  # fmt: skip
+        m, d, y = 0.5 * (first.m + last.m), 0.5 * (first.d + last.d), 0.5 * (first.y + last.y)
         share = 0.5 * (1.0 / first.s + 1.0 / last.s)
         fall = np.einsum("fqa,fa->fq", d, y) / (first.s * last.s * (first.s + last.s))
         r = share[..., None] * d - fall[..., None] * self.normal[:, None]
@@ -111,19 +108,19 @@ class TurningFaces(ClosingFaces):
     ) -> None:
         """Add γ ∇g ∇gᵀ, at the end of a step and where faces touch, to nodal blocks (B, d, d).
 
-        It has no negative mode. Beside the derivative of the force it leaves out the turn of G, of
-        the order of p g, and that G is of the middle of the step.
+        It has no negative mode. It is not all of the derivative: G turns, which is as small as the
+        gap, and is of the middle of the step.
         """
         del before
         if self._places is None or self._places[0] is not pattern:
             rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
             found = pattern_places(pattern, rows.ravel(), columns.ravel())
-            self._places = pattern, found.reshape(rows.shape)
+            self._places = pattern, found
         space = blocks.shape[1]
         slopes = self.slopes(after, after)
         share = self.weights * self.stiffness[:, None] * self.touching(after)
         added = np.einsum("fq,fqia,fqjb->fijab", share, slopes, slopes).reshape(-1, space**2)
-        places = self._places[1].ravel()
+        places = self._places[1]
         for k, entries in enumerate(added.T):
             blocks.reshape(len(blocks), -1)[:, k] += np.bincount(places, entries, len(blocks))
 
