@@ -155,13 +155,13 @@ class Stepper:
         self._tie = self._over_step(self.body.tie_forces.at, start.time)
         a, forces = self._solved(start, self._first(start))
         if self.body.contact is not None:
-            a, forces = self._pressed(start, a)
+            a, forces = self._pressed(start, a, forces)
         state.displacement, state.velocity = self._end(start, a)
         state.acceleration, state.time = a, start.time + self.size
         self._travelled = state.displacement - start.displacement
         return forces
 
-    def _pressed(self, start: State, a: Array) -> tuple[Array, StepForces]:
+    def _pressed(self, start: State, a: Array, forces: StepForces) -> tuple[Array, StepForces]:
         """Add the pressures at the end of the step that keep faces from overlapping there.
 
         Their work over the step is p·(g₊ − g) with p·g₊ = 0, and g is not negative: contact never
@@ -176,6 +176,9 @@ class Stepper:
         assert faces is not None
         share, load = self.size**2 * self.scheme.beta, self._load
         pressure, contact, last = np.zeros_like(body.pressure), np.zeros_like(load), np.inf
+        if faces.opened(self._end(start, a)[0]).min(initial=0.0) == 0.0:  # none overlap
+            body.pressure_before, body.pressure = body.pressure, pressure
+            return a, forces
         for _ in range(_MOST_ITERATIONS):
             u = self._end(start, a)[0]
             slopes = faces.slopes(start.displacement, u)

@@ -329,6 +329,23 @@ def test_gaps_that_turn_are_objective_and_their_forces_turn_nothing(d, degree):
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)  # of second order
 
 
+@pytest.mark.fenicsx
+def test_the_pressure_at_the_start_of_a_motion_is_the_pressure_at_rest():
+    squeezed = [{"where": "bottom", "displacement": [0.0, 0.0]},
+                {"where": "top", "displacement": [0.0, -0.01]}]  # fmt: skip
+    given = {"contact": {"expected": "closed"}, "supports": squeezed,
+             "material": scenes.soft(density=1.0)}  # fmt: skip
+    rest = ConformingSolver().solve(scenes.scene(LINES[:1], **given), 0, 0)
+    motion = {"kind": "dynamic", "duration": 0.1, "outputs": 2}
+    initial = {"kind": "equilibrium", "cuts": "open"}
+    moving = scenes.scene(LINES[:1], analysis=motion, initial=initial, **given)
+    found = ConformingSolver().solve(moving, 0, 0)
+    assert rest.contact.pressure.max() > 0.005
+    np.testing.assert_allclose(
+        found.contact.pressure[0], rest.contact.pressure[0], rtol=1e-9, atol=1e-12
+    )
+
+
 SPINNING = ["-0.15*y - 0.02*x", "0.15*x"]
 HALF_TURN = ["-2*x", "-2*y"]
 
