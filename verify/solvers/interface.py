@@ -103,7 +103,7 @@ def refused_contact(solver: Any, scene: Scene) -> str | None:
 
     A solver offers contact by its attribute ``contact``: the analyses that have it, "static" and
     "dynamic", and of those that have it at finite rotation too "static finite_rotation" and
-    "dynamic finite_rotation"; "finite_rotation" is both. Of other laws than Hooke's none has it.
+    "dynamic finite_rotation"; "finite_rotation" is both.
     """
     if not scene.contact.closed:
         return None
@@ -114,8 +114,6 @@ def refused_contact(solver: Any, scene: Scene) -> str | None:
     asked = [analysis.kind, *(["static"] if begins and analysis.kind != "static" else [])]
     if analysis.kinematics != "linear":
         asked = [f"{kind} finite_rotation" for kind in asked]
-    if scene.material.model != "hooke":
-        asked.append(scene.material.model)
     where = " and ".join(f"'{word}'" for word in asked if word not in offered)
     name = getattr(solver, "name", type(solver).__name__)
     return f"contact of the faces of a cut ({where}) is not offered by {name}" if where else None

@@ -112,7 +112,7 @@ class ClosingFaces:
     Raises
     ------
     XfemError
-        If cells are aggregated, the body is a membrane, or its law not Hooke's.
+        If cells are aggregated, or the body is a membrane.
     """
 
     kinematics: Kinematics = "linear"
@@ -124,10 +124,10 @@ class ClosingFaces:
         cuts: Sequence[Cut] = (),
         moving: bool = False,
     ) -> None:
-        if phantom.aggregation is not None or phantom.mesh.is_membrane or material.law != "hooke":
+        if phantom.aggregation is not None or phantom.mesh.is_membrane:
             raise XfemError(
-                "contact of a body with aggregated cells, of a membrane or of another law than "
-                "Hooke's; expected a solid or plane body of its own unknowns"
+                "contact of a body with aggregated cells or of a membrane; expected a solid or "
+                "plane body of its own unknowns"
             )
         mesh = phantom.mesh
         self.phantom = phantom
