@@ -20,7 +20,7 @@ STRAIN = [[-1e-3, 0.0], [0.0, -1e-3]]
 UNIFORM = 1e-3 / (1.3 * 0.4)  # E ε / ((1+ν)(1−2ν))
 
 
-def measured(pressure, known=None, slide=0.0, cut=LINE):
+def measured(pressure, known=None, slide=0.0, cut=LINE, turn=None):
     """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain.
 
     Against the exact one, or another that is `known`. Its facets are the straight line.
@@ -40,13 +40,15 @@ def measured(pressure, known=None, slide=0.0, cut=LINE):
     cells = np.array([[0, 1, 4], [1, 5, 4], [6, 7, 3], [7, 2, 3]])
     moved = corners @ np.array(STRAIN)
     moved[[2, 3, 6, 7]] += slide * np.array([3.0, 1.0]) / np.sqrt(10.0)
+    if turn is not None:
+        moved = (corners + moved) @ turn.T - corners
     solution = Solution(corners, cells, moved[None], size=0.1, contact=contact,
                         cut_facets=corners[None, [4, 5]])  # fmt: skip
     body, law = body_of(scene), law_of(scene)
     rule = Rules(body, 0.1).on_cuts()
     known = known or exact_contact(exact_of(scene), law, rule, 0.0, "exact")
     field = SolutionMotion(solution, body).at()
-    found, notes = contact_metrics(solution, field, rule, known, 0.1)
+    found, notes = contact_metrics(solution, field, rule, known, 0.1, turn is not None)
     return {one.name: one for one in found}, notes, solution
 
 
@@ -78,6 +80,13 @@ def test_faces_that_slide_by_more_than_half_an_element_are_not_judged():
     assert notes["contact_pressure"].startswith("faces slide by 0.7 elements")
     little, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.03)
     assert little["contact_pressure"].value < 1e-12
+
+
+def test_faces_slide_as_far_in_a_body_that_has_turned():
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    slid, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.07, turn=quarter)
+    assert slid["contact_slip"].value == pytest.approx(0.7, rel=1e-9)
+    assert "contact_pressure" in notes
 
 
 def test_faces_of_a_curved_cut_slide_as_far_though_its_facets_are_off_it():

@@ -196,3 +196,19 @@ def test_contact_at_finite_rotation_is_of_motion(name):
     assert "('static finite_rotation') is not offered" in why
     begins = {**held, "initial": {"kind": "equilibrium", "cuts": "open"}}
     assert "('static finite_rotation')" in solver.refuses(spinning(**begins))
+
+
+@pytest.mark.parametrize("name", ["xfem", "conforming"])
+def test_strains_of_a_thousandth_in_space_press_as_in_linear_kinematics(name, tmp_path):
+    linear = colliding(tmp_path, 7)
+    analysis = linear.analysis.model_copy(update={"kinematics": "corotational"})
+    turning = linear.model_copy(update={"analysis": analysis})
+    one, other = (
+        find_solver(name).solve(scene, 0, 0, scheme="energy_momentum")
+        for scene in (linear, turning)
+    )
+    size = np.abs(one.displacement).max()
+    assert np.abs(other.displacement - one.displacement).max() < 5.0 * SPEED * size
+    forces = [found.contact.pressure @ found.contact.weights for found in (one, other)]
+    assert forces[0].max() > 0.5 * SPEED * 0.09  # ρ c v times the area
+    assert np.abs(forces[1] - forces[0]).max() < 0.02 * forces[0].max()

@@ -392,7 +392,8 @@ def _contact(
             last = float(one.solution.times[-1])
             truth = exact_contact(exact, one.law, rule, last, reference.source)
     size = compared_size(one.solution, one.body)
-    return contact_metrics(one.solution, one.field, rule, truth, size)
+    turns = one.scene.analysis.kinematics != "linear"
+    return contact_metrics(one.solution, one.field, rule, truth, size, turns)
 
 
 def _errors(

@@ -129,8 +129,9 @@ def stated_pressure(solution: Solution) -> Pressure:
 
 
 def contact_metrics(
-    solution: Solution, field: Field, rule: CutRule, truth: ContactTruth | None, size: float
-) -> tuple[list[Metric], dict[str, str]]:
+    solution: Solution, field: Field, rule: CutRule, truth: ContactTruth | None, size: float,
+    turns: bool = False,
+) -> tuple[list[Metric], dict[str, str]]:  # fmt: skip
     """Measure the contact of faces that a solution states.
 
     Parameters
@@ -143,6 +144,8 @@ def contact_metrics(
     truth : ContactTruth or None
     size : float
         Of its elements, m.
+    turns : bool
+        Whether normals turn with the faces.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def contact_metrics(
     contact = solution.contact
     if contact is None or not len(contact.weights):
         return [], {CONTACT_ERRORS[0]: "the solver states no pressure of contact"}
-    slip = _slip(contact, field, rule) / size
+    slip = _slip(contact, field, rule, turns) / size
     metrics = [Metric("contact_slip", slip, "1")]
     if slip >= _MOST_SLIP:
         why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
@@ -208,7 +211,7 @@ def _pressed(pressure: Array, weights: Array) -> NDArray[np.bool_]:
     return np.asarray(pressure > _PRESSED * (weights @ pressure) / weights.sum())
 
 
-def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
+def _slip(contact: ContactPressure, field: Field, rule: CutRule, turns: bool) -> float:
     """Compute the largest displacement along each other of faces that are together, m."""
     points = contact.points[_pressed(contact.pressure[-1], contact.weights)]
     if not len(points):
@@ -217,5 +220,6 @@ def _slip(contact: ContactPressure, field: Field, rule: CutRule) -> float:
     near = np.unique(cKDTree(rule.points).query(points)[1])
     beside = rule.reordered(near)
     jump = displacement_jump(field, beside)
-    jump -= np.sum(jump * beside.normals, axis=1)[:, None] * beside.normals
+    if not turns:  # else all of it: faces that are together have next to no gap
+        jump -= np.sum(jump * beside.normals, axis=1)[:, None] * beside.normals
     return float(np.linalg.norm(jump, axis=1).max())
