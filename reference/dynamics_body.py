@@ -301,7 +301,7 @@ class MovingBody:
         self._mass_diagonal = space.everywhere(diagonal.array).ravel()
         diagonal.destroy()
         of_kinematics = FaceContact if self.law.linear else TurningContact
-        closed = scene.contact.closed
+        closed = scene.contact.closed and len(space.mesh.cut_facets) > 0
         self.contact = of_kinematics(space, self._own_held) if closed else None
         self.pressure = np.zeros(0 if self.contact is None else len(self.contact.weights))
         self.pressure_before = self.pressure

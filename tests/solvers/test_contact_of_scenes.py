@@ -212,3 +212,26 @@ def test_strains_of_a_thousandth_in_space_press_as_in_linear_kinematics(name, tm
     forces = [found.contact.pressure @ found.contact.weights for found in (one, other)]
     assert forces[0].max() > 0.5 * SPEED * 0.09  # ρ c v times the area
     assert np.abs(forces[1] - forces[0]).max() < 0.02 * forces[0].max()
+
+
+@pytest.mark.parametrize("name, given", [("xfem", {}), ("conforming", {}),
+                                         ("conforming", {"mesh": "remeshed", "degree": 2})])  # fmt: skip
+def test_a_cut_that_opens_in_a_body_pressed_at_rest_stays_closed(name, given):
+    """Equilibrium of the whole body: without friction the faces slide by little, and bear it all."""
+    squeezed = [{"where": "bottom", "displacement": [0.0, 0.0]},
+                {"where": "top", "displacement": [0.0, -0.02]}]  # fmt: skip
+    scene = scenes.scene(
+        [{"kind": "polyline", "points": [[-0.1, 0.41], [1.1, 0.47]], "opens_at": 0.1}],
+        supports=squeezed, material=scenes.soft(density=1.0), contact={"expected": "closed"},
+        analysis={"kind": "dynamic", "kinematics": "finite_rotation", "duration": 0.6,
+                  "outputs": 4, "time_step": 0.05},
+        initial={"kind": "equilibrium"},
+    )  # fmt: skip
+    found = find_solver(name).solve(scene, 0, 0, scheme="energy_momentum", **given)
+    energy = found.ledger["kinetic"] + found.ledger["strain"]
+    assert energy.max() <= energy[0] * (1.0 + 1e-12)
+    force = found.contact.pressure @ found.contact.weights
+    # between a bar with free sides, E/(1 − ν²), and one whose sides are held, λ + 2μ
+    assert force[0] < 1e-15
+    assert force[1:].min() > 0.02 / (1.0 - 0.3**2) * 0.9
+    assert force[1:].max() < 0.02 * 1.35
