@@ -214,10 +214,12 @@ def test_strains_of_a_thousandth_in_space_press_as_in_linear_kinematics(name, tm
     assert np.abs(forces[1] - forces[0]).max() < 0.02 * forces[0].max()
 
 
-@pytest.mark.parametrize("name, given", [("xfem", {}), ("conforming", {}),
-                                         ("conforming", {"mesh": "remeshed", "degree": 2})])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, given",
+    [("xfem", {}), ("conforming", {}), ("conforming", {"mesh": "remeshed", "degree": 2})],
+)
 def test_a_cut_that_opens_in_a_body_pressed_at_rest_stays_closed(name, given):
-    """Equilibrium of the whole body: without friction the faces slide by little, and bear it all."""
+    """Equilibrium of the whole body: faces without friction slide by little, and bear it all."""
     squeezed = [{"where": "bottom", "displacement": [0.0, 0.0]},
                 {"where": "top", "displacement": [0.0, -0.02]}]  # fmt: skip
     scene = scenes.scene(
