@@ -11,7 +11,6 @@ import numpy as np
 from verify.xfem.arrays import Floats, XfemError
 from verify.xfem.body import (
     DynamicBody,
-    FreeMass,
     MotionState,
     RayleighDamping,
     StepForces,
@@ -77,7 +76,6 @@ class GeneralisedAlpha(NewtonIntegrator):
         self.weight = (1.0 - self.alpha_m) / self.beta
         check_no_contact(body, "generalised-α")
         super().__init__(body, step_size, solver)
-        self._mass = FreeMass(body)
         self.acceleration = np.zeros(body.shape)
         self._last: _End | None = None
 
@@ -126,7 +124,7 @@ class GeneralisedAlpha(NewtonIntegrator):
             held[body.fixed] = ((later - now) / self.step_size)[body.fixed]
         forces = before.external - before.internal - before.viscous - body.mass.apply(held)
         if body.damping.stiffness == 0.0 or self.alpha_m == self.alpha_f:
-            return held + self._mass.solve(forces)
+            return held + body.free_mass.solve(forces)
         forces[body.fixed] = 0.0
         found = self._correction(resistance, forces)
         return held + (1.0 - self.alpha_m) / (self.beta * self.step_size**2) * found

@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_array
 
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.block_pattern import BlockPattern, block_pattern
@@ -142,38 +141,6 @@ class AggregatedMass(Mass):
     def keeps_element_steps(self) -> bool:
         """Whether the step of the smallest uncut element is stable, whatever the cuts."""
         return self.of_corners.keeps_element_steps
-
-    def solve(self, forces: Floats) -> Floats:
-        """Compute M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
-        coupled, factor = self._coupled
-        found = forces / self.matrix.diagonal()[:, None]
-        if len(coupled):
-            found[coupled] = factor.solve(forces[coupled])
-        return found
-
-    @cached_property
-    def _coupled(self):
-        """Unknowns that the matrix couples, and the factor of their block."""
-        rows, columns, _ = self.entries
-        coupled = np.unique(rows[rows != columns])
-        if len(coupled) == 0:
-            return coupled, None
-        return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
-
-    def project(self, corner_values: Floats, held: Bools, values: Floats) -> Floats:
-        """Project corner values on the dof nodes (N, d) in the norm of the mass, except where held.
-
-        Of a velocity it keeps the linear and angular momentum of every part without a support.
-        """
-        moment = self.aggregation.restriction @ self.of_corners.apply(corner_values)
-        found = np.where(held, values, 0.0)
-        moment -= self.apply(found)
-        for axis in range(found.shape[1]):
-            free = np.flatnonzero(~held[:, axis])
-            if len(free):
-                factor = splu(csc_array(self.matrix[free][:, free]))
-                found[free, axis] = factor.solve(moment[free, axis])
-        return found
 
 
 def aggregate(

@@ -20,7 +20,6 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from verify.xfem.arrays import Bools, Floats, XfemError
 from verify.xfem.body import (
     DynamicBody,
-    FreeMass,
     MotionState,
     RayleighDamping,
     StepFailedError,
@@ -39,30 +38,22 @@ from verify.xfem.mesh import SimplexMesh
 class _Explicit:
     """Base of the schemes: accelerations of a body, and the end of a step."""
 
-    def __init__(self, body: DynamicBody, step_size: float, at_once: bool = False) -> None:
-        """Prepare a body and a step in seconds; or, at once, no step but an acceleration."""
+    def __init__(self, body: DynamicBody, step_size: float) -> None:
         # stiffness of contact over mass grows like 1/ε at a sliver of share ε: no step is stable
-        if not at_once:
-            check_no_contact(body, type(self).__name__)
+        check_no_contact(body, type(self).__name__)
         self.body = body
         self.step_size = check_step(step_size)
-        if body.moving and couples_supports(body) and not at_once:
+        if body.moving and couples_supports(body):
             raise XfemError(
                 "explicit step with moving supports whose nodes the mass couples to free ones; "
                 "use the side-wise mass, and hold slivers there on their own or keep them"
             )
-        self._mass = FreeMass(body)
 
     def _acceleration(
-        self, displacement: Floats, velocity: Floats, time: float, held: Floats | None = None
+        self, displacement: Floats, velocity: Floats, time: float
     ) -> tuple[Floats, StepForces]:
-        body = self.body
-        at = body.force.configuration(displacement)
-        internal, _ = body.force.evaluate_at(at)
-        if body.contact is not None:
-            internal += body.contact.force_of_step(displacement, displacement)
-        forces = StepForces(internal, body.external(time), body.viscous(velocity, at))
-        return self._mass.solve(forces.external - forces.internal - forces.viscous, held), forces
+        forces = self.body.balance(displacement, velocity, time)
+        return self.body.free_mass.solve(forces.unbalanced), forces
 
     def _finish(
         self, state: MotionState, displacement: Floats, velocity: Floats, time: float
@@ -97,9 +88,8 @@ def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
             "acceleration of a body whose mass couples free nodes to moving supports; expected "
             "supports that say their acceleration"
         )
-    return _Explicit(body, 1.0, at_once=True)._acceleration(
-        state.displacement, state.velocity, state.time, held
-    )[0]
+    forces = body.balance(state.displacement, state.velocity, state.time)
+    return body.free_mass.solve(forces.unbalanced, held)
 
 
 class CentralDifferences(_Explicit):

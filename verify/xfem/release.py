@@ -28,7 +28,7 @@ import numpy as np
 
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError
-from verify.xfem.body import DynamicBody, FreeMass, MotionState, check_state
+from verify.xfem.body import DynamicBody, MotionState, check_state
 from verify.xfem.mesh import cells_at
 from verify.xfem.phantom import PhantomMesh
 
@@ -61,8 +61,9 @@ def inherit_state(
         return MotionState(displacement, velocity, state.time)
     if body is None or body.force.phantom is not new or not isinstance(body.mass, AggregatedMass):
         raise XfemError("state of a body with aggregated cells; expected that body with its mass")
-    own = new.node_corner
-    velocity = body.mass.project(velocity, body.fixed, velocity[own])
+    own, mass = new.node_corner, body.mass
+    moment = mass.aggregation.restriction @ mass.of_corners.apply(velocity)
+    velocity = body.free_mass.solve(moment, np.where(body.fixed, velocity[own], 0.0))
     return MotionState(displacement[own], velocity, state.time)
 
 
@@ -232,7 +233,7 @@ class TieForces:
 
 def acceleration_at_corners(body: DynamicBody, state: MotionState) -> Floats:
     """Return the acceleration (N_corners, d) of a body at its corners, of supports where held."""
-    found = FreeMass(body).solve(-_resisting(body, state), body.held_acceleration(state.time))
+    found = body.free_mass.solve(-_resisting(body, state), body.held_acceleration(state.time))
     return body.force.phantom.extend(found)
 
 
