@@ -30,6 +30,9 @@ _MOST = 10_000  # iterations where there is no memory for a factor
 class SolverByCost(LinearSolver):
     """Solver of K x = b, first iterative and direct from the first solution that takes too long.
 
+    A matrix that comes back, as in linear motion, is factorised too, once its solutions have taken
+    as many iterations together.
+
     Parameters
     ----------
     pattern : BlockPattern
@@ -65,6 +68,8 @@ class SolverByCost(LinearSolver):
         many = int(_ACROSS * pattern.node_count ** (1 / 3)) if self._waits else 0
         self._iterative = ConjugateGradients(pattern, block, tolerance, max(_MANY, many))
         self._matrices, self._is_analysed = 0, False
+        self._spent = 0  # iterations with this matrix
+        self._turned_for_one = False  # to a factorisation, because a matrix came back
 
     def learn(self, former: LinearSolver) -> None:
         """Iterate as often as a former one was allowed to, or factorise at once if it did so."""
@@ -103,7 +108,9 @@ class SolverByCost(LinearSolver):
 
     def factorize(self, blocks: Floats) -> None:
         """Take the matrix; see `LinearSolver`. A single matrix is spared the analysis."""
-        self._blocks, self._matrices = blocks, self._matrices + 1
+        self._blocks, self._matrices, self._spent = blocks, self._matrices + 1, 0
+        self.is_iterative |= self._turned_for_one
+        self._turned_for_one = False
         if self._matrices == 2 and not (self._is_analysed or self._waits):
             self._analyse()
         if self.is_iterative:
@@ -115,10 +122,18 @@ class SolverByCost(LinearSolver):
     def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`. Iterations run out only if there is no room for a factor."""
         x = np.zeros(np.shape(load)) if x is None else x
+        if self.is_iterative and self._spent > self._iterative.limit:
+            if not self._is_analysed:
+                self._analyse()
+            if self._direct is not None and self._spent > self._iterative.limit:
+                self._turn()
+                self._turned_for_one = True
         while self.is_iterative:
             allowed = self._iterative.limit
             try:
-                return self._iterative.solve(load, x)
+                self._iterative.solve(load, x)
+                self._spent += self._iterative.iterations
+                return x
             except NotConvergedError:
                 if not self._is_analysed:
                     self._analyse()
@@ -130,7 +145,7 @@ class SolverByCost(LinearSolver):
         return self._direct.solve(load, x)
 
     def _turn(self) -> None:
-        """Factorise this matrix and all that follow."""
+        """Factorise this matrix."""
         assert self._blocks is not None
         assert self._direct is not None
         self.is_iterative = False
