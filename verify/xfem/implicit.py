@@ -25,7 +25,7 @@ _SLOW = 0.5  # of the residual: what a correction leaves that takes too little o
 _JUST = 1e-9  # of a step: more than the round-off of a time summed over some thousand steps
 _INEXACT = 1e-6  # residual of conjugate gradients for a correction without a former one
 _COARSE, _FINE = 1e-2, 1e-10  # most and least of it
-_SPARE = 0.2  # of the residual expected after the correction: conjugate gradients may leave it
+_SPARE = 0.05  # of the residual expected after the correction: conjugate gradients may leave it
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
 
