@@ -168,3 +168,19 @@ def test_what_it_takes_depends_on_the_size_the_shape_and_the_step(divisions, ste
     after = RealTimeEuler(body, step)  # as after a cut: what was found is not found again
     after.follow(scheme, np.arange(body.shape[0]))
     assert after.solver.is_iterative == iterates
+
+
+@pytest.mark.parametrize("divisions", [(30, 4), (9, 5, 4)])
+def test_a_matrix_that_comes_back_is_factorised_once_its_iterations_have_cost_as_much(divisions):
+    """Linear motion has one matrix; with another step the next one begins by iterations again."""
+    body = _body(divisions, kinematics="linear")
+    scheme, found = _moved(Trapezoidal, body, 0.005, 1)
+    assert scheme._solver.is_iterative
+    for _ in range(29):
+        scheme.step(found)
+    assert not scheme._solver.is_iterative
+    _, wanted = _moved(Trapezoidal, body, 0.005, 30, solver=_cholesky(body))
+    size = np.abs(wanted.displacement).max()
+    assert found.displacement == pytest.approx(wanted.displacement, abs=1e-8 * size)
+    scheme._solver.factorize(scheme._blocks)
+    assert scheme._solver.is_iterative

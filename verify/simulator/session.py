@@ -71,13 +71,13 @@ class StepRecord:
     delay : (k,) float array
         Of the elements split in this step: from the first edge that the tool passed to the last
         one, s of the scene (Table 4.6).
-    kinetic, strain : float
+    kinetic : float
         J (in the plane per metre of thickness).
     potential : float
         Of the weight, J.
-    work : float
-        Done on the body by hooks, supports and the tool since the start, J; NaN where no account
-        is kept.
+    strain, work : float
+        Energy, and what hooks, supports and the tool have done on the body since the start, J; NaN
+        where no account is kept.
     dissipated : float
         By damping and by the scheme since the start, J; likewise.
     cut_work : (strokes,) float array
@@ -447,7 +447,7 @@ class Session:
             unknowns=int(np.prod(body.shape)),
             delay=delay,
             kinetic=kinetic,
-            strain=float(body.force.evaluate(state.displacement)[1]),
+            strain=self._ledger.strain if self._account else np.nan,
             potential=-float(np.sum(body.weight * state.displacement)),
             work=float(work),
             dissipated=float(lost),

@@ -87,12 +87,17 @@ class BalanceRecorder:
     body : DynamicBody
     state : MotionState
         Where the record starts.
+
+    Attributes
+    ----------
+    strain : float
+        Strain energy at the last entry, J.
     """
 
     def __init__(self, body: DynamicBody, state: MotionState) -> None:
         self.body = body
         self._last = state.copy()
-        self._strain, self._penalty = self._stored(state)
+        self.strain, self._penalty = self._stored(state)
         space = body.shape[1]
         self._work = np.zeros(6)  # load, support, damping, algorithmic, unbalanced, cut
         self._impulse = np.zeros(space)
@@ -134,14 +139,14 @@ class BalanceRecorder:
             np.sum(change * (forces.external - body.weight - tie)),
             np.sum(change * reaction) - taken,
             np.sum(change * forces.viscous),
-            slip - taken + np.sum(change * forces.internal) - (strain - self._strain),
+            slip - taken + np.sum(change * forces.internal) - (strain - self.strain),
             np.sum(change * (residual - reaction)),
             -np.sum(change * tie),
         ]
         self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(
             axis=0
         )
-        self._last, self._strain = state.copy(), strain
+        self._last, self.strain = state.copy(), strain
         self._rows.append(self._row(state))
 
     def _stored(self, state: MotionState) -> tuple[float, float]:
@@ -160,7 +165,7 @@ class BalanceRecorder:
         energies = [
             state.time,
             0.5 * np.sum(state.velocity * momenta),
-            self._strain,
+            self.strain,
             -np.sum(body.weight * state.displacement),
         ]
         angular = _cross(position, momenta)
