@@ -113,7 +113,7 @@ class Pieces:
 
 def size_of(boundary: Array) -> float:
     """Size of a body by the facets (b, k, d) of its boundary: the longest side of its box, m."""
-    return float(np.ptp(boundary.reshape(-1, boundary.shape[2]), axis=0).max(initial=0.0))
+    return max((float(np.ptp(x)) for x in np.moveaxis(boundary, 2, 0) if x.size), default=0.0)
 
 
 def pieces_on_part(
@@ -326,14 +326,19 @@ def held_facets(
     facet = np.arange(len(corners)) if facet is None else facet
     pieces = pieces_on_part(geometry, where, corners, boundary)
     k, size = corners.shape[1], size_of(boundary)
-    measure = measures(corners)
-    lengths = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _pairs(k)]
-    of_facet = np.bincount(facet, measure)
-    covered = np.bincount(facet, measure * pieces.covered(len(corners)))
-    reach, least = np.zeros(len(of_facet)), np.full(len(of_facet), _DEPTH * size)
-    np.maximum.at(reach, facet, np.max(lengths, axis=0))
+    count = int(facet.max(initial=-1)) + 1
+    reach, least = np.zeros(count), np.full(count, _DEPTH * size)
+    met = np.zeros(count, dtype=bool)
+    met[facet[pieces.facet]] = True
+    some = np.flatnonzero(met[facet])  # all others have nothing on the part
+    at, own = corners[some], facet[some]
+    measure = measures(at)
+    lengths = [np.linalg.norm(at[:, i] - at[:, j], axis=1) for i, j in _pairs(k)]
+    of_facet = np.bincount(own, measure, count)
+    covered = np.bincount(own, measure * pieces.covered(len(corners))[some], count)
+    np.maximum.at(reach, own, np.max(lengths, axis=0))
     if depth is not None:
-        np.maximum.at(least, facet, depth)
+        np.maximum.at(least, own, depth[some])
     least = np.minimum(least * reach ** (k - 2), 0.5 * of_facet)
     held = (covered > 0.0) & (covered >= least)
     ended = np.flatnonzero(held & (of_facet - covered > np.maximum(least, _COVERED * of_facet)))
@@ -400,11 +405,14 @@ def points_apart(
     scene: SceneTables, where: str, places: Array, held: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Tell which nodes (n,) of the boundary lie on a part where it holds none (n,) by a facet."""
-    _, place = np.unique(places, axis=0, return_inverse=True)
-    taken = np.zeros(len(places), dtype=bool)
-    taken[place.ravel()[held]] = True
     size = float(np.ptp(places, axis=0).max(initial=0.0))
-    return np.asarray(on_part(scene.geometry, where, places, size) & ~taken[place.ravel()])
+    found = np.array(on_part(scene.geometry, where, places, size))
+    on = np.flatnonzero(found)
+    _, place = np.unique(places[on], axis=0, return_inverse=True)
+    taken = np.zeros(len(on), dtype=bool)
+    taken[place.ravel()[held[on]]] = True
+    found[on] = ~taken[place.ravel()]
+    return found
 
 
 def _reach(corners: Array, pieces: Array) -> float:

@@ -456,7 +456,7 @@ def _boundary_parts(phantom: PhantomMesh) -> _BoundaryParts:
         unknowns.append(phantom.corner_node[phantom.cells[piece][:, rest]])
         nodes = mesh.points[mesh.cells[phantom.parent[piece]][:, rest]]
         longest = np.linalg.norm(nodes - np.roll(nodes, 1, axis=1), axis=2).max(axis=1)
-        sides = np.unique(np.column_stack([phantom.parent[piece], piece]), axis=0)[:, 0]
+        sides = phantom.parent[np.unique(piece)]
         divided = np.bincount(sides, minlength=len(mesh.cells))[phantom.parent[piece]] > 1
         diameter.append(np.where(divided, longest, 0.0))
     _, number = np.unique(np.concatenate(facet), return_inverse=True)
