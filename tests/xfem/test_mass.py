@@ -109,7 +109,9 @@ def _beside_nodes(dim, fraction, kernels=FAST):
     mesh = rectangle_mesh((5, 4)) if dim == 2 else box_mesh((4, 3, 3))
     node = mesh.points[np.argmin(np.linalg.norm(mesh.points - 0.5, axis=1))]
     point = node + fraction * np.eye(dim)[-1] / 4.0
-    v = xfem.cut_mesh(mesh, [Plane(point, [0.0, 0.0, 1.0][-dim:]), Plane([0.37] * dim, [1.0, 0.3, 0.2][:dim])])
+    v = xfem.cut_mesh(
+        mesh, [Plane(point, [0.0, 0.0, 1.0][-dim:]), Plane([0.37] * dim, [1.0, 0.3, 0.2][:dim])]
+    )
     held = xfem.Supports.none(v).prescribe(v, mesh.points[:, 0] == 0.0)
     held = held.prescribe(v, mesh.points[:, 1] == 0.0, components=[dim - 1])
     force = xfem.InternalForce(v, material(dim), kernels=kernels)
@@ -128,7 +130,10 @@ def test_accelerations_balance_the_forces_on_every_unknown_of_slivers_too(
     with D the diagonal, as masses of slivers weigh ε³. Where a component is held it does not move.
     """
     body = _beside_nodes(dim, fraction, kernels)
-    supports, random = [body.supports, xfem.Supports.none(body.force.phantom)], np.random.default_rng(5)
+    supports, random = (
+        [body.supports, xfem.Supports.none(body.force.phantom)],
+        np.random.default_rng(5),
+    )
     for iterates in (False, True):
         monkeypatch.setattr(body_in_motion, "_LARGE", 0 if iterates else 10_000)
         for held in supports:

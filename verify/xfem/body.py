@@ -532,4 +532,3 @@ def couples_supports(body: DynamicBody) -> bool:
         return False
     rows, columns, _ = body.mass.entries
     return bool((body.fixed[rows] & ~body.fixed[columns]).any())
-

@@ -109,7 +109,9 @@ class Mass:
         try:
             factor = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=_IN_ITS_ORDER)
         except RuntimeError as failure:
-            raise XfemError("mass singular to round-off, though scaled: a part too thin") from failure
+            raise XfemError(
+                "mass singular to round-off, though scaled: a part too thin"
+            ) from failure
         scale = scale[:, None]
         return lambda forces: scale * factor.solve(scale * forces)
 
