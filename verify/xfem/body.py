@@ -518,11 +518,11 @@ class FreeMass:
     def _inverses(self) -> list[tuple[list[int], Callable[[Floats], Floats]]]:
         """Components that are held at the same nodes, and what solves for them."""
         mass, fixed = self._body.mass, self._body.fixed
+        if mass.diagonal is not None or not fixed.any():
+            return [(list(range(fixed.shape[1])), mass.solve)]
         alike: dict[bytes, list[int]] = {}
         for component in range(fixed.shape[1]):
             alike.setdefault(fixed[:, component].tobytes(), []).append(component)
-        if mass.diagonal is not None or not fixed.any():
-            return [(list(range(fixed.shape[1])), mass.solve)]
         return [(some, mass.inverse_of(~fixed[:, some[0]])) for some in alike.values()]
 
 
