@@ -99,7 +99,8 @@ class NewtonIntegrator(ABC):
     ----------
     tolerance : float
         Of the residual force, over the largest of the forces that it balances, each force over the
-        mass of its node: what hangs on a sliver is solved for like the rest.
+        mass of its node, or its share of the volumes around it if that is more: what hangs on a
+        sliver is solved for like the rest.
     iterations : int
         Allowed per step; if they do not suffice the step fails rather than go on unsolved. Most
         take 2 to 4; where cells that are inside out stand up, it may be 50.
@@ -128,10 +129,11 @@ class NewtonIntegrator(ABC):
         self._solver = body.step_solver(_INEXACT) if solver is None else solver
         self._held = held_entries(body.pattern, body.fixed)
         self._mass_places = body.mass.places(body.pattern)
-        # a consistent mass has ε³ on the diagonal for a sliver whose weight is ε²: over the former
-        # that weight alone, 1/ε, would be the scale, beside which nothing else is left to solve
+        # at a node far from a sliver of size ε a consistent mass has ε⁴ on the diagonal and the
+        # weight ε³ where its stiffness is ε²: over the former these, 1/ε and more, would be the
+        # scale, beside which nothing else is left to solve. Over its share of volumes they are not
         mass = np.maximum(body.mass.matrix.diagonal(), body.mass.weights)
-        self._inverse_mass = (1.0 / mass)[:, None]
+        self._inverse_mass = (1.0 / np.maximum(mass, self._shared_mass()))[:, None]
         self._noise = self._round_off()
         self._factorised: tuple[float, RayleighDamping, bytes] | None = None
         self._left: list[float] = []  # of the residual by each correction of the last step
@@ -308,6 +310,13 @@ class NewtonIntegrator(ABC):
         """
         expected = self._left[number] if number < len(self._left) else _INEXACT / _SPARE
         return min(max(_FINE, _SPARE * max(expected, enough)), _COARSE)
+
+    def _shared_mass(self) -> Floats:
+        """Share the mass of the body among the corners of its pieces, by their volumes: (N,)."""
+        body, v = self.body, self.body.force.phantom
+        each = np.repeat(v.volumes / v.cells.shape[1], v.cells.shape[1])
+        shared = v.restrict(np.bincount(v.cells.ravel(), each)[:, None])[:, 0]
+        return np.asarray(body.mass.weights.sum() / shared.sum() * shared)
 
     def _round_off(self) -> Floats:
         """Bound the error (N, 1) of the acceleration of each node, for positions of size one."""
