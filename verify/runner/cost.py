@@ -32,8 +32,8 @@ _LEAST = {True: 1e-3, False: 3e-4}  # s of a step, however few the unknowns
 _FINENESS = {2: 12, 3: 4}  # elements over a body's extent on the first level of its reference
 _GRADED = {2: 3.0, 3: 1.5}  # times as many elements, where a reference is graded
 # of 81 levels of references of published runs, 72 had between 0.6 and 5 times as many unknowns;
-# more where cuts are near each other, fewer (0.55) where a mesh is fine everywhere
-_RANGE = (0.5, 5.0)
+# more where cuts are near each other, fewer (0.44) where a mesh is fine everywhere
+_RANGE = (0.4, 5.0)
 _TYPICAL = 1.6  # times as many: the middle of that range
 _DOUBT = 0.5  # s that a level may take more or less than by its unknowns, whatever it is
 _FACTOR = 3.0  # within which forecasts are expected
