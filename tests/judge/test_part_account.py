@@ -278,6 +278,39 @@ def test_a_part_that_a_support_holds_is_not_free():
     assert lower.drift
 
 
+@pytest.mark.parametrize("acting", ["support", "traction"])
+def test_a_part_is_not_free_though_what_acts_on_it_ends_inside_a_facet(acting):
+    """No node lies on a part of the boundary that is shorter than a facet, here 0.25 m."""
+    case, one = turning(loads=[])
+    narrow = "y > 1 - 1e-9 and x > 0.3 and x < 0.4"
+    change = {
+        "support": {"supports": [{"where": narrow, "displacement": [0.0, 0.0]}]},
+        "traction": {"loads": [{"kind": "traction", "where": narrow, "traction": [1.0, 2.0]}]},
+    }
+    content = case.model_dump(mode="json", by_alias=True) | change[acting]
+    _, (upper, lower), _, _ = accounted(Scene.model_validate(content), one)
+    assert upper.free_from is None
+    assert lower.drift["linear_momentum"] < 1e-13
+
+
+def test_momenta_that_damping_takes_are_no_drift():
+    """Of a free part that the drag α v slows: p' = m g − α p, and its spin falls off as fast."""
+    drag, g = 1.7, np.array([0.4, -9.8])
+    case, one = turning(loads=[{"kind": "gravity", "acceleration": g.tolist()}])
+    content = case.model_dump(mode="json", by_alias=True)
+    content["analysis"] = {**DYNAMIC, "kinematics": "linear", "damping": [drag, 0.0]}
+    centre, way = np.array([0.3, 0.2]), one.points - [0.3, 0.2]
+    turned = np.column_stack([-way[:, 1], way[:, 0]])
+    left = np.exp(-drag * TIMES)[:, None, None]
+    slowed = Solution(
+        one.points, one.cells, np.zeros_like(one.displacement), TIMES,
+        velocity=left * (turned + centre) + (1.0 - left) / drag * g,
+    )  # fmt: skip
+    _, _, found, _ = accounted(Scene.model_validate(content), slowed)
+    for kind in ("linear", "angular"):
+        assert found[f"part_{kind}_momentum_drift"].value < 1e-13
+
+
 def test_parts_whose_faces_may_press_on_each_other_are_not_free():
     """Halves that rebound have other momenta afterwards, and lose none."""
     case, one = turning()

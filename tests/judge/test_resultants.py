@@ -106,6 +106,42 @@ def test_a_clamp_that_is_cut_through_bears_the_load():
     assert list(values(scene).values()) == pytest.approx([*-LOAD, -MOMENT], abs=5e-4)
 
 
+def held_apart(start, end, supports, **more):
+    """The square, its top held on either side of a cut that comes through it."""
+    x = start[0] + (1.0 - start[1]) * (end[0] - start[0]) / (end[1] - start[1])
+    sides = [f"y > 1 - 1e-9 and x {sign} {x!r}" for sign in "<>"]
+    asked = [reaction(f"{i}{c}", at, c) for i, at in enumerate(sides) for c in "xy"]
+    asked += [moment(f"{i}m", at, "z", [0.2, 0.1]) for i, at in enumerate(sides)]
+    supports = [{"where": at} | one for at, one in zip(sides, supports, strict=True)]
+    return scenes.scene(
+        [{"kind": "polyline", "points": [start, end]}], supports=supports,
+        material=PLANE["material"], loads=PLANE["loads"][2:3], quantities=asked, **more,
+    )  # fmt: skip
+
+
+def test_supports_on_either_side_of_a_cut_bear_each_its_half():
+    """Each is in balance by itself; 0.2 % of the weight is what a clamp that is cut is off by."""
+    still, moved = {"displacement": [0.0, 0.0]}, {"displacement": [0.1, 0.05]}
+    scene = held_apart([0.37, -0.1], [0.57, 1.1], [still, moved], mesh={"cells": [[16, 16]]})
+    found, left = values(scene), 0.47  # its width in the middle
+    assert [found["0x"], found["0y"]] == pytest.approx([-0.3 * left, left], abs=2e-3)
+    assert [found["1x"], found["1y"]] == pytest.approx([-0.3 + 0.3 * left, 1 - left], abs=2e-3)
+    # a cut that ends inside: both together bear the weight, and turn as it turns
+    scene = held_apart([0.43, 0.4], [0.57, 1.1], [still, moved], mesh={"cells": [[16, 16]]})
+    found = values(scene)
+    total = [found[f"0{c}"] + found[f"1{c}"] for c in "xym"]
+    assert total == pytest.approx([-0.3, 1.0, 0.3 + 0.4 * 0.3], abs=2e-3)
+
+
+def test_supports_on_either_side_of_a_loaded_cut_have_no_reaction():
+    """What the load on a face does on the elements that one of them holds is not known."""
+    scene = held_apart([0.43, -0.1], [0.57, 1.1], [{"displacement": [0.0, 0.0]}] * 2)
+    content = scene.model_dump(mode="json", by_alias=True)
+    content["loads"].append({"kind": "cut_faces", "pressure": 0.01})
+    with pytest.raises(UnsupportedSceneError, match="another support begins at a cut"):
+        values(scenes.Scene.model_validate(content))
+
+
 SOLID = {
     "cuts": [{"kind": "polygon", "points": [[0.35, -0.1, 0.4], [0.78, -0.1, 0.55],
                                             [0.78, 1.1, 0.65], [0.35, 1.1, 0.5]]}],

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, diags_array, issparse
 from scipy.spatial import cKDTree
 
 from verify.compare.locate import ROUND_OFF
-from verify.compare.simplices import EDGES, cells_of, kept_with, nodes_of_facets, simplex_rule
+from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
 from verify.errors import InputError
 from verify.geometry.simplices import boundary_facets as alone
 from verify.geometry.simplices import connected_cells
@@ -316,15 +316,6 @@ def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
     """Compute the mass and inertia of given cells (c,), connected or not."""
     shape = cells_of(solution)
     return _part(cells, shape.corners, density * shape.volume)
-
-
-def boundary_nodes(solution: Solution) -> NDArray[np.bool_]:
-    """Tell whether nodes (n,) are corners of a facet of outer boundary, not of faces of cuts."""
-    cell, opposite = boundary_facets(solution)
-    found = np.zeros(len(solution.points), dtype=bool)
-    corners = solution.cells[:, : solution.cell_dimension + 1]
-    found[nodes_of_facets(corners[cell], opposite)] = True
-    return found
 
 
 def boundary_facets(solution: Solution) -> tuple[Ints, Ints]:

@@ -13,7 +13,6 @@ from verify.compare.locate import SolutionField
 from verify.compare.mass import (
     Kinetic,
     Part,
-    boundary_nodes,
     density_of,
     kinetic,
     part_of,
@@ -30,10 +29,11 @@ from verify.compare.motion_account import (
     total_energy,
     uniform_force,
 )
-from verify.errors import UnsupportedSceneError
+from verify.compare.outer_work import boundary_nodes_of_facets, nodes_held
+from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric, Notice, NoticeKind, PartRecord, SolveRecord
 from verify.scene import BodyForce, Gravity, PartQuantity, Scene, Traction
-from verify.scene.parts import on_part
+from verify.scene.parts import pieces_on_part
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -61,7 +61,8 @@ def part_records(scene: Scene, solution: Solution, account: MotionAccount) -> li
             series |= {"kinetic": motion.energy.tolist()}
             series |= momentum_components(motion.linear, motion.spin)
             if free and force is not None:
-                drift = _drift(account.times, motion, force, free_from)
+                drag = scene.analysis.damping[0]
+                drift = _drift(account.times, motion, force, drag, free_from)
         found.append(
             PartRecord(
                 part.mass, part.centre.tolist(), part.inertia.tolist(),
@@ -95,15 +96,21 @@ def momentum_components(linear: Array, angular: Array) -> dict[str, list[float]]
     return rows | {f"angular_momentum_{axes[k]}": row.tolist() for k, row in enumerate(angular.T)}
 
 
-def _drift(times: Array, motion: Kinetic, force: Array, start: float) -> dict[str, float]:
-    """Change of the momenta since `start`, s, over what they are small against when they cancel."""
+def _drift(
+    times: Array, motion: Kinetic, force: Array, drag: float, start: float
+) -> dict[str, float]:
+    """Change of the momenta since `start`, s, over what they are small against when they cancel.
+
+    Beside a force per mass (d,), and a drag (1/s) by which alone they would fall off in time.
+    """
     since = np.flatnonzero(times >= start - 1e-9 * float(np.ptp(times)))
     if len(since) < 2 or motion.linear_scale == 0.0:
         return {}
-    first, when = since[0], times[since]
-    impulse = motion.mass * (when - when[0])[:, None] * force
-    linear = motion.linear[since] - motion.linear[first] - impulse
-    spin = motion.spin[since] - motion.spin[first]
+    first, when = since[0], (times[since] - times[since[0]])[:, None]
+    left = np.exp(-drag * when)
+    impulse = motion.mass * (-np.expm1(-drag * when) / drag if drag else when) * force
+    linear = motion.linear[since] - left * motion.linear[first] - impulse
+    spin = motion.spin[since] - left * motion.spin[first]
     return {
         "linear_momentum": float(np.linalg.norm(linear, axis=1).max()) / motion.linear_scale,
         "angular_momentum": float(np.linalg.norm(spin, axis=1).max()) / motion.angular_scale,
@@ -116,15 +123,21 @@ def _all_open(scene: Scene) -> float:
 
 
 def _held(scene: Scene, solution: Solution) -> NDArray[np.bool_]:
-    """Tell whether nodes (n,) of the outer boundary are held, or pulled at."""
-    boundary = np.flatnonzero(boundary_nodes(solution))
-    held = np.zeros(len(solution.points), dtype=bool)
-    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
-    acting = [s.where for s in scene.supports]
-    acting += [load.where for load in scene.loads if isinstance(load, Traction)]
-    for where in acting:
-        held[boundary] |= on_part(scene.geometry, where, solution.points[boundary], size)
-    return held
+    """Tell whether nodes (n,) are held, or pulled at on the outer boundary."""
+    points, acted = solution.points, np.zeros(len(solution.points), dtype=bool)
+    try:
+        held = nodes_held(scene, solution, [support.where for support in scene.supports])
+    except InputError:  # of a body that is another one: of no part it is known
+        return ~acted
+    for nodes in held:
+        acted[nodes] = True
+    facets = boundary_nodes_of_facets(solution)
+    corners = points[facets[:, : solution.cell_dimension]]
+    for load in scene.loads:
+        if isinstance(load, Traction):
+            pulled = pieces_on_part(scene.geometry, load.where, corners).facet
+            acted[facets[pulled]] = True
+    return acted
 
 
 def motion_history(account: MotionAccount) -> dict[str, list[float]]:

@@ -18,12 +18,20 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
 from verify.compare.hooke import Corotated, Law, stress_power, viscous_power
 from verify.compare.locate import ROUND_OFF, Field, SolutionField
-from verify.compare.mass import consistent_mass, density_of, inertia_of, kinetic, separated_parts
+from verify.compare.mass import (
+    assembled,
+    consistent_mass,
+    density_of,
+    inertia_of,
+    kinetic,
+    separated_parts,
+)
 from verify.compare.motion import step_at
 from verify.compare.outer_work import (
     PrescribedNodes,
@@ -33,6 +41,7 @@ from verify.compare.outer_work import (
     spread,
     taken_up,
 )
+from verify.compare.simplices import EDGES, cells_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.geometry.simplices import measures
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
@@ -230,17 +239,63 @@ def _extended(form: WeakForm, own: Bools, held: Bools) -> Array:
     """Extend 1 (n, d) at components of nodes that a support holds: by 0, or smoothly.
 
     Where a cut meets the elements in which it would fall to 0, that is no test function of solvers
-    whose elements go on beyond a cut. There it ends as smoothly as the body is large.
+    whose elements go on beyond a cut. There it ends as smoothly as the body is large, as if the cut
+    were closed; or on each face by itself, if another support begins at it.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If it ends on each face by itself, and faces of cuts bear loads or press on each other.
     """
     found, solution = own.astype(float), form.solution
     nodes = own.any(axis=1)
-    layer = np.unique(solution.cells[nodes[solution.cells].any(axis=1)])
-    if not form.on_cut[layer].any():
+    if not _meets_cut(form, nodes):
         return found
     away = cKDTree(solution.points[nodes]).query(solution.points)[0]
     share = np.minimum(away / (_REACH * form.field.scale), 1.0)
     smooth = (1.0 - share) ** 2 * (1.0 + 2.0 * share)
-    return np.where(held, found, smooth[:, None])
+    others = (held & ~own)[:, own.any(axis=0)].any(axis=1) & (share < 1.0)
+    if not _meets_cut(form, others):
+        return np.where(held, found, smooth[:, None])
+    scene = form.scene
+    if scene.contact.closed or any(isinstance(load, CutFaces) for load in scene.loads):
+        raise UnsupportedSceneError(
+            "another support begins at a cut whose faces bear loads; expected one for both sides"
+        )
+    return _harmonic(form, own, held | (share == 1.0)[:, None])
+
+
+def _meets_cut(form: WeakForm, nodes: Bools) -> bool:
+    """Tell whether a cut meets the elements at some nodes (n,)."""
+    cells = form.solution.cells
+    return bool(form.on_cut[cells[nodes[cells].any(axis=1)]].any())
+
+
+def _harmonic(form: WeakForm, own: Bools, fixed: Bools) -> Array:
+    """Extend 1 (n, d) at own and 0 at other fixed components of nodes, with cuts open.
+
+    From s, of which each component is harmonic on the corners of cells, to 3s² − 2s³, which begins
+    and ends smoothly. It need not be accurate.
+    """
+    solution, found = form.solution, own.astype(float)
+    corners = solution.cells[:, : solution.cell_dimension + 1]
+    shape = cells_of(solution)
+    local = shape.gradients @ np.swapaxes(shape.gradients, 1, 2)
+    stiffness = assembled(shape.volume[:, None, None] * local, corners, len(found))
+    diagonal = stiffness.diagonal()
+    for s, held in zip(found.T, fixed.T, strict=True):
+        free = ~held & (diagonal > 0.0)
+        if s.any() and free.any():
+            scale = diags_array(diagonal[free] ** -0.5)
+            scaled = scale @ stiffness[free][:, free] @ scale
+            s[free] = scale @ cg(scaled.tocsr(), -(scale @ (stiffness[free] @ s)), rtol=1e-6)[0]
+    if solution.order == 2:
+        ends = np.array(EDGES[solution.cell_dimension])
+        middles = solution.cells[:, solution.cell_dimension + 1 :]
+        mean = found[corners[:, ends]].mean(axis=2)
+        found[middles] = np.where(fixed[middles], found[middles], mean)
+    found = np.clip(found, 0.0, 1.0)
+    return found**2 * (3.0 - 2.0 * found)
 
 
 @dataclass(frozen=True)
