@@ -26,7 +26,7 @@ from verify.errors import InputError
 from verify.geometry.simplices import nearest_cut
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.scene import Gravity, Scene, ToolPathCut
-from verify.scene.physics import PrescribedMotion, factor_at, first_factor
+from verify.scene.physics import CLOSE, PrescribedMotion, factor_at, first_factor
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -331,12 +331,13 @@ class MovingBody:
             total += factor_at(load.history, time) * self._forces(load, time)
         return total
 
-    def prescribed(self, time: float) -> tuple[Array, Array]:
-        """Return displacements and velocities (h,) of held unknowns, m and m/s."""
-        values, rates = [], []
-        for one in self._supports:
-            values.append(one.values(factor_at(one.support.history, time), time))
-            rates.append(one.velocities(time))
+    def prescribed(self, time: float, before: bool = False) -> tuple[Array, Array]:
+        """Return displacements and velocities (h,) of held unknowns, m and m/s.
+
+        After what jumps at a time, or before it.
+        """
+        values = [one.at(time, before) for one in self._supports]
+        rates = [one.velocities(time, before) for one in self._supports]
         return self._filled(values), self._filled(rates)
 
     def equilibrium(self) -> Array:
@@ -503,7 +504,8 @@ class MovingBody:
 
     def _found(self) -> list[_Held]:
         """Find what each support holds."""
-        space = self.space
+        space, duration = self.space, self.scene.analysis.duration
+        assert duration is not None
         found = []
         for i, support in enumerate(self.scene.supports):
             key = f"supports[{i}].where"
@@ -511,7 +513,8 @@ class MovingBody:
             held = list(support.held(space.dimension))
             exact = self.exact if support.displacement == "exact" else None
             place: Any = np.ix_(nodes, held)
-            found.append(_Held(support, space.node_points[nodes], near, exact, place))
+            points, close = space.node_points[nodes], CLOSE * duration
+            found.append(_Held(support, points, near, exact, place, close=close))
         return found
 
     def _filled(self, values: list[Array]) -> Array:

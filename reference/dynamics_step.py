@@ -254,7 +254,7 @@ class Stepper:
             far = h * start.velocity if self._travelled is None else self._travelled
         still = self._end(start, 0.0 * start.acceleration)[0]
         guess = start.displacement + far
-        guess[self.body.held] = self.body.prescribed(start.time + h)[0]
+        guess[self.body.held] = self.body.prescribed(start.time + h, before=True)[0]
         guess = start.displacement + share * (guess - start.displacement)
         return np.asarray((guess - still) / (h**2 * scheme.beta))
 

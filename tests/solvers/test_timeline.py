@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import scene
 
+from verify.solvers.interface import find_solver, parameters_in, solver_in
 from verify.solvers.runs import march, notes_of_steps, timeline_of
 
 OFF = 1e-10  # s, of a motion of one second: less than what steps added up are off by
@@ -132,3 +133,35 @@ def test_what_jumps_at_a_break_is_taken_up_once_and_after_an_output_then():
         "open", "begin", "output", "step", "step", "output", "begin", "step", "open", "begin",
         "step", "output",
     ]  # fmt: skip
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("solver", ["xfem", "xfem scheme=central_differences", "conforming"])
+@pytest.mark.parametrize("table", [[[0, 0], [0.5, 1], [1, 0.2]], [[0, 0], [0.5, 0.2], [0.5, 1]]])
+def test_a_kink_at_the_end_of_a_step_is_there_whatever_round_off_the_time_has(solver, table):
+    """Time × T and density × T² change nothing; 0.35 of 0.7 s lies beside its output time.
+
+    The output at a kink is what comes there: a pulled end still has its velocity of before.
+    """
+    found = {}
+    for time in (0.3, 0.7, 1.1):
+        moving = scene(
+            [{"kind": "polyline", "points": [[0.5, 0.4], [0.6, 1.1]]}],
+            material={"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 11.0 * time**2},
+            supports=[
+                {"where": "left", "displacement": [0.0, 0.0]},
+                {"where": "right", "displacement": [0.1, 0.05],
+                 "history": [[share * time, factor] for share, factor in table]},
+            ],
+            analysis={"kind": "dynamic", "duration": time, "time_step": time / 30, "outputs": 7},
+        )  # fmt: skip
+        mass = {"mass": "sidewise"} if "central" in solver else {}
+        one = find_solver(solver_in(solver)).solve(moving, 0, 0, **parameters_in(solver), **mass)
+        end = one.points[:, 0] == 1.0
+        assert one.velocity[3, end] * time == pytest.approx(
+            np.tile(np.multiply([0.1, 0.05], table[1][1] / 0.5), (end.sum(), 1)), abs=1e-3
+        )
+        found[time] = one.displacement, one.velocity * time, one.acceleration * time**2
+    for time in (0.7, 1.1):
+        for one, other in zip(found[time], found[0.3], strict=True):
+            np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-8 * np.abs(other).max())

@@ -1,7 +1,7 @@
 """Material, supports, loads, their factors in time, and the analysis of a scene. SI units."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import ceil
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
@@ -169,27 +169,33 @@ History = Annotated[
 _Table = Sequence[tuple[float, float]] | None
 
 
-def factor_at(history: _Table, time: float) -> float:
-    """Factor at a time, after a jump there; 1 without a history."""
+def factor_at(history: _Table, time: float, before: bool = False) -> float:
+    """Factor at a time, after a jump there, or before it; 1 without a history."""
     if history is None:
         return 1.0
     times, factors = np.array(history, dtype=float).T
-    last = int(np.searchsorted(times, time, side="right"))
+    last = int(np.searchsorted(times, time, side="left" if before else "right"))
     if last in (0, len(times)):
         return float(factors[min(last, len(times) - 1)])
     share = (time - times[last - 1]) / (times[last] - times[last - 1])
     return float((1.0 - share) * factors[last - 1] + share * factors[last])
 
 
-def slope_at(history: _Table, time: float) -> float:
-    """Rate of the factor at a time, 1/s; after a kink there."""
+def slope_at(history: _Table, time: float, before: bool = False) -> float:
+    """Rate of the factor at a time, 1/s; after a kink there, or before it."""
     if history is None:
         return 0.0
     times, factors = np.array(history, dtype=float).T
-    last = int(np.searchsorted(times, time, side="right"))
+    last = int(np.searchsorted(times, time, side="left" if before else "right"))
     if last in (0, len(times)):
         return 0.0
     return float((factors[last] - factors[last - 1]) / (times[last] - times[last - 1]))
+
+
+def knot_near(history: _Table, time: float, close: float) -> float:
+    """Return the time of a history that differs from one by at most `close`, s; else that one."""
+    nearest = min((t for t, _ in history or ()), key=lambda t: abs(t - time), default=time)
+    return nearest if abs(nearest - time) <= close else time
 
 
 def first_factor(history: _Table) -> float:
@@ -335,6 +341,8 @@ class Support(Strict):
         return speed
 
 
+# of the duration: times that differ by no more are one, as steps added up are off by less
+CLOSE = 1e-9
 _LAG = 1e-5  # of the duration: round-off of its differences is 1e-11, their own error 1e-10
 
 
@@ -352,12 +360,15 @@ class PrescribedMotion:
         None: the points themselves say it.
     exact : object or None
         The exact solution, where the support says ``"exact"``.
+    close : float
+        Times that differ by no more from one of the history are that, s.
     """
 
     support: Support
     points: Array
     near: Array | None
     exact: Any
+    close: float = field(default=0.0, kw_only=True)
 
     @property
     def moves(self) -> bool:
@@ -371,10 +382,16 @@ class PrescribedMotion:
             return self.support.values(self.points, factor, time)
         return factor * self._held(self.exact.at(time).displacement(self.points, self.near))
 
-    def velocities(self, time: float) -> Array:
-        """Prescribed velocity (k, held), m/s, at a time in s; after a kink there."""
+    def at(self, time: float, before: bool = False) -> Array:
+        """Prescribed displacement (k, held), m, at a time in s; after a jump there, or before."""
+        time = knot_near(self.support.history, time, self.close)
+        return self.values(factor_at(self.support.history, time, before), time)
+
+    def velocities(self, time: float, before: bool = False) -> Array:
+        """Prescribed velocity (k, held), m/s, at a time in s; after a kink there, or before."""
         history = self.support.history
-        factor, slope = factor_at(history, time), slope_at(history, time)
+        time = knot_near(history, time, self.close)
+        factor, slope = (of(history, time, before) for of in (factor_at, slope_at))
         if self.exact is None:
             return self.support.velocities(self.points, factor, slope, time)
         field = self.exact.at(time)

@@ -21,7 +21,7 @@ from verify.scene.parts import (
     points_apart,
     shifted_ends,
 )
-from verify.scene.physics import Load, PrescribedMotion, factor_at, first_factor
+from verify.scene.physics import CLOSE, Load, PrescribedMotion, first_factor
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import moduli_of
 from verify.xfem.body import MovingSupports
@@ -349,8 +349,9 @@ def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Suppor
         return Supports(fixed, values)
 
     def motion(time: float) -> tuple[_Floats, _Floats]:
-        where = [one.values(factor_at(one.support.history, time), time) for one in held]
-        speed = [one.velocities(time) for one in held]
+        before = time > held[0].close  # at the end of a step; a motion starts after what jumps
+        where = [one.at(time, before) for one in held]
+        speed = [one.velocities(time, before) for one in held]
         return _filled(phantom, held, where)[1], _filled(phantom, held, speed)[1]
 
     def acceleration(time: float) -> _Floats:
@@ -388,7 +389,7 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     """
     mesh, parts, corners = phantom.mesh, _boundary_parts(phantom), _own_corners(phantom)
     own = np.flatnonzero(corners & np.isin(phantom.node_parent, parts.boundary.nodes))
-    found = []
+    close, found = CLOSE * (scene.analysis.duration or 0.0), []
     for i, support in enumerate(scene.supports):
         mark = np.zeros(phantom.node_count, dtype=bool)
         if scene.geometry.holds_inside(support.where):
@@ -406,7 +407,7 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
         components = support.held(scene.dimension)
         field = exact if support.displacement == "exact" else None
         points, near = phantom.node_points[at], phantom.node_piece_points[at]
-        found.append(_Held(support, points, near, field, at, components))
+        found.append(_Held(support, points, near, field, at, components, close=close))
     return found
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.geometry.simplices import measures
 from verify.scene import Box, Rectangle, Scene, ToolPathCut, crossed_by_interfaces
-from verify.scene.physics import jumps
+from verify.scene.physics import CLOSE, jumps
 from verify.solution import Regularisation, Solution
 
 _Floats = NDArray[np.float64]
@@ -124,7 +124,6 @@ OPENINGS = {
 }
 
 _ROUND_OFF = 1e-14  # of a time that steps have added up to
-_CLOSE = 1e-9  # of the duration: times that close are one, steps added up are off by less
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ def timeline_of(scene: Scene, kinks: bool) -> Timeline:
     """Return the timeline of a dynamic scene; with or without `kinks` of histories."""
     outputs = np.array(scene.analysis.output_times)
     end = float(outputs[-1])
-    close = _CLOSE * end
+    close = CLOSE * end
 
     def snapped(times: Iterable[Any], to: _Floats) -> _Floats:
         given = np.array(list(times), dtype=float)
