@@ -119,7 +119,9 @@ class GeneralisedAlpha(NewtonIntegrator):
         """
         body, start, before = self.body, self._start, self._before
         held = np.zeros(body.shape)
-        if body.moving:
+        if (known := body.held_acceleration(start.time)) is not None:
+            held = known
+        elif body.moving:
             later, now = (body.prescribed(start.time + h)[1] for h in (self.step_size, 0.0))
             held[body.fixed] = ((later - now) / self.step_size)[body.fixed]
         forces = before.external - before.internal - before.viscous - body.mass.apply(held)

@@ -359,7 +359,10 @@ def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Suppor
         assert duration is not None
         return _filled(phantom, held, [one.accelerations(time, duration) for one in held])[1]
 
-    return MovingSupports(fixed, motion, acceleration)
+    def after(time: float) -> _Floats:
+        return _filled(phantom, held, [one.velocities(time) for one in held])[1]
+
+    return MovingSupports(fixed, motion, acceleration, after)
 
 
 def _filled(

@@ -233,7 +233,7 @@ class CutMotion:
 
     def __post_init__(self) -> None:
         scene, opening, record = self.scene, self.opening, self.record
-        self.timeline = timeline_of(scene, kinks=False)
+        self.timeline = timeline_of(scene, kinks=True)
         phases = (opening.phase, "loading", "initial state", "steps", "accounting")
         record.timings |= dict.fromkeys(phases, 0.0)
         with record.timed(opening.phase):
@@ -314,7 +314,13 @@ class CutMotion:
         return True
 
     def begin(self) -> None:
-        """Do nothing: integrators see what jumps by themselves, and are new at an opening."""
+        """Take up velocities of supports; integrators see other jumps by themselves."""
+        velocity = self.body.taken_up(self.state)
+        if velocity is not self.state.velocity:
+            shown = bool(self._instants) and self._instants[-1][0] == self._taken
+            self._recorder.take_up(velocity, again=not shown)
+            self.state.velocity[:] = velocity
+            self._integrators.clear()
 
     def put_out(self) -> None:
         """Keep the state, with its acceleration where that is to be had."""

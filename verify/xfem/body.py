@@ -93,11 +93,15 @@ class MovingSupports:
     acceleration : callable, optional
         (N, d) at a time, after what jumps then; read where fixed. A mass that couples nodes hands
         it on to free ones.
+    after : callable, optional
+        Velocity (N, d) at a time, after what jumps then, where `motion` has that of before; read
+        where fixed.
     """
 
     fixed: Bools
     motion: Callable[[float], tuple[Floats, Floats]]
     acceleration: Callable[[float], Floats] | None = None
+    after: Callable[[float], Floats] | None = None
 
     def at(self, time: float) -> tuple[Floats, Floats]:
         """Evaluate the prescribed displacement and velocity (N, d).
@@ -321,6 +325,19 @@ class DynamicBody:
         if not isinstance(supports, MovingSupports) or supports.acceleration is None:
             return None
         return np.where(self.fixed, supports.acceleration(time), 0.0)
+
+    def taken_up(self, state: MotionState) -> Floats:
+        """Compute the velocity (N, d) after supports have taken up theirs of after a time at once.
+
+        Free nodes have no impulse: where the mass couples them to held ones they move, too.
+        """
+        supports, velocity = self.supports, state.velocity
+        if not isinstance(supports, MovingSupports) or supports.after is None:
+            return velocity
+        change = np.where(self.fixed, supports.after(state.time) - velocity, 0.0)
+        if not change.any():
+            return velocity
+        return velocity + FreeMass(self).solve(np.zeros(self.shape), change)
 
     def external(self, time: float) -> Floats:
         """Sum weight, load and tie forces (N, d) at a time, in newtons.

@@ -149,6 +149,24 @@ class BalanceRecorder:
         self._last, self.strain = state.copy(), strain
         self._rows.append(self._row(state))
 
+    def take_up(self, velocity: Floats, again: bool) -> None:
+        """Enter that supports have taken up a velocity (N, d) at once: work of theirs.
+
+        Parameters
+        ----------
+        velocity : (N, d) float array
+            Of the body after that.
+        again : bool
+            Whether the last entry shall be of after that.
+        """
+        last = self._last
+        gained = self.body.mass.apply(velocity - last.velocity)
+        self._work[1] += 0.5 * np.sum((velocity + last.velocity) * gained)
+        self._impulse = self._impulse + gained.sum(axis=0)
+        self._last = MotionState(last.displacement, velocity.copy(), last.time)
+        if again:
+            self._rows[-1] = self._row(self._last)
+
     def _stored(self, state: MotionState) -> tuple[float, float]:
         """Compute the strain energy, and the share of a ghost penalty or of contact in it."""
         force = self.body.force
