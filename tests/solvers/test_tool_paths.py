@@ -16,6 +16,7 @@ from tool_path_scenes import (
     path_text,
 )
 
+from verify.compare.mass import separated_parts
 from verify.compare.motion_account import energy_scale, total_energy
 from verify.scene import load_scene
 from verify.solvers.body_of_scene import Openings
@@ -169,3 +170,21 @@ def test_a_method_is_cut_twice_and_its_parts_fall(tmp_path, method):
     # from 0.12 s on nothing holds the lower parts; before that they hung for a while
     assert (fallen < -0.5 * 9.8 * 0.25**2).all()
     assert (fallen > -0.5 * 9.8 * 0.4**2 * 1.1).all()
+
+@pytest.mark.parametrize("solver", ["xfem", "virtual_node"])
+@pytest.mark.parametrize("mesh", [PLANE, UNSTRUCTURED], ids=["regular", "free"])
+def test_a_blade_crosses_a_cut_that_opens_after_it_has_set_out(tmp_path, openings, solver, mesh):
+    """Cuts are kept in the order in which they set out; in some elements the later opens first.
+
+    What it leaves whole there is no longer divided by the other one, on whose side it lies.
+    """
+    slit = cut_text([-0.1, 0.31], [1.1, 0.36]) + 'name = "slit"\nopens_at = 0.07\n'
+    blade = path_text([[0.41, 0.8], [0.52, -0.1]], [0.05, 0.2], name="blade")
+    text = mesh + MOTION + SPUN % ("3.0", "[0.2, 0.1]") + weight_text() + slit + blade
+    found = solve_by(tmp_path, solver, text)
+    assert len(openings) >= 4
+    for _, (before, after) in openings:
+        for one, other in zip(before, after, strict=True):
+            np.testing.assert_allclose(other, one, rtol=0.0, atol=1e-12 * np.abs(one).max())
+    assert np.ptp(found.ledger["total"]) <= 1e-10 * found.ledger["kinetic"].max()
+    assert len(separated_parts(found, 1e3)) == 4

@@ -100,22 +100,44 @@ def ancestors(old: PhantomMesh, new: PhantomMesh) -> Ints:
 
 def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> Ints:
     """Find the piece (p,) of the old body of which each new piece is a part."""
-    starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
-    counts = np.diff(starts)
-    piece = starts[new.parent]
-    found = counts[new.parent] == 1
-    for k in range(counts.max(initial=0)):
-        # among several, the one that lies on the same side of every cut that made it
-        candidate = np.minimum(starts[new.parent] + k, len(old.parent) - 1)
-        valid = (k < counts[new.parent]) & ~found
-        label = old.label[candidate]
-        fits = ((label == 0) | (label == new.label[:, :cuts])).all(axis=1)
-        piece = np.where(valid & fits, candidate, piece)
-        found |= valid & fits
+    piece, found = _fitting(old, new.parent, new.label[:, :cuts])
+    if not found.all():
+        # a cut that opens earlier elsewhere may open later here: what it leaves whole of a piece is
+        # on one side of those that were open before, and no longer divided by them
+        rows = np.flatnonzero(~found)
+        sides = np.where(new.label == 0, _sides(new), new.label)[rows, :cuts]
+        piece[rows], found[rows] = _fitting(old, new.parent[rows], sides)
     if not found.all():
         where = int(new.parent[np.argmin(found)])
         raise XfemError(f"a piece of cell {where} is no part of any piece of the old body")
     return piece
+
+
+def _fitting(old: PhantomMesh, parent: Ints, sides: Ints) -> tuple[Ints, Bools]:
+    """Find for parts (q,) of cells the old piece on the same sides (q, cuts), and if there is."""
+    starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
+    counts = np.diff(starts)
+    piece = starts[parent]
+    found = counts[parent] == 1
+    for k in range(counts.max(initial=0)):
+        # among several, the one that lies on the same side of every cut that made it
+        candidate = np.minimum(starts[parent] + k, len(old.parent) - 1)
+        valid = (k < counts[parent]) & ~found
+        label = old.label[candidate]
+        fits = ((label == 0) | (label == sides)).all(axis=1)
+        piece = np.where(valid & fits, candidate, piece)
+        found |= valid & fits
+    return piece, found
+
+
+def _sides(phantom: PhantomMesh) -> Ints:
+    """Tell on which side (p, cuts) of each cut, ±1, the most of each piece lies."""
+    piece, barycentric, volume = phantom.solid_simplices
+    nodes = phantom.mesh.cells[phantom.parent[piece]]
+    middle = np.einsum("sn,snc->sc", barycentric.mean(axis=1), phantom.level_sets[nodes])
+    above = np.zeros(phantom.label.shape)
+    np.add.at(above, piece, volume[:, None] * np.sign(middle))
+    return np.where(above >= 0.0, 1, -1)
 
 
 @dataclass(frozen=True)
