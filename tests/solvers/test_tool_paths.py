@@ -171,6 +171,7 @@ def test_a_method_is_cut_twice_and_its_parts_fall(tmp_path, method):
     assert (fallen < -0.5 * 9.8 * 0.25**2).all()
     assert (fallen > -0.5 * 9.8 * 0.4**2 * 1.1).all()
 
+
 @pytest.mark.parametrize("solver", ["xfem", "virtual_node"])
 @pytest.mark.parametrize("mesh", [PLANE, UNSTRUCTURED], ids=["regular", "free"])
 def test_a_blade_crosses_a_cut_that_opens_after_it_has_set_out(tmp_path, openings, solver, mesh):
