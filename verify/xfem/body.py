@@ -94,7 +94,7 @@ class MovingSupports:
         (N, d) at a time, after what jumps then; read where fixed. A mass that couples nodes hands
         it on to free ones.
     after : callable, optional
-        Velocity (N, d) at a time, after what jumps then, where `motion` has that of before; read
+        Velocity (N, d) at a time after what jumps then, where `motion` has the one before; read
         where fixed.
     """
 
