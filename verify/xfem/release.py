@@ -23,8 +23,10 @@ are no part of r: they change with the space, not by the cut.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.xfem.aggregation import AggregatedMass
 from verify.xfem.arrays import Bools, Floats, Ints, XfemError
@@ -113,7 +115,7 @@ def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> Ints:
     return piece
 
 
-def _fitting(old: PhantomMesh, parent: Ints, sides: Ints) -> tuple[Ints, Bools]:
+def _fitting(old: PhantomMesh, parent: Ints, sides: NDArray[Any]) -> tuple[Ints, Bools]:
     """Find for parts (q,) of cells the old piece on the same sides (q, cuts), and if there is."""
     starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
     counts = np.diff(starts)
