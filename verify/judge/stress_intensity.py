@@ -92,9 +92,11 @@ def _defect_in_time(scene: Scene, asked: FractureQuantity) -> str | None:
         return f"at {time:.6g} s cut '{asked.cut}' has not opened yet (opens_at = {opens:.6g} s)"
     if min(abs(time - t) for t in scene.analysis.output_times) > slack:
         return f"{time:.6g} s is no output time, and accelerations are known at those only"
-    forces = [load.history for load in scene.loads if isinstance(load, BodyForce)]
-    if any(abs(time - t) <= slack for history in forces for t in jumps(history)):
-        return f"a body force jumps at {time:.6g} s, and with it every acceleration"
+    forces: list[BodyForce | CutFaces] = [x for x in scene.loads if isinstance(x, BodyForce)]
+    for load in [*forces, *_face_loads(scene, asked)]:
+        if any(abs(time - t) <= slack for t in jumps(load.history)):
+            what = load.kind.replace("_", " ")
+            return f"a load ({what}) jumps at {time:.6g} s, and with it accelerations at the tip"
     return None
 
 
