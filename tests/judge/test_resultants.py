@@ -236,6 +236,25 @@ def test_a_reaction_in_motion_has_the_inertia_in_it(solver):
     assert len(over_time["quantity_sx"]) == 5
 
 
+@pytest.mark.parametrize("kind", ["body_force", "traction"])
+def test_a_reaction_has_no_value_where_a_load_jumps(kind):
+    """By accelerations of before it and the load of after it was off by a tenth."""
+    force = {"body_force": {"force": [0.02, 0.05]},
+             "traction": {"where": "right", "traction": [0.01, 0.0]}}  # fmt: skip
+    load = {"kind": kind, "history": [[0.0, 0.2], [0.5, 0.2], [0.5, 1.0]]} | force[kind]
+    scene = scenes.scene(
+        material=scenes.soft(2, density=1.0), loads=[load],
+        supports=[{"where": "left", "displacement": [0.0, 0.0]}],
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.05, "outputs": 5},
+        quantities=[reaction("R", "left", "x", time=0.5)],
+    )  # fmt: skip
+    one = measured(scene)
+    with pytest.raises(UnsupportedSceneError, match=r"a load jumps at 0\.5 s"):
+        one.quantity(scene.quantities[0])
+    row = resultants_over_time(one.weak_form, scene.quantities)["quantity_R"]
+    assert np.isnan(row).tolist() == [False, False, True, False, False]
+
+
 def test_a_hanging_bar_bears_its_weight_and_the_weight_below():
     """No lateral contraction: the stress is that of the weight below; A = 2e-3, ρg = 9800.
 

@@ -47,7 +47,7 @@ from verify.geometry.simplices import measures
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction
 from verify.scene.acceptance import Quantity, ReactionQuantity, SectionQuantity, StressQuantity
 from verify.scene.parts import Pieces, clipped
-from verify.scene.physics import factor_at
+from verify.scene.physics import CLOSE, factor_at, jumps
 from verify.scene.placement import on_unit_sphere
 from verify.solution import Solution
 
@@ -149,9 +149,11 @@ class WeakForm:
         Raises
         ------
         UnsupportedSceneError
-            If a load follows an exact field.
+            If a load follows an exact field, or jumps then: of accelerations solvers say those of
+            before or of after.
         """
         time, found = float(self.solution.times[step]), np.zeros_like(self.solution.points)
+        close = CLOSE * float(np.ptp(self.solution.times))
         for load in self.scene.loads:
             if isinstance(load, Gravity):
                 pulled = np.asarray(load.acceleration)
@@ -165,6 +167,9 @@ class WeakForm:
                 assert isinstance(load, BodyForce | Traction)
                 if load.exact:
                     raise UnsupportedSceneError("a load follows an exact field")
+                if time > close and any(abs(time - t) <= close for t in jumps(load.history)):
+                    what = f"a load jumps at {time:.6g} s, and with it accelerations"
+                    raise UnsupportedSceneError(f"{what}; expected another output time")
                 clip = None if side is None else side.part_of
                 forces = nodal_forces(self.scene, load, self.solution, time, clip)
                 found += factor_at(load.history, time) * forces
@@ -380,16 +385,21 @@ def _check_section(form: WeakForm, beyond: Bools, rigid: Array) -> None:
 
 
 def resultants_over_time(form: WeakForm, asked: Sequence[Quantity]) -> dict[str, list[float]]:
-    """Values of reactions and sections at all output times, as ``quantity_NAME``; of those had."""
+    """Values of reactions and sections at all output times, as ``quantity_NAME``.
+
+    NaN at a time at which there is none; of those that are had at some.
+    """
     found = {}
     for one in asked:
         if isinstance(one, ReactionQuantity | SectionQuantity):
-            then = [one.model_copy(update={"time": float(time)}) for time in form.solution.times]
-            with suppress(InputError, UnsupportedSceneError):
-                found[f"quantity_{one.name}"] = [
-                    reaction(form, at) if isinstance(at, ReactionQuantity) else section(form, at)
-                    for at in then
-                ]
+            row = []
+            for time in form.solution.times:
+                at = one.model_copy(update={"time": float(time)})
+                row.append(np.nan)
+                with suppress(InputError, UnsupportedSceneError):
+                    row[-1] = (reaction if isinstance(at, ReactionQuantity) else section)(form, at)
+            if not np.isnan(row).all():
+                found[f"quantity_{one.name}"] = row
     return found
 
 
