@@ -334,6 +334,20 @@ def test_a_scene_says_the_rule_for_all_and_without_it_nothing_is_late(tmp_path, 
     assert "cut_work" not in find_solver("removal").solve(scene, 0, 0).ledger
 
 
+@pytest.mark.fenicsx
+def test_how_far_a_blade_goes_in_a_step_is_told_in_elements_on_its_way(tmp_path):
+    """The reference grades its mesh along a blade that ends inside: far from it they are larger."""
+    inside = path_text([[-0.1, 0.2], [0.7, 0.45]], [-0.05, 0.25])
+    (tmp_path / "graded.toml").write_text(
+        PLANE + MOTION + inside + support_text("top", [0, 0]) + "[reference]\nsize = 0.2\n"
+    )
+    found = find_solver("reference").solve(load_scene(tmp_path / "graded.toml"), 0, 0)
+    largest = np.linalg.norm(found.cut_facets[:, 1] - found.cut_facets[:, 0], axis=1).max()
+    share = float(found.notes["blade advance in a step"].split()[0])
+    assert share * largest == pytest.approx(np.hypot(0.8, 0.25) / 0.3 * 0.02, rel=0.05)
+    assert share > 0.5
+
+
 CASES = Path(__file__).parents[2] / "cases"
 
 

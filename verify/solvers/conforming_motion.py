@@ -23,6 +23,7 @@ from reference.fracture.cells import MIXED
 from reference.inside_out import naming_weak_places
 from reference.nodal_algebra import facing_nodes, lasting_ties
 from reference.space import ConformingSpace, conforming_space
+from verify.geometry.simplices import nearest_cut
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.tables import starts_open
 from verify.solution import ContactPressure
@@ -169,7 +170,8 @@ class TiedMotion:
             stepper.close()
         newton = sum(stepper.solves for stepper in self.steppers.values())
         record.iterations |= {"steps": sizes.total(), "newton": newton}
-        steps = notes_of_steps(self.scene, sizes, marching.name, CONSISTENT, marching.element)
+        element = self._along_blades()
+        steps = notes_of_steps(self.scene, sizes, marching.name, CONSISTENT, element)
         record.notes |= {**steps, "unknowns": self.unknowns}
         if self.halved:
             record.notes["steps in halves"] = f"{self.halved}, which were not solved as a whole"
@@ -187,6 +189,17 @@ class TiedMotion:
             "unknowns": self.space.node_points.size,
             "contact": self._contact(),
         }
+
+    def _along_blades(self) -> float:
+        """Find the largest element on the way of the blades, m: meshes are graded to their ends."""
+        corners = self.space.mesh.realised_cut
+        cuts = self.scene.final_cuts
+        blades = [isinstance(cut, ToolPathCut) for cut in self.scene.cuts]
+        if not any(blades) or not len(corners):
+            return self.marching.element
+        mine = np.array(blades)[nearest_cut(corners, [cut.pieces() for cut in cuts])]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)[mine]
+        return float(min(self.marching.element, edges.max(initial=0.0) or np.inf))
 
     def _contact(self) -> ContactPressure | None:
         if (faces := self.body.contact) is None:
