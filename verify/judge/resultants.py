@@ -397,7 +397,10 @@ def resultants_over_time(form: WeakForm, asked: Sequence[Quantity]) -> dict[str,
                 at = one.model_copy(update={"time": float(time)})
                 row.append(np.nan)
                 with suppress(InputError, UnsupportedSceneError):
-                    row[-1] = (reaction if isinstance(at, ReactionQuantity) else section)(form, at)
+                    if isinstance(at, ReactionQuantity):
+                        row[-1] = reaction(form, at)
+                    else:
+                        row[-1] = section(form, at)
             if not np.isnan(row).all():
                 found[f"quantity_{one.name}"] = row
     return found
