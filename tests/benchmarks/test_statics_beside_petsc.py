@@ -176,7 +176,7 @@ def seconds_in_turns(body, times):
 def test_a_cut_cube_costs_no_more_than_a_whole_one_by_multigrid(sizes, speed, capsys):
     """48, 197, 706 thousand, 1.5 million tetrahedra."""
     ours(cube(13)), ours(cube(22))  # compile: small bodies and large ones take other solvers
-    seconds = np.array([seconds_in_turns(cube(n), 3 if n < 30 else 1) for n in sizes])
+    seconds = np.array([seconds_in_turns(cube(n), 3) for n in sizes])
     ratios, cells = seconds[:, 0] / seconds[:, 1], 6 * np.array(sizes) ** 3
     own, peer = np.polyfit(np.log(cells), np.log(seconds), 1)[0]
     with capsys.disabled():
