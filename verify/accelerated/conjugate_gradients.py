@@ -121,7 +121,7 @@ class ConjugateGradients(LinearSolver):
         )  # fmt: skip
 
 
-_FUSED = {"contract"}  # multiply and add in one, rounded once
+FUSED = {"contract"}  # multiply and add in one, rounded once
 
 
 def upper_pattern(starts, columns, diagonal):
@@ -134,7 +134,7 @@ def upper_pattern(starts, columns, diagonal):
     return np.concatenate([[0], np.cumsum(count)]), columns[above].astype(np.uint32), above
 
 
-@njit(cache=True, fastmath=_FUSED)
+@njit(cache=True, fastmath=FUSED)
 def solve_upper(starts, columns, upper, inverse, p, t, e, u):
     """Find t = (D + Lᵀ)⁻¹ p, with e = Lᵀ t and u = D t = p − e.
 
@@ -166,7 +166,7 @@ def solve_upper(starts, columns, upper, inverse, p, t, e, u):
             t[row, k] = inverse[row, k, 0] * a + inverse[row, k, 1] * b + inverse[row, k, 2] * c
 
 
-@njit(cache=True, fastmath=_FUSED)
+@njit(cache=True, fastmath=FUSED)
 def solve_lower(starts, columns, upper, inverse, g, s):
     """Find s = (D + L)⁻¹ g; of g only D s is left.
 
@@ -217,7 +217,7 @@ def subtract_product(starts, columns, upper, diagonal, x, out):
 
 
 # sums in any order, over long flat vectors, where it lets the compiler use the vector unit
-_SUMS = {"reassoc", "contract", "nsz"}
+SUMS = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, error_model="numpy")
@@ -249,7 +249,7 @@ def invert_blocks(blocks, out):
     return -1
 
 
-@njit(cache=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=SUMS)
 def conjugate_gradients(
     starts, columns, upper, diagonal, inverse, is_zero, work, flat, target, limit
 ):

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from scipy.sparse import csr_array
 
-from verify.accelerated.conjugate_gradients import ConjugateGradients, solve_lower
+from verify.accelerated.conjugate_gradients import FUSED, SUMS, ConjugateGradients, solve_lower
 from verify.xfem.arrays import Bools, Floats, Ints, SingularStiffnessError
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.linear_solvers import SparseLU
@@ -192,10 +192,7 @@ def _coarse_pattern(starts: Ints, columns: Ints, part: Ints) -> tuple[BlockPatte
     return pattern, place[: len(columns)]
 
 
-_FUSED = {"contract"}
-
-
-@njit(cache=True, fastmath=_FUSED)
+@njit(cache=True, fastmath=FUSED)
 def add_product(starts, columns, upper, diagonal, x, out):
     """Add K x (N, 3) to `out`, with the diagonal blocks (N, 3, 3)."""
     for row in range(len(x)):
@@ -217,7 +214,7 @@ def add_product(starts, columns, upper, diagonal, x, out):
         out[row, 2] += c
 
 
-@njit(cache=True, fastmath=_FUSED)
+@njit(cache=True, fastmath=FUSED)
 def sweep_back(starts, columns, upper, inverse, g, t, w):
     """Find t = (D + Lᵀ)⁻¹ g and w = g + L t, all (N, 3), in one pass over the matrix.
 
@@ -267,11 +264,7 @@ def add_coarse(starts, columns, upper, diagonal, modes, place, own, out):
                         out[to, a, b] += modes[row, k, a] * half[k, b]
 
 
-# sums in any order, over long vectors, where it lets the compiler use the vector unit
-_SUMS = {"reassoc", "contract", "nsz"}
-
-
-@njit(cache=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=SUMS)
 def turn(t, w, p, q, beta):
     """Set p to t + β p and q to w + β q, and return p·q."""
     a, b, c, d = t.ravel(), w.ravel(), p.ravel(), q.ravel()
@@ -283,7 +276,7 @@ def turn(t, w, p, q, beta):
     return product
 
 
-@njit(cache=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=SUMS)
 def advance(x, r, p, q, alpha):
     """Add α p to x, take α q from r, and return r·r."""
     a, b, c, d = x.ravel(), r.ravel(), p.ravel(), q.ravel()
