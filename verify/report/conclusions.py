@@ -13,7 +13,7 @@ import numpy as np
 from verify.errors import InputError
 from verify.report.evidence import MEASURE, Beside, Evidence, beside, is_solid, moves
 from verify.report.notation import number
-from verify.result import REFERENCE, finest_of
+from verify.result import REFERENCE, CaseResult, finest_of
 
 # The cases C3 and C8 grant it to a method that cuts through elements.
 QUARTER = 1.25
@@ -136,8 +136,9 @@ def _weighed(
         won=won, lost=lost, scenes=won + tied + lost,
     )  # fmt: skip
     if own.scatter is not None:
-        untold = "; the scene decides." if own.contradicted else ", not told apart."
-        text += own.over_positions + ("." if shown else untold)
+        untold = "" if len(own.by_scene) == 2 else ", not told apart"
+        untold = "; the scene decides" if own.contradicted else untold
+        text += f"{own.over_positions}{'' if shown else untold}."
     return Found(text, own.written, needs, not side or shown in (0, side))
 
 
@@ -153,20 +154,22 @@ def _tip_functions(evidence: Evidence) -> Found | None:
                  own.ratio <= 1 / QUARTER and own.scatter[2] < 1.0)  # fmt: skip
 
 
-def _moving_in_space(evidence: Evidence) -> Found | None:
-    """Say how large XFEM's error is in cut solids; a slab of one layer is none."""
+def _in_solids(
+    results: Sequence[CaseResult], by: Callable[[str], bool], words: str, source: str
+) -> Found | None:
+    """Say how large a solver's error is in cut solids in motion; a slab of one layer is none."""
     found = [
         (one.value, one.uncertainty, solve.unknowns, result.case)
-        for result in evidence.results
+        for result in results
         if moves(result) and result.scene["cuts"] and is_solid(result.scene)
         for solve in finest_of(s for s in result.solves if s.metric("displacement_l2")).values()
-        if solve.solver == "xfem" and solve.unknowns and (one := solve.metric("displacement_l2"))
+        if by(solve.solver) and solve.unknowns and (one := solve.metric("displacement_l2"))
     ]
     told = [error for error, half, _, _ in found if error > half]
     if len(told) < FEWEST:
         return None
     least, most = (number(100 * v, 2) for v in (min(told), max(told)))
-    text = f"In {len(told)} cut solids in motion XFEM's error is {least} to {most} %"
+    text = words.format(len(told), f"{least} to {most} %")
     doubted = ", ".join(
         f"{name} below {number(100 * (error + half), 2)} %"
         for error, half, _, name in found if error <= half
@@ -177,7 +180,22 @@ def _moving_in_space(evidence: Evidence) -> Found | None:
         for error, half, unknowns, name in found
     )
     needs = f"at least {FEWEST} errors larger than the half-width of their reference"
-    return Found(text, numbers, needs, True)
+    return Found(text, numbers, needs, True, source)
+
+
+def _moving_in_space(evidence: Evidence) -> Found | None:
+    return _in_solids(
+        evidence.results, lambda name: name == "xfem",
+        "In {} cut solids in motion XFEM's error is {}", "arena",
+    )  # fmt: skip
+
+
+def _by_frames(evidence: Evidence) -> Found | None:
+    """Say how wrong the step of the real-time engine is at 60 steps a second."""
+    return _in_solids(
+        evidence.frames, lambda name: "scheme=real_time" in name,
+        "There the engine's step, 60 a second, is wrong by {1}", "frames",
+    )  # fmt: skip
 
 
 def _real_time(evidence: Evidence) -> Found | None:
@@ -242,16 +260,16 @@ def _step_kept(evidence: Evidence) -> Found | None:
     _, size, least = found[0]
     text = (
         "XFEM with a mass lumped on each side of the cut: through cuts leave "
-        f"{number(least, 3)} of the uncut body's step, however close to nodes"
+        f"{number(least, 3)} of the uncut body's step in two families, however close to nodes"
     )
     moved = [
         float(row["value"]) for row in evidence.claims
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
-    text += f", and at least {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
+    text += f", and {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
     text += (
-        "; never less than the smallest uncut element's. [Ends of cuts](../theory/xfem.md) leave "
-        "less."
+        ". The bound is the smallest uncut element's step; [ends of cuts](../theory/xfem.md) "
+        "leave less of the body's."
     )
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
@@ -341,11 +359,12 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("motion, remeshed", "XFEM beside remeshing on three such scenes", partial(
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
             factor=QUARTER, words=(
-             "Beside a new mesh for each cut it is more accurate, {} times its error.",
-             "Its error is {} times that of a new mesh for each cut.",
-             "Beside a new mesh for each cut it is less accurate, {} times its error."))),
+             "Beside a mesh made for its cuts it is more accurate, {} times its error.",
+             "Its error is {} times that of a mesh made for its cuts, to which no state moves.",
+             "Beside a mesh made for its cuts it is less accurate, {} times its error."))),
         Sentence("motion in space", "errors of XFEM on three moving scenes in space",
                  _moving_in_space),
+        Sentence("frames", "errors of the engine's step in such scenes", _by_frames),
         Sentence("real time", "a blade in real time (`verify study thesis`)", _real_time),
         Sentence("sofa", "real time beside SOFA (`make bench`)", _sofa),
     ),
@@ -360,7 +379,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("remeshed", "remeshing, on several positions of the mesh", partial(
             _weighed, kind="rest", metric="displacement_l2", solver=_REMESHED, rival="xfem",
             factor=QUARTER, words=tuple(
-                f"{lead}: with a new mesh for each cut the error is {{}} times XFEM's."
+                f"{lead}: on a mesh made for the cuts the error is {{}} times XFEM's."
                 for lead in (
                     "Remesh for accuracy at rest",
                     "Remeshing gains accuracy in {won} of {scenes} scenes at rest, loses it in "

@@ -40,12 +40,14 @@ class Evidence:
         As in `verify.result.Ranking`.
     positions, benchmark_positions, slivers, claims, speed : list of dict
         Rows of their tables; empty if there are none.
+    frames : list of CaseResult
+        Cut solids in motion by the step of the real-time engine.
     hand : dict
         Steps of the real-time engine in the thesis study; empty if there are none.
     commands : dict of str to str
         By run or study; a missing entry has none.
     tips : frozenset of str
-        Scenes of the positions study in which a cut ends inside the body.
+        Scenes of both studies of positions in which a cut ends inside the body.
     """
 
     results: list[CaseResult]
@@ -57,6 +59,7 @@ class Evidence:
     slivers: list[Row] = field(default_factory=list)
     claims: list[Row] = field(default_factory=list)
     speed: list[Row] = field(default_factory=list)
+    frames: Sequence[CaseResult] = ()
     hand: dict[str, Any] = field(default_factory=dict)
     commands: dict[str, str] = field(default_factory=dict)
     tips: frozenset[str] = frozenset()
@@ -92,6 +95,10 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
             results |= {result.case: result for result in new}
             if new:
                 commands[name] = str(run.record.get("command") or "unknown")
+    frames: list[CaseResult] = []
+    if (runs / "frames").is_dir():
+        run = load_run(runs / "frames")
+        frames, commands["frames"] = run.results, str(run.record.get("command") or "unknown")
     for name in ("positions", "benchmark_positions", "slivers", "thesis"):
         if (record := runs / name / f"{name}.json").is_file():
             found = read_json(record)
@@ -106,14 +113,16 @@ def load_evidence(runs: Path, published: Path) -> Evidence:
         return []
 
     positions = table("positions", "positions.csv")
+    benchmark = table("benchmark_positions", "positions.csv")
     return Evidence(
         results=list(results.values()), positions=positions,
-        benchmark_positions=table("benchmark_positions", "positions.csv"),
+        benchmark_positions=benchmark,
         slivers=table("slivers", "slivers.csv"), claims=table("claims", "claims.csv"),
-        speed=_rows(published / "speed.csv"),
+        speed=_rows(published / "speed.csv"), frames=frames,
         hand={**(thesis.get("hand") or {}), "contended": thesis.get("contended")}
         if thesis.get("hand") else {},
-        commands=commands, tips=_with_tips({row["scene"] for row in positions}),
+        commands=commands,
+        tips=_with_tips({row["scene"] for row in (*positions, *benchmark)}),
     )  # fmt: skip
 
 
@@ -238,14 +247,18 @@ class Beside:
     def over_positions(self) -> str:
         """The ratio over positions of the mesh, as words; none where they were not studied.
 
-        Two scenes are told one by one: their common range belongs to neither.
+        Two scenes are told one by one: their common range belongs to neither. Of more, those are
+        named whose range excludes 1.
         """
         if self.scatter is None:
             return ""
-        if len(self.by_scene) == 2:
-            told = {name_of(n): own for n, own in self.by_scene.items()}
-            return " Over positions: " + ", ".join(f"{n} {_over(o)}" for n, o in told.items())
-        return f" Over positions: {_over(self.scatter)}"
+        told = {name_of(n): own for n, own in self.by_scene.items()}
+        if len(told) == 2:
+            words = (f"{n} {_over(o)}{'' if _side(o) else ', not told apart'}"
+                     for n, o in told.items())  # fmt: skip
+            return f" Over positions: {'; '.join(words)}"
+        apart = ", ".join(f"{n} {_over(o)}" for n, o in told.items() if _side(o))
+        return f" Over positions: {_over(self.scatter)}{apart and f'; told apart in {apart}'}"
 
     @property
     def contradicted(self) -> bool:
@@ -301,10 +314,10 @@ def beside(
     if pair is None or pair.ratio is None or pair.low is None or pair.high is None:
         return None
     moving = {result.case for result in evidence.results if moves(result)}
-    # the protocol's six scenes are at rest, two of the benchmark's move
-    rows = evidence.benchmark_positions if kind == "motion" else evidence.positions
-    by_scene = mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
-        kind, scene in moving, scene in evidence.tips))  # fmt: skip
+    by_scene: dict[str, list[float]] = {}
+    for rows in (evidence.benchmark_positions, evidence.positions):  # these first, of a scene of both
+        by_scene |= mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
+            kind, scene in moving, scene in evidence.tips))  # fmt: skip
     ratios = [ratio for own in by_scene.values() for ratio in own]
     scatter = _quantiles(ratios) if ratios else None
     each = {scene: _quantiles(own) for scene, own in by_scene.items()}

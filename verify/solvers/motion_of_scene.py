@@ -193,8 +193,12 @@ class Integration:
     scheme: str
     step_factor: float
     spectral_radius: float = 0.8
+    step: float | None = None
 
     def __post_init__(self) -> None:
+        given = self.step
+        if given is not None and not (isinstance(given, int | float) and 0.0 < given < np.inf):
+            raise InputError(f"step {given}; expected a positive number of seconds")
         if not 0.0 <= self.spectral_radius <= 1.0:
             raise InputError(f"spectral_radius {self.spectral_radius:g}; expected 0 to 1")
 
@@ -375,8 +379,10 @@ class CutMotion:
         self.body, self.state = body, state
         self._recorder, self._integrators = BalanceRecorder(body, state), dict[float, Integrator]()
         self._instants, self._taken = list[tuple[int, dict[str, float]]](), 0
-        scheme, factor = self.integration.scheme, self.integration.step_factor
-        self.largest, how = largest_step(self.scene, body, scheme, factor)  # as it is cut now
+        own = self.integration
+        self.largest, how = largest_step(  # as it is cut now
+            self.scene, body, own.scheme, own.step_factor, own.step
+        )
         self.record.notes["step from"] = how
 
     def _leave(self) -> None:

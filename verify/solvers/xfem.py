@@ -81,6 +81,7 @@ class _Parameters:
     mass: str | None = None
     step_factor: float = 0.9
     spectral_radius: float = 0.8
+    step: float | None = None
     kernels: str = "fast"
     opening: str | None = None
 
@@ -104,7 +105,7 @@ class _Parameters:
 
     def integration(self) -> Integration:
         """Return the options of the time integration."""
-        return Integration(self.scheme, self.step_factor, self.spectral_radius)
+        return Integration(self.scheme, self.step_factor, self.spectral_radius, self.step)
 
 
 @dataclass(eq=False)
@@ -208,7 +209,11 @@ class XfemSolver:
         asks for it; 0: one.
     scheme : str
         Dynamics: time integration, "newmark", "implicit_euler", "energy_momentum",
-        "generalised_alpha", "central_differences", "symplectic_euler" or "forward_euler".
+        "generalised_alpha", "central_differences", "symplectic_euler", "forward_euler", or
+        "real_time": implicit Euler with one linearisation and the side-wise mass, the step of
+        `verify play`.
+    step : float
+        Dynamics: largest time step, s, instead of the scene's; 1/60 is a frame of `verify play`.
     spectral_radius : float
         Dynamics: spectral radius of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}

@@ -57,6 +57,7 @@ from verify.xfem.linear_solvers import Kernels
 from verify.xfem.loads_and_supports import check_bodies
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import Fragments, treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.subdivision import Subdivision, extrapolation, subdivide
@@ -163,6 +164,7 @@ def system_of(
 SCHEMES: dict[str, Callable[..., Integrator]] = {  # of a body and a step, s
     "newmark": Trapezoidal,
     "implicit_euler": ImplicitEuler,
+    "real_time": RealTimeEuler,
     "energy_momentum": EnergyMomentum,
     "generalised_alpha": GeneralisedAlpha,
     "central_differences": CentralDifferences,
@@ -180,19 +182,22 @@ MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
 }
 _REACH = 1.0  # strain up to which the step of a turning body is a bound
 EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+_LUMPED = (*EXPLICIT, "real_time")
 
 
 def mass_for(scheme: str, slivers: str = "keep") -> str:
     """Name the mass that suits a time integration, among `MASSES`.
 
     Explicit schemes need a diagonal one, whose step no sliver shortens; so does a ghost penalty.
-    All others take the consistent one: a lumped mass lets the lattice radiate energy that belongs
+    The real-time step is taken with that of `verify play`. All others take the consistent one: a lumped mass lets the lattice radiate energy that belongs
     to the crack (docs/theory/dynamics.md).
     """
-    return "sidewise" if scheme in EXPLICIT or slivers == "penalise" else CONSISTENT
+    return "sidewise" if scheme in _LUMPED or slivers == "penalise" else CONSISTENT
 
 
-def largest_step(scene: Scene, body: DynamicBody, scheme: str, factor: float) -> tuple[float, str]:
+def largest_step(
+    scene: Scene, body: DynamicBody, scheme: str, factor: float, given: float | None = None
+) -> tuple[float, str]:
     """Return the largest time step of a body, s, and where it comes from.
 
     An explicit scheme takes `factor` times its critical step, or the step asked for if that is
@@ -207,10 +212,13 @@ def largest_step(scene: Scene, body: DynamicBody, scheme: str, factor: float) ->
     scheme : str
         One of `SCHEMES`.
     factor : float
+    given : float or None
+        Step asked for instead of the scene's, s.
     """
-    explicit, asked = scheme in EXPLICIT, scene.analysis.time_step
+    explicit, asked = scheme in EXPLICIT, given or scene.analysis.time_step
+    name = "the parameter step" if given else "analysis.time_step"
     if not explicit and asked is not None:
-        return asked, "analysis.time_step"
+        return asked, name
     critical = _critical(scene, body, explicit)
     turning = explicit and body.force.is_corotational
     found = factor * critical * (RESONANCE_FREE if turning else 1.0)
@@ -218,7 +226,7 @@ def largest_step(scene: Scene, body: DynamicBody, scheme: str, factor: float) ->
     if not np.isfinite(found) or found <= 0.0:
         raise InputError(f"the critical step is {critical:g} s; give analysis.time_step")
     if asked is not None and asked < found:
-        return asked, f"analysis.time_step; the critical step is {critical:.4g} s"
+        return asked, f"{name}; the critical step is {critical:.4g} s"
     return found, said
 
 
