@@ -100,6 +100,7 @@ def in_space(known=3):
 
 def by_frames():
     """Return the same scenes by the step of the real-time engine, ten times as wrong."""
+
     def by_engine(solve):
         worse = [replace(solve.metrics[0], value=10.0 * solve.metrics[0].value)]
         return replace(solve, solver="xfem scheme=real_time step=0.0166667", metrics=worse)
@@ -174,7 +175,10 @@ def test_the_step_kept_is_told_for_unstructured_meshes_too():
         own.found["step kept"] for own in answer(replace(made(), claims=[other, moved]))
         if "step kept" in own.found
     ]  # fmt: skip
-    assert ", and 0.80 on meshes with moved nodes. The bound is the smallest uncut element's" in found.text
+    assert (
+        ", and 0.80 on meshes with moved nodes. The bound is the smallest uncut element's"
+        in found.text
+    )
 
 
 def slower(evidence):
@@ -234,7 +238,9 @@ def test_the_error_in_space_is_absolute_and_bounded_where_the_reference_is_no_be
     assert sentence.of(made(others())) is None  # in the plane
     (frames,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
                  if s.name == "frames")  # fmt: skip
-    assert frames.of(made()).text == "There the engine's step, 60 a second, is wrong by 3.3 to 13 %."
+    assert (
+        frames.of(made()).text == "There the engine's step, 60 a second, is wrong by 3.3 to 13 %."
+    )
 
 
 def test_every_sentence_has_numbers_that_refute_it():
@@ -435,7 +441,9 @@ def test_the_command_line_knows_every_run_of_the_protocol(foreign, monkeypatch, 
     for words in asked:
         build_parser().parse_args(words)  # leaves with a message where it does not know a word
     assert set(made) <= set(PUBLISHER.PAGES)
-    assert {words[-1] for words in asked} == {str(PUBLISHER.RUNS / n) for n in (*made, "long", "frames")}
+    assert {words[-1] for words in asked} == {
+        str(PUBLISHER.RUNS / n) for n in (*made, "long", "frames")
+    }
     names = {word for words in asked for option, word in pairwise(words) if option == "--solver"}
     shown = [solver_title(name) for name in sorted(names) if "ghost=" not in name]
     assert Palette.of(shown) == Palette.of(reversed(shown))  # one look on all pages

@@ -315,7 +315,10 @@ def beside(
         return None
     moving = {result.case for result in evidence.results if moves(result)}
     by_scene: dict[str, list[float]] = {}
-    for rows in (evidence.benchmark_positions, evidence.positions):  # these first, of a scene of both
+    for rows in (
+        evidence.benchmark_positions,
+        evidence.positions,
+    ):  # these first, of a scene of both
         by_scene |= mesh_ratios(rows, metric, solver, rival, lambda scene: _is(
             kind, scene in moving, scene in evidence.tips))  # fmt: skip
     ratios = [ratio for own in by_scene.values() for ratio in own]

@@ -189,8 +189,8 @@ def mass_for(scheme: str, slivers: str = "keep") -> str:
     """Name the mass that suits a time integration, among `MASSES`.
 
     Explicit schemes need a diagonal one, whose step no sliver shortens; so does a ghost penalty.
-    The real-time step is taken with that of `verify play`. All others take the consistent one: a lumped mass lets the lattice radiate energy that belongs
-    to the crack (docs/theory/dynamics.md).
+    So does the real-time step, as in `verify play`. All others take the consistent one: a lumped
+    mass lets the lattice radiate energy that belongs to the crack (docs/theory/dynamics.md).
     """
     return "sidewise" if scheme in _LUMPED or slivers == "penalise" else CONSISTENT
 
