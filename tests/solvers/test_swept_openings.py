@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from case_texts import support_text, weight_text
@@ -27,6 +28,7 @@ from verify.solvers import conforming_motion, find_solver, motion_of_scene
 from verify.solvers.xfem_system import SCHEMES
 from verify.xfem.body import MotionState
 from verify.xfem.explicit import acceleration_of
+from verify.xfem.mesh import rectangle_mesh
 
 METHODS = ("virtual_node", "virtual_node_arbitrary", "subdivision", "snapping",
            "snapping_subdivision", "mass_spring", "conforming")  # fmt: skip
@@ -281,6 +283,32 @@ def test_every_scheme_closes_with_the_work_of_the_cut(tmp_path, openings, scheme
         late = find_solver("xfem").solve(scene, 0, 0, scheme=scheme, opening="late")
         assert found.notes["step from"] == late.notes["step from"]
         assert "cut_work" not in late.ledger
+
+
+@pytest.mark.parametrize("tip", ["inside", "partial"])
+def test_a_mirrored_body_under_a_mirrored_blade_moves_as_the_mirror_image(tmp_path, tip):
+    """Two blades cross and end in the body; by "partial" at nodes, of which neither is above it."""
+    mesh = rectangle_mesh((9, 6), [0.0, 0.0], [1.0, 0.7])
+    inner = ((mesh.points > 1e-9) & (mesh.points < np.array([1.0, 0.7]) - 1e-9)).all(axis=1)
+    moved = 0.03 * np.random.default_rng(2).uniform(-1.0, 1.0, mesh.points.shape)
+    points = mesh.points + np.where(inner[:, None], moved, 0.0)
+    body = PLANE.replace(
+        '"rectangle"\nlower = [0.0, 0.0]\nupper = [1.0, 0.7]', '"file"\nfile = "b.vtu"'
+    )
+    body = body.replace("cells = [[9, 6]]", 'pattern = "given"')
+    ledgers = []
+    for sign in (1.0, -1.0):
+        image = np.column_stack([points * [1.0, sign], np.zeros(len(points))])
+        cells = mesh.cells if sign > 0.0 else mesh.cells[:, ::-1]
+        meshio.Mesh(image, [("triangle", cells)]).write(tmp_path / "b.vtu")
+        text = body + MOTION + support_text("x < 1e-6", (0, 0))
+        text += path_text([[0.2, 0.2 * sign], [0.75, 0.5 * sign]], [0.03, 0.22])
+        text += path_text([[0.31, 0.8 * sign], [0.53, 0.17 * sign]], [0.05, 0.22], name="across")
+        text += weight_text().replace("-9.8", str(-9.8 * sign))
+        ledgers.append(solve(tmp_path, "xfem", text, tip=tip).ledger)
+    one, other = ledgers
+    for name in ("kinetic", "strain", "cut_work"):
+        assert other[name] == pytest.approx(one[name], rel=1e-8, abs=1e-12), name
 
 
 @pytest.mark.parametrize("slivers", ["keep", "merge", "drop", "penalise"])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
+from verify.geometry.simplices import measures
 from verify.geometry.swept_shares import CutSimplices, SweptShares
 from verify.methods.tip_nodes import with_tip_nodes
 from verify.scene import (
@@ -271,7 +272,12 @@ class Openings:
         for k, cut in enumerate(self.asked):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             if isinstance(cut, ToolPathCut):
-                passage = shares.add(sections(phantom, cells, k), cut.passed_at)
+                # a node on the cut counts as on its positive side: of cells that the cut touches in
+                # a node alone, those behind it would open, and those before it not
+                section = sections(phantom, cells, k)
+                some = measures(section.points) > 0.0
+                section = CutSimplices(*(each[some] for each in section))
+                passage = shares.add(section, cut.passed_at)
                 times[:, k], passed[:, k] = passage.let_go, passage.passed
             else:
                 times[cells, k] = passed[cells, k] = self.times[k]
