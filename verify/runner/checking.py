@@ -53,6 +53,7 @@ def _check_mechanics(scene: Scene, exact: Any) -> None:
         check_formulas_are_finite,
         check_pieces_are_held,
         check_places_in_mesh,
+        check_supports_do_not_jump,
     )
     from verify.solvers.body_of_scene import background_mesh
 
@@ -66,6 +67,7 @@ def _check_mechanics(scene: Scene, exact: Any) -> None:
     check_pieces_are_held(scene, exact)
     if exact is not None and scene.judged_by_exact:
         check_exact_fits(scene, exact, mesh)
+    check_supports_do_not_jump(scene, mesh, exact)
 
 
 def _exact_of(scene: Scene, where: str) -> Any:

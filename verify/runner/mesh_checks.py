@@ -24,7 +24,7 @@ from verify.scene import (
     Traction,
 )
 from verify.scene.parts import on_part
-from verify.scene.physics import field_values
+from verify.scene.physics import PrescribedMotion, field_values, jumps
 from verify.scene.placement import misplaced_point
 from verify.solvers.body_of_scene import background_mesh, cuts_of
 from verify.solvers.boundary_conditions import supports_of
@@ -41,6 +41,7 @@ _NODES = 3000  # of the mesh on which loose pieces are looked for: cut in 0.1 s
 _SHORTEST = 1e-4  # of the body: the reference puts one facet on a shorter cut, and cannot open it
 _ALONG = 40  # samples of a line inside the bounding box of the body
 _NEAR = 1e-6  # of the body: on its boundary, not inside it
+_JUMP = 1e-6  # of the largest displacement of a support: an initial field in seven digits is none
 _METRES = 100.0  # times the body: a cut as large is not in metres, or the body is not
 
 
@@ -91,6 +92,47 @@ def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array
             given = getattr(scene.initial, key)
             if given not in (None, "exact"):
                 yield f"initial.{key}", partial(field_values, given), inside
+
+
+def check_supports_do_not_jump(scene: Scene, mesh: SimplexMesh, exact: Any) -> None:
+    """Raise `InputError` if a support of a motion jumps: on its way, or from the initial state.
+
+    What is beside it would be thrown at any speed: the energy of the motion has no limit as
+    elements and steps become smaller.
+    """
+    if scene.analysis.duration is None:
+        return
+    end, outline = scene.analysis.duration, samples.boundary_nodes(mesh)[0]
+    for i, support in enumerate(scene.supports):
+        at = mesh.points if scene.geometry.holds_inside(support.where) else outline
+        points = at[on_part(scene.geometry, support.where, at, mesh.extent)]
+        prescribed = exact if support.displacement == "exact" else None
+        motion = PrescribedMotion(support, points, None, prescribed)
+        start, held = _initial(scene, points, exact), list(support.held(scene.dimension))
+        before = {time: motion.at(time, before=True) for time in jumps(support.history)}
+        before[0.0] = motion.at(0.0, before=True) if start is None else start[:, held]
+        times = [*scene.analysis.output_times, *before]
+        largest = max(np.abs(motion.at(time)).max(initial=0.0) for time in times)
+        for time, place in before.items():
+            off = np.linalg.norm(motion.at(time) - place, axis=1).max(initial=0.0)
+            if time <= end and off > _JUMP * max(largest, np.abs(place).max(initial=0.0)):
+                raise InputError(
+                    f"supports[{i}]: jumps by {off:.3g} m at {time:g} s, and no motion follows "
+                    "that: its energy has no limit as steps get smaller; expected a history that "
+                    "leads there in some time, from the initial state on",
+                    str(scene.file or scene.name),
+                )
+
+
+def _initial(scene: Scene, points: Array, exact: Any) -> Array | None:
+    """Return the initial displacement (n, d) of points, m; None: the one that supports have."""
+    match scene.initial:
+        case Equilibrium():
+            return None
+        case InitialField():
+            still = scene.initial.model_copy(update={"velocity": None})  # unbounded at tips
+            return still.state(points, points, exact)[0]
+    return np.zeros_like(points)
 
 
 def check_pieces_are_held(scene: Scene, exact: object) -> None:

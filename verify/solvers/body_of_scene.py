@@ -272,12 +272,7 @@ class Openings:
         for k, cut in enumerate(self.asked):
             cells = np.unique(phantom.parent[phantom.label[:, k] != 0])
             if isinstance(cut, ToolPathCut):
-                # a node on the cut counts as on its positive side: of cells that the cut touches in
-                # a node alone, those behind it would open, and those before it not
-                section = sections(phantom, cells, k)
-                some = measures(section.points) > 0.0
-                section = CutSimplices(*(each[some] for each in section))
-                passage = shares.add(section, cut.passed_at)
+                passage = shares.add(sections(phantom, cells, k), cut.passed_at)
                 times[:, k], passed[:, k] = passage.let_go, passage.passed
             else:
                 times[cells, k] = passed[cells, k] = self.times[k]
@@ -340,7 +335,11 @@ def openings_of(scene: Scene, size: float, rule: str) -> Openings:
 
 
 def sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
-    """Compute sections of cells by zero level of a cut, with the shape functions of their nodes."""
+    """Compute sections of cells by zero level of a cut, with the shape functions of their nodes.
+
+    A node on the cut counts as above it: of cells that the cut touches in a node alone, those below
+    it would have a section of no measure, those above it none. None of them has one.
+    """
     nodes = phantom.mesh.cells[cells]
     value = phantom.level_sets[nodes, k]
     corners = nodes.shape[1]
@@ -362,4 +361,6 @@ def sections(phantom: PhantomMesh, cells: _Ints, k: int) -> CutSimplices:
             shapes.append(points[[0, *parts]].transpose(1, 0, 2))
     row, shape = np.concatenate(owner), np.concatenate(shapes)
     points = shape @ phantom.mesh.points[nodes[row]]
-    return CutSimplices(points, cells[row], nodes[row], shape)
+    some = measures(points) > 0.0
+    row = row[some]
+    return CutSimplices(points[some], cells[row], nodes[row], shape[some])
