@@ -20,10 +20,11 @@ STRAIN = [[-1e-3, 0.0], [0.0, -1e-3]]
 UNIFORM = 1e-3 / (1.3 * 0.4)  # E ε / ((1+ν)(1−2ν))
 
 
-def measured(pressure, known=None, slide=0.0, cut=LINE, turn=None):
+def measured(pressure, known=None, slide=0.0, cut=LINE, turn=None, back=False):
     """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain.
 
-    Against the exact one, or another that is `known`. Its facets are the straight line.
+    Against the exact one, or another that is `known`. Its facets are the straight line. A second
+    output time has the faces `back`, as they are without a slide.
     """
     scene = scenes.scene(
         [cut], contact={"expected": "closed"},
@@ -44,11 +45,15 @@ def measured(pressure, known=None, slide=0.0, cut=LINE, turn=None):
         moved = (corners + moved) @ turn.T - corners
     solution = Solution(corners, cells, moved[None], size=0.1, contact=contact,
                         cut_facets=corners[None, [4, 5]])  # fmt: skip
+    if back:
+        both = np.stack([moved, corners @ np.array(STRAIN)])
+        twice = replace(contact, pressure=np.repeat(contact.pressure, 2, axis=0))
+        solution = replace(solution, displacement=both, times=np.arange(2.0), contact=twice)
     body, law = body_of(scene), law_of(scene)
     rule = Rules(body, 0.1).on_cuts()
     known = known or exact_contact(exact_of(scene), law, rule, 0.0, "exact")
-    field = SolutionMotion(solution, body).at()
-    found, notes = contact_metrics(solution, field, rule, known, 0.1, turn is not None)
+    motion = SolutionMotion(solution, body)
+    found, notes = contact_metrics(solution, motion, rule, known, 0.1, turn is not None)
     return {one.name: one for one in found}, notes, solution
 
 
@@ -80,6 +85,12 @@ def test_faces_that_slide_by_more_than_half_an_element_are_not_judged():
     assert notes["contact_pressure"].startswith("faces slide by 0.7 elements")
     little, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.03)
     assert little["contact_pressure"].value < 1e-12
+
+
+def test_faces_that_slide_and_come_back_have_slid():
+    slid, notes, _ = measured(lambda x: np.full_like(x, UNIFORM), slide=0.07, back=True)
+    assert slid["contact_slip"].value == pytest.approx(0.7, rel=1e-9)
+    assert "contact_pressure" in notes
 
 
 def test_faces_slide_as_far_in_a_body_that_has_turned():

@@ -393,7 +393,7 @@ def _contact(
             truth = exact_contact(exact, one.law, rule, last, reference.source)
     size = compared_size(one.solution, one.body)
     turns = one.scene.analysis.kinematics != "linear"
-    return contact_metrics(one.solution, one.field, rule, truth, size, turns)
+    return contact_metrics(one.solution, one.motion, rule, truth, size, turns)
 
 
 def _errors(

@@ -20,8 +20,7 @@ from scipy.spatial import cKDTree
 from verify.compare.cut_rule import CutRule
 from verify.compare.errors import CONTACT_ERRORS, displacement_jump
 from verify.compare.hooke import Law
-from verify.compare.locate import Field
-from verify.compare.motion import field_at
+from verify.compare.motion import Motion, field_at
 from verify.judge.convergence import extrapolate, field_uncertainty
 from verify.result import Metric
 from verify.solution import ContactPressure, Solution
@@ -129,7 +128,7 @@ def stated_pressure(solution: Solution) -> Pressure:
 
 
 def contact_metrics(
-    solution: Solution, field: Field, rule: CutRule, truth: ContactTruth | None, size: float,
+    solution: Solution, motion: Motion, rule: CutRule, truth: ContactTruth | None, size: float,
     turns: bool = False,
 ) -> tuple[list[Metric], dict[str, str]]:  # fmt: skip
     """Measure the contact of faces that a solution states.
@@ -137,8 +136,8 @@ def contact_metrics(
     Parameters
     ----------
     solution : Solution
-    field : Field
-        Its field at the last output time.
+    motion : Motion
+        Its field over time.
     rule : CutRule
         On the cuts.
     truth : ContactTruth or None
@@ -151,15 +150,15 @@ def contact_metrics(
     -------
     metrics : list of Metric
         Relative errors ``contact_pressure`` and ``contact_oscillation``; at the last output time
-        ``contact_extent`` (m, in space m²), ``contact_force`` (N) and ``contact_slip`` of faces
-        that are together, the largest in elements.
+        ``contact_extent`` (m, in space m²) and ``contact_force`` (N); ``contact_slip`` of faces
+        that are together, the largest at any output time, in elements.
     notes : dict of str to str
         Reasons, by the name of each metric that could not be measured.
     """
     contact = solution.contact
     if contact is None or not len(contact.weights):
         return [], {CONTACT_ERRORS[0]: "the solver states no pressure of contact"}
-    slip = _slip(contact, field, rule, turns) / size
+    slip = _slip(solution, motion, rule, turns) / size
     metrics = [Metric("contact_slip", slip, "1")]
     if slip >= _MOST_SLIP:
         why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
@@ -211,15 +210,18 @@ def _pressed(pressure: Array, weights: Array) -> NDArray[np.bool_]:
     return np.asarray(pressure > _PRESSED * (weights @ pressure) / weights.sum())
 
 
-def _slip(contact: ContactPressure, field: Field, rule: CutRule, turns: bool) -> float:
-    """Compute the largest displacement along each other of faces that are together, m."""
-    points = contact.points[_pressed(contact.pressure[-1], contact.weights)]
-    if not len(points):
-        return 0.0
+def _slip(solution: Solution, motion: Motion, rule: CutRule, turns: bool) -> float:
+    """Compute the largest displacement along each other of faces while they are together, m."""
+    contact, largest = solution.contact, 0.0
+    assert contact is not None
     # points of the cut as asked: facets of a curved one lie on one side of it, where no field jumps
-    near = np.unique(cKDTree(rule.points).query(points)[1])
-    beside = rule.reordered(near)
-    jump = displacement_jump(field, beside)
-    if not turns:  # else all of it: faces that are together have next to no gap
-        jump -= np.sum(jump * beside.normals, axis=1)[:, None] * beside.normals
-    return float(np.linalg.norm(jump, axis=1).max())
+    nearest = cKDTree(rule.points).query(contact.points)[1]
+    for time, pressure in zip(solution.times, contact.pressure, strict=True):
+        if not (pressed := _pressed(pressure, contact.weights)).any():
+            continue
+        beside = rule.reordered(np.unique(nearest[pressed]))
+        jump = displacement_jump(motion.at(float(time)), beside)
+        if not turns:  # else all of it: faces that are together have next to no gap
+            jump -= np.sum(jump * beside.normals, axis=1)[:, None] * beside.normals
+        largest = max(largest, float(np.linalg.norm(jump, axis=1).max()))
+    return largest

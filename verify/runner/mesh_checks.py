@@ -97,7 +97,7 @@ def _used(scene: Scene, mesh: SimplexMesh) -> Iterator[tuple[str, _Values, Array
 def check_supports_do_not_jump(scene: Scene, mesh: SimplexMesh, exact: Any) -> None:
     """Raise `InputError` if a support of a motion jumps: on its way, or from the initial state.
 
-    What is beside it would be thrown at any speed: the energy of the motion has no limit as
+    Material beside it would be thrown at any speed: the energy of the motion has no limit as
     elements and steps become smaller.
     """
     if scene.analysis.duration is None:
