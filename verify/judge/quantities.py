@@ -75,6 +75,11 @@ class Measured:
         return SolutionMotion(self.solution, self.body, deviation, everywhere)
 
     @property
+    def field(self) -> Field:
+        """Field at the last output time."""
+        return self.motion.at()
+
+    @property
     def coverage(self) -> float:
         """Volume of the cells over that of the body: 1, or something is missing or twice there."""
         shape = cells_of(self.solution)
