@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import shutil
 import subprocess
 import sys
 from contextlib import suppress
@@ -91,6 +92,32 @@ def test_directory_that_is_no_environment_is_never_removed(checkout):
     assert refused.returncode == 2
     assert "environment" in refused.stderr
     assert precious.read_text() == "years of work"
+
+
+def test_an_environment_of_another_clone_is_used_and_never_removed(checkout):
+    """Same packages: the project is installed from there. Others: refused, nothing is touched."""
+    place, environment = checkout
+    second, shared = place.parent / "second", place / ".venv"
+    shutil.copytree(place, second)
+    assert set_up(checkout).returncode == 0
+    for one, calls in ((second, 3), (second, 3), (place, 4)):
+        done = set_up((one, environment), VERIFY_VENV=shared)
+        assert done.returncode == 0, done.stderr
+        assert "removing" not in done.stdout
+        assert len(pip_calls(checkout)) == calls
+        assert f"--editable {one}" in pip_calls(checkout)[-1]
+    (second / ".ci/requirements.lock").open("a").write("\n# changed\n")
+    for stamp in ((shared / "ready").read_text(), "", None):
+        if stamp is None:
+            (shared / "ready").unlink()
+        else:
+            (shared / "ready").write_text(stamp)
+        refused = set_up((second, environment), VERIFY_VENV=shared)
+        assert refused.returncode == 2
+        assert f"{shared} belongs to {place}" in refused.stderr
+        assert (shared / "bin/python").exists()
+    shutil.rmtree(place / ".ci")  # a clone that is gone has no more use of it
+    assert set_up((second, environment), VERIFY_VENV=shared).returncode == 0
 
 
 # Runs the code that it is given under the real Python, which now says that it is another one.
