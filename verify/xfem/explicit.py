@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array, issparse, kron
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse import bsr_array, csr_array, issparse, kron
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from verify.xfem.arrays import Bools, Floats, XfemError
 from verify.xfem.body import (
@@ -31,7 +31,7 @@ from verify.xfem.body import (
 )
 from verify.xfem.element import Material
 from verify.xfem.internal_force import inside_out
-from verify.xfem.mass import Mass, cell_densities
+from verify.xfem.mass import Mass, cell_densities, inverse_of_mass
 from verify.xfem.mesh import SimplexMesh
 
 
@@ -283,11 +283,12 @@ def _largest_general(K: csr_array, M: csr_array, tolerance: float) -> float:
     scale = 1.0 / np.sqrt(M.diagonal())
     K = K * scale[:, None] * scale[None, :]
     M = M * scale[:, None] * scale[None, :]
+    inverse = inverse_of_mass(M)
     if K.shape[0] <= _DENSE:
         factor = np.linalg.inv(np.linalg.cholesky(M.toarray()))
         return float(np.linalg.eigvalsh(factor @ K.toarray() @ factor.T)[-1])
-    inverse = LinearOperator(K.shape, matvec=splu(csc_array(M)).solve)
-    values = eigsh(K, k=1, M=M, Minv=inverse, which="LA", tol=tolerance, return_eigenvectors=False)
+    given = LinearOperator(K.shape, matvec=inverse)
+    values = eigsh(K, k=1, M=M, Minv=given, which="LA", tol=tolerance, return_eigenvectors=False)
     return float(values[0])
 
 

@@ -7,12 +7,12 @@ The solvers are SciPy's: sparse LU factorisation, conjugate gradients. `Kernels`
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
+from scipy.sparse import csc_array, diags_array, sparray
+from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from verify.xfem.arrays import (
     Bools,
@@ -27,7 +27,9 @@ from verify.xfem.element import Elements
 
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
 _SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than iterations
-_IN_ITS_ORDER = {"SymmetricMode": True}  # of SuperLU: pivots on the diagonal, rows as columns
+_IN_ITS_ORDER: dict[str, Any] = {  # of SuperLU: pivots on the diagonal, rows as columns
+    "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}
+}  # fmt: skip
 
 
 class LinearSolver(Protocol):
@@ -88,10 +90,7 @@ class LinearSolver(Protocol):
 
 
 class SparseLU(LinearSolver):
-    """LU factorisation by SuperLU.
-
-    Rows and columns are scaled by the diagonal before: the entries of a sliver are many orders
-    smaller than others, and a pivot among numbers of both sizes would lose them.
+    """LU factorisation by SuperLU, as `scaled_inverse`.
 
     Parameters
     ----------
@@ -105,41 +104,60 @@ class SparseLU(LinearSolver):
 
     def __init__(self, pattern: BlockPattern, block: int, definite: bool = False) -> None:
         self._pattern, self._block, self._definite = pattern, block, definite
-        self._factor: SuperLU | None = None
-        self._scale: Floats | None = None
+        self._inverse: Callable[[Floats], Floats] | None = None
 
     def factorize(self, blocks: Floats) -> None:
         """Factorise; see `LinearSolver`."""
         check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
-        matrix = self._pattern.matrix(blocks)
-        diagonal = matrix.diagonal()
-        if self._definite and not (diagonal > 0.0).all():
-            raise SingularStiffnessError(int(np.argmin(diagonal > 0.0)) // self._block)
-        size = np.abs(diagonal)
-        self._scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
-        scaling = diags_array(self._scale)
-        scaled = csc_array(scaling @ matrix @ scaling)
-        try:
-            if not self._definite:
-                self._factor = splu(scaled)
-                return
-            factor = splu(scaled, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=_IN_ITS_ORDER)
-        except RuntimeError as failure:
-            raise SingularStiffnessError(None) from failure
-        small = ~(factor.U.diagonal() > _ROUND_OFF) | (factor.perm_r != factor.perm_c)
-        if small.any():
-            place = int(np.argmax(small))
-            raise SingularStiffnessError(int(np.argmax(factor.perm_c == place)) // self._block)
-        self._factor = factor
+        self._inverse = scaled_inverse(self._pattern.matrix(blocks), self._definite, self._block)
 
     def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`."""
-        if self._factor is None or self._scale is None:
+        if self._inverse is None:
             raise RuntimeError("solve before factorize")
         load = nodal_vector(load, "right-hand side", self._pattern.node_count, self._block)
         x = np.empty(load.shape) if x is None else x
-        x[:] = (self._scale * self._factor.solve(self._scale * load.ravel())).reshape(load.shape)
+        x[:] = self._inverse(load.ravel()).reshape(load.shape)
         return x
+
+
+def scaled_inverse(
+    matrix: sparray, definite: bool = True, block: int = 1
+) -> Callable[[Floats], Floats]:
+    """Factorise a matrix (n, n); what is returned multiplies (n,) or (n, k) by its inverse.
+
+    Rows and columns are scaled by the diagonal before: the entries of a sliver are many orders
+    smaller than others, and a pivot among numbers of both sizes would lose them.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+    definite : bool
+        Whether it must be symmetric and positive definite, as of `SparseLU`.
+    block : int
+        Unknowns of a node, for the message.
+
+    Raises
+    ------
+    SingularStiffnessError
+        If the matrix is singular, or to be positive definite and is not, to round-off.
+    """
+    diagonal = matrix.diagonal()
+    if definite and not (diagonal > 0.0).all():
+        raise SingularStiffnessError(int(np.argmin(diagonal > 0.0)) // block)
+    size = np.abs(diagonal)
+    scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+    scaled = csc_array(diags_array(scale) @ matrix @ diags_array(scale))
+    try:
+        factor = splu(scaled, **(_IN_ITS_ORDER if definite else {}))
+    except RuntimeError as failure:
+        raise SingularStiffnessError(None) from failure
+    if definite:
+        small = ~(factor.U.diagonal() > _ROUND_OFF) | (factor.perm_r != factor.perm_c)
+        if small.any():
+            place = int(np.argmax(small))
+            raise SingularStiffnessError(int(np.argmax(factor.perm_c == place)) // block)
+    return lambda load: (scale * factor.solve((scale * load.T).T).T).T
 
 
 class BlockJacobiCG(LinearSolver):

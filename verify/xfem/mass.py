@@ -13,15 +13,22 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_array
 
-from verify.xfem.arrays import Bools, Floats, Ints, XfemError, finite_array
+from verify.xfem.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    SingularStiffnessError,
+    XfemError,
+    finite_array,
+)
 from verify.xfem.block_pattern import BlockPattern, body_pattern, find_places, pattern_places
+from verify.xfem.linear_solvers import scaled_inverse
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 
-_IN_ITS_ORDER = {"SymmetricMode": True}  # of SuperLU: pivots on the diagonal, rows as columns
+_DIGITS = 1e-3  # of an acceleration, that its mass must give back
 
 
 @dataclass(frozen=True)
@@ -90,30 +97,20 @@ class Mass:
     def inverse_of(self, free: Bools) -> Callable[[Floats], Floats]:
         """Factorise the rows and columns of free nodes (N,); the inverse maps others to zero.
 
-        Scaled to a unit diagonal, with pivots on it: an entry of a sliver of share ε is ε³ of
-        others, and a pivot off the diagonal would lose it. Scaled, the condition number is below
-        10, whatever ε. It is larger only where shape functions depend on each other, as in a part
-        between two cuts that are close.
-
         Raises
         ------
         XfemError
-            If such a part is too thin: its mass is singular.
+            As `inverse_of_mass`.
         """
-        rows, columns, values = self.entries
-        scale = np.where(free, 1.0 / np.sqrt(self.matrix.diagonal()), 0.0)
-        scaled = values * scale[rows] * scale[columns]
-        scaled[(rows == columns) & ~free[rows]] = 1.0
-        # of a symmetric matrix the rows are the columns
-        matrix = csc_array((scaled, self.matrix.indices, self.matrix.indptr), self.matrix.shape)
-        try:
-            factor = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=_IN_ITS_ORDER)
-        except RuntimeError as failure:
-            raise XfemError(
-                "mass singular to round-off, though scaled: a part too thin"
-            ) from failure
-        scale = scale[:, None]
-        return lambda forces: scale * factor.solve(scale * forces)
+        kept = np.flatnonzero(free)
+        inverse = inverse_of_mass(self.matrix[kept][:, kept])
+
+        def solve(forces: Floats) -> Floats:
+            found = np.zeros(forces.shape)
+            found[kept] = inverse(forces[kept])
+            return found
+
+        return solve
 
     def weight(self, gravity: ArrayLike) -> Floats:
         """Compute the dead weight (N, d) of the unknowns under gravity (d,), in newtons.
@@ -162,6 +159,33 @@ class Mass:
         if self.diagonal is not None and len(rows) == pattern.node_count:
             return pattern.diagonal.astype(np.int64)
         return pattern_places(pattern, rows, columns)
+
+
+def inverse_of_mass(matrix: csr_array) -> Callable[[Floats], Floats]:
+    """Factorise a mass (n, n) that is not diagonal; the result solves for (n,) or (n, k) forces.
+
+    Scaled to a unit diagonal the condition number is below 10 at slivers of any share. It is larger
+    only where shape functions depend on each other, as in a part between two cuts that are close:
+    1/t² of a part of t elements.
+
+    Raises
+    ------
+    XfemError
+        If such a part is too thin: a random acceleration does not come back with three digits.
+    """
+    try:
+        inverse = scaled_inverse(matrix)
+        root = np.sqrt(matrix.diagonal())
+        one = np.random.default_rng(0).standard_normal(len(root)) / root
+        error = np.abs(root * (inverse(matrix @ one) - one)).max(initial=0.0)
+    except SingularStiffnessError:
+        error = np.inf
+    if not error < _DIGITS:
+        raise XfemError(
+            "mass singular to round-off, though scaled: a part too thin between two cuts, or of no "
+            "mass; expected the side-wise mass, or cuts further apart"
+        )
+    return inverse
 
 
 def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
