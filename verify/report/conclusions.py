@@ -260,7 +260,8 @@ def _step_kept(evidence: Evidence) -> Found | None:
     _, size, least = found[0]
     text = (
         "XFEM with a mass lumped on each side of the cut: through cuts leave "
-        f"{number(least, 3)} of the uncut body's step in two families, however close to nodes"
+        f"{number(least, 3)} of the uncut body's step in two families, however close to nodes, "
+        "not all of it"
     )
     moved = [
         float(row["value"]) for row in evidence.claims
