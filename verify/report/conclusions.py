@@ -258,19 +258,18 @@ def _step_kept(evidence: Evidence) -> Found | None:
     if not found:
         return None
     _, size, least = found[0]
-    text = (
-        "XFEM with a mass lumped on each side of the cut: through cuts leave "
-        f"{number(least, 3)} of the uncut body's step in two families, however close to nodes, "
-        "not all of it"
-    )
     moved = [
         float(row["value"]) for row in evidence.claims
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
+    text = (
+        "The step is not quite the uncut body's: with a mass lumped on each side of the cut XFEM "
+        f"keeps {number(least, 3)} of it in two families, however close to nodes"
+    )
     text += f", and {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
     text += (
-        ". The bound is the smallest uncut element's step; [ends of cuts](../theory/xfem.md) "
-        "leave less of the body's."
+        "; through cuts never go below the smallest uncut element's. [Ends of cuts]"
+        "(../theory/xfem.md) keep less."
     )
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
