@@ -338,7 +338,7 @@ def test_a_difference_in_motion_has_to_show_over_positions_of_moving_scenes_of_t
         assert found.holds
 
 
-def test_of_many_scenes_those_are_named_that_positions_of_the_mesh_tell_apart():
+def test_of_many_scenes_those_are_counted_that_positions_of_the_mesh_tell_apart():
     factors = {"benchmark/c1_slit": 1.0, "benchmark/c4_disc": 1.4, "fracture/front": 2.0}
     rows = [
         {"scene": scene, "position": str(k), "solver": name, "metric": METRIC,
@@ -348,7 +348,7 @@ def test_of_many_scenes_those_are_named_that_positions_of_the_mesh_tell_apart():
     ]  # fmt: skip
     evidence = made(positions=rows[:32], benchmark_positions=rows[32:], tips=frozenset(factors))
     text = beside(evidence, "tip", METRIC, "xfem").over_positions
-    assert text.endswith("; told apart in C4 1.4 (1.3 to 1.5), fracture/front 2.0 (1.8 to 2.2)")
+    assert text.endswith("; of 3 scenes below 1 in none, above 1 in 2 (C4, fracture/front)")
 
 
 def test_two_scenes_whose_positions_contradict_each_other_are_told_one_by_one():

@@ -136,7 +136,7 @@ def _weighed(
         won=won, lost=lost, scenes=won + tied + lost,
     )  # fmt: skip
     if own.scatter is not None:
-        untold = "" if len(own.by_scene) == 2 else ", not told apart"
+        untold = "" if len(own.by_scene) > 1 else ", not told apart"
         untold = "; the scene decides" if own.contradicted else untold
         text += f"{own.over_positions}{'' if shown else untold}."
     return Found(text, own.written, needs, not side or shown in (0, side))

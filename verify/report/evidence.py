@@ -248,7 +248,7 @@ class Beside:
         """The ratio over positions of the mesh, as words; none where they were not studied.
 
         Two scenes are told one by one: their common range belongs to neither. Of more, those are
-        named whose range excludes 1.
+        counted whose own range excludes 1.
         """
         if self.scatter is None:
             return ""
@@ -257,8 +257,14 @@ class Beside:
             words = (f"{n} {_over(o)}{'' if _side(o) else ', not told apart'}"
                      for n, o in told.items())  # fmt: skip
             return f" Over positions: {'; '.join(words)}"
-        apart = ", ".join(f"{n} {_over(o)}" for n, o in told.items() if _side(o))
-        return f" Over positions: {_over(self.scatter)}{apart and f'; told apart in {apart}'}"
+        said = f" Over positions: {_over(self.scatter)}"
+        if len(told) < 2:
+            return said
+        sides = (([n for n, o in told.items() if _side(o) == side], word)
+                 for side, word in ((-1, "below"), (1, "above")))  # fmt: skip
+        parts = [f"{word} 1 in {len(own)} ({', '.join(own)})" if 0 < len(own) < 3
+                 else f"{word} 1 in {len(own) or 'none'}" for own, word in sides]  # fmt: skip
+        return f"{said}; of {len(told)} scenes {', '.join(parts)}"
 
     @property
     def contradicted(self) -> bool:
