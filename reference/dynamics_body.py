@@ -258,10 +258,8 @@ class MovingBody:
         On nodes that the cut has released.
     contact : FaceContact or None
         Of a scene with contact.
-    pressure : (m,) array
-        On its faces in the last step, or in the initial equilibrium, Pa.
-    pressure_before : (m,) array
-        Pressure of the step before.
+    pressures : sequence of (m,) array
+        On its faces in the last three steps, the last first, or in the initial equilibrium, Pa.
 
     Raises
     ------
@@ -303,8 +301,7 @@ class MovingBody:
         of_kinematics = FaceContact if self.law.linear else TurningContact
         closed = scene.contact.closed and len(space.mesh.cut_facets) > 0
         self.contact = of_kinematics(space, self._own_held) if closed else None
-        self.pressure = np.zeros(0 if self.contact is None else len(self.contact.weights))
-        self.pressure_before = self.pressure
+        self.pressures = 3 * [np.zeros(0 if self.contact is None else len(self.contact.weights))]
         self.tie(np.zeros((0, 2), dtype=np.int64))
 
     def tie(self, pairs: NDArray[np.int64]) -> None:
@@ -468,8 +465,9 @@ class MovingBody:
         if (faces := self.contact) is not None:
             compliance = self.compliance(solver, faces.gaps)
             gaps = faces.opened(found)
-            self.pressure_before = self.pressure = faces.pressed(gaps, compliance, self.ties.leader)
-            found += solver.solve(self.freed(faces.gaps.T @ self.pressure))
+            pressure = faces.pressed(gaps, compliance, self.ties.leader)
+            self.pressures = 3 * [pressure]
+            found += solver.solve(self.freed(faces.gaps.T @ pressure))
         solver.destroy()
         return found
 

@@ -175,9 +175,9 @@ class Stepper:
         body, faces = self.body, self.body.contact
         assert faces is not None
         share, load = self.size**2 * self.scheme.beta, self._load
-        pressure, contact, last = np.zeros_like(body.pressure), np.zeros_like(load), np.inf
+        pressure, contact, last = np.zeros_like(body.pressures[0]), np.zeros_like(load), np.inf
         if faces.opened(self._end(start, a)[0]).min(initial=0.0) == 0.0:  # none overlap
-            body.pressure_before, body.pressure = body.pressure, pressure
+            body.pressures = [pressure, *body.pressures[:2]]
             return a, forces
         for _ in range(_MOST_ITERATIONS):
             u = self._end(start, a)[0]
@@ -213,7 +213,7 @@ class Stepper:
                 f"{left:.3g} N are left of forces of {scale:.3g} N; a smaller analysis.time_step "
                 "may help"
             )
-        body.pressure_before, body.pressure = body.pressure, pressure
+        body.pressures = [pressure, *body.pressures[:2]]
         return a, replace(forces, contact=contact)
 
     def restart(self, state: State, forces: Array) -> None:

@@ -249,8 +249,7 @@ class TiedMotion:
             unbalanced = self._unbalanced(found.time)
             found.acceleration = self.body.accelerations(unbalanced, found.time)
         self.outputs.append(found)
-        body = self.body  # undamped, pressures alternate from step to step about their mean
-        self.pressures.append(0.5 * (body.pressure_before + body.pressure))
+        self.pressures.append(self._pressure)
         ledger, momenta = self.ledger, momenta_of(self.body, self.state)
         done = ledger.done | work_of_blades(self.scene.cuts, ledger.work_by_cut)
         energies = ledger.state(self.body, self.state)
@@ -380,10 +379,21 @@ class TiedMotion:
         forces -= mass * (body.mass @ state.velocity)
         if body.contact is not None:
             slopes = body.contact.slopes(state.displacement, state.displacement)
-            forces += slopes.T @ body.pressure
+            forces += slopes.T @ self._pressure
         if stiffness:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
         return forces
+
+    @property
+    def _pressure(self) -> Array:
+        """Pressure of contact (m,) at the time of the state, Pa.
+
+        The one of a step is of the time at which it balances forces, α_f before its end. Undamped,
+        pressures alternate from step to step about their mean. From three of them.
+        """
+        last, second, third = self.body.pressures
+        late = 0.25 + 0.5 * (0.5 if self.averaged else self.scheme.alpha_f)
+        return np.maximum(0.5 * (last + second) + late * (last - third), 0.0)
 
     def _over_time(self, name: str) -> Array:
         """Return a field (t, n, d) at the outputs."""
