@@ -8,7 +8,7 @@ import zipfile
 
 import pytest
 
-from verify.foreign import installing, records
+from verify.foreign import installing
 from verify.solvers import interface
 
 RECORD = """
@@ -37,8 +37,7 @@ def programs(tmp_path, monkeypatch):
     """An empty list of programs, and a folder of installations."""
     folder = tmp_path / "programs"
     folder.mkdir()
-    for module in (records, installing):
-        monkeypatch.setattr(module, "PROGRAMS", folder)
+    monkeypatch.setattr(installing, "PROGRAMS", folder)
     monkeypatch.setattr(interface, "_PROGRAMS", folder)
     monkeypatch.setenv("VERIFY_SOLVERS", str(tmp_path / "solvers"))
     return folder
@@ -47,7 +46,7 @@ def programs(tmp_path, monkeypatch):
 @pytest.fixture
 def add_example(programs):
     """Enter the example program under a name."""
-    original = records.Path(records.__file__).parent / "programs"
+    original = installing.Path(installing.__file__).parent / "programs"
 
     def add(name, module="numpy", kind="system", python=sys.executable, text=None):
         (programs / name).mkdir()

@@ -12,7 +12,7 @@ from verify.compare.motion_account import motion_account
 from verify.compare.part_account import account_metrics
 from verify.exchange import export_case, read_answers
 from verify.foreign import foreign_solver, state_of
-from verify.foreign.records import PROGRAMS
+from verify.foreign.installing import PROGRAMS
 from verify.scene import load_scene
 from verify.solvers import find_solver
 

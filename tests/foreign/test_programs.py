@@ -12,7 +12,7 @@ import pytest
 from verify.cli import main
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange import read_answers
-from verify.foreign.records import PROGRAMS, Takes
+from verify.foreign.installing import PROGRAMS, Takes
 from verify.scene import BodyForce, load_scene
 from verify.solvers import find_solver, solver_names
 from verify.solvers.interface import refusal_of

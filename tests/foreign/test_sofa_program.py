@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from verify.exchange import export_case, read_answers
-from verify.foreign.records import PROGRAMS
+from verify.foreign.installing import PROGRAMS
 from verify.scene import load_scene
 from verify.xfem.body import DynamicBody
 from verify.xfem.element import isotropic

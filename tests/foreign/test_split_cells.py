@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from verify.foreign.records import PROGRAMS
+from verify.foreign.installing import PROGRAMS
 
 
 @pytest.fixture

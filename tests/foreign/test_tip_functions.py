@@ -8,7 +8,7 @@ import pytest
 
 from verify.cli import main
 from verify.foreign import foreign_solver, state_of
-from verify.foreign.records import PROGRAMS
+from verify.foreign.installing import PROGRAMS
 from verify.scene import load_scene
 from verify.study.measured_scenes import measurements, variant_of
 

@@ -10,7 +10,7 @@ import scenes
 from reference_scenes import needs_fenicsx
 
 from verify.exchange import export_case, problem_of
-from verify.foreign.records import PROGRAMS
+from verify.foreign.installing import PROGRAMS
 from verify.judge.convergence import shifted_ends
 from verify.methods import METHODS
 from verify.result import Regularisation, SolveRecord, Status

@@ -3,8 +3,7 @@
 import re
 
 from verify.judge.pairs import pairs_of
-from verify.report.benchmark_page import METRIC
-from verify.report.engine_page import RIVALS, write_engine
+from verify.report.benchmark_page import METRIC, RIVALS, write_engine
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
 NOTES = {"version": "v9", "scheme": "implicit Euler", "mass": "lumped",

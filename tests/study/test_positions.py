@@ -11,8 +11,7 @@ from command_line import forking
 
 from verify.cli import main
 from verify.judge.models import coarsest
-from verify.report.positions_page import positions_lead
-from verify.report.study_page import render_study
+from verify.report.study_page import positions_lead, render_study
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import load_scene

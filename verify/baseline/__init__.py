@@ -5,6 +5,14 @@ value that owes nothing to the solver (exact, published, or of the reference wit
 uncertainty); only a hand that edits the file can move it.
 """
 
-from verify.baseline.checking import Row, VerdictChange, check_run, exit_code_of, verdict_changes
+from verify.baseline.checking import (
+    Move,
+    Row,
+    VerdictChange,
+    check_run,
+    exit_code_of,
+    save_run,
+    update_from,
+    verdict_changes,
+)
 from verify.baseline.record import Baseline, FinishedRun, read_baseline, read_run, write_baseline
-from verify.baseline.updating import Move, save_run, update_from

@@ -46,7 +46,7 @@ def export(
     see docs/guide/your-solver.md.
     """  # fmt: skip
     from verify.exchange import export_case
-    from verify.foreign.records import write_template
+    from verify.foreign.installing import write_template
     from verify.runner.selection import select_cases
 
     scenes = select_cases([case], weight="heavy")

@@ -5,5 +5,12 @@ and `ForeignProgram` makes one a solver. The programs themselves are stand-alone
 their own Python and import nothing of this package.
 """
 
-from verify.foreign.installing import ForeignProgram, install, remove, state_of
-from verify.foreign.records import ForeignSolver, foreign_solver, foreign_solvers
+from verify.foreign.installing import (
+    ForeignProgram,
+    ForeignSolver,
+    foreign_solver,
+    foreign_solvers,
+    install,
+    remove,
+    state_of,
+)

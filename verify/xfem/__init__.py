@@ -115,7 +115,7 @@ for each step ``RigidMotions.follow``, then ``Newton.solve``. ``EnergyMomentum``
 
 `contacts`, `aggregation`, `slivers`, `ghost_penalty`
     which pieces touch; corners that follow others, u = C û; policies for slivers; a penalty on them
-`rigid_motion`, `stability`, `equilibrium`
+`rigid_motion`, `equilibrium`
     load steps at finite rotation: rigid motion first, second paths, stability, slack membranes
 `energy_balance`, `energy_momentum`, `real_time`, `release`
     energies of a motion; a scheme that keeps energy and momentum; one with a single linear solve
