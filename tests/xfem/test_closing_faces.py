@@ -222,7 +222,7 @@ def test_faces_that_slide_along_a_circle_bear_the_pressure_as_if_they_did_not():
         force = xfem.InternalForce(phantom, soft(2), "linear")
         answer = solve_closed(force, faces, xfem.Supports(fixed, np.where(fixed, exact, 0.0)))
         # it is this that normals of facets would take for gaps
-        taken = faces.stiffness[:, None] * faces.slid(answer.displacement)
+        taken = faces.stiffness[:, None] * faces.slid(answer.displacement, force)
         assert np.abs(taken).max() > P
         found.append(misses(faces, answer.pressure, np.full_like(answer.pressure, P))[0])
     # differences over a step of h/4 leave a gap of s (h/4R)², a pressure of M s h/16R²

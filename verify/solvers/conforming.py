@@ -54,7 +54,7 @@ def _refusal(scene: Scene) -> str | None:
 class _OnConformingMeshes:
     """What both adapters do not do, and the contact that they know."""
 
-    contact = ("static", "dynamic", "dynamic finite_rotation")
+    contact = ("static", "dynamic", "finite_rotation")
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""

@@ -231,7 +231,7 @@ class XfemSolver:
     """
 
     name = "xfem"
-    contact = ("static", "dynamic", "dynamic finite_rotation")
+    contact = ("static", "dynamic", "finite_rotation")
     choices = _CHOICES
     parameters = tuple(one.name for one in fields(_Parameters))
 

@@ -315,14 +315,11 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
         if not isinstance(entry, Gravity):
             load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
     path = path_of_supports(scene, phantom, exact)
-    # at finite rotation cuts are closed in it: see `refused_contact`
-    faces = None if body.force.is_corotational else faces_of(scene, phantom)
-    if faces is not None:
-        return solve_closed(body.force, faces, path(1.0), load).displacement
+    prescribed: Callable[[float], _Floats] = lambda share: path(share).values
+    if (faces := faces_of(scene, phantom)) is not None:
+        return solve_closed(body.force, faces, path(1.0), load, prescribed).displacement
     check_bodies(phantom, path(1.0))
-    return static_equilibrium(
-        body.force, body.fixed, lambda share: path(share).values, load
-    ).displacement
+    return static_equilibrium(body.force, body.fixed, prescribed, load).displacement
 
 
 def solution_on(
@@ -499,8 +496,9 @@ def solve_equilibrium(
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
     if (faces := faces_of(scene, phantom, penalise)) is not None:
         with record.timed("solve"):
-            elastic = InternalForce(body, material, "linear", kernels)
-            closed = solve_closed(elastic, faces, supports, load)
+            elastic = InternalForce(body, material, kinematics, kernels)
+            along: Callable[[float], _Floats] = lambda share: path(share).values
+            closed = solve_closed(elastic, faces, supports, load, along, load_steps or 1)
         record.iterations["contact"] = closed.iterations
         record.notes["linear solver"] = _solver_text(closed.solver, kernels)
         record.notes["residual"] = f"{closed.residual:.3e}"

@@ -41,11 +41,11 @@ force of the middle would lose nothing. But the pressure of bars that meet would
 times its value and back from step to step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import bsr_array, csc_array, csr_array
 
 from verify.xfem.arrays import (
     Bools,
@@ -56,13 +56,14 @@ from verify.xfem.arrays import (
     XfemError,
     finite_array,
 )
-from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain, pattern_places
+from verify.xfem.block_pattern import BlockPattern, pattern_places
 from verify.xfem.cuts import Cut
 from verify.xfem.element import Material
-from verify.xfem.internal_force import InternalForce, Kinematics
+from verify.xfem.equilibrium import LoadPath
+from verify.xfem.internal_force import Configuration, InternalForce, Kinematics
 from verify.xfem.loads_and_supports import Supports, check_bodies, simplex_rule
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.statics import StaticSolver
+from verify.xfem.statics import ROUND_OFF, Newton, NotInEquilibriumError
 from verify.xfem.subdivision import subdivide, torn_facets
 
 STABILITY = 2.0  # c: a(u, u) keeps half of itself at least
@@ -94,6 +95,8 @@ class ClosingFaces:
         Dof nodes of both pieces at each facet of the cut.
     gap : (f, q, 2 (d + 1), d) float array
         Normal jump at the quadrature points of each facet, by the displacement of these nodes.
+    pieces : (f, 2) int array
+        Of both sides of each facet, and `share` (f, 2) of each in mean stresses.
     normal : (f, d) float array
         Of each facet, out of the material that comes first in `nodes`.
     shapes : (f, q, 2 (d + 1)) float array
@@ -152,13 +155,13 @@ class ClosingFaces:
         along = np.einsum("fsid,fd->fsi", gradients, normal)
         flexible = phantom.part_fraction[pieces] * mesh.measures[phantom.parent[pieces]]
         flexible /= lam + 2.0 * mu
-        share = flexible / flexible.sum(axis=1, keepdims=True)
+        self.pieces, self.share = pieces, flexible / flexible.sum(axis=1, keepdims=True)
         self.normal, normal = normal, normal[:, None, None]
-        self.gradients = _flat(share[..., None, None] * gradients, 1)
+        self.gradients = _flat(self.share[..., None, None] * gradients, 1)
         stress = lam[..., None, None] * gradients + 2.0 * mu[..., None, None] * (
             along[..., None] * normal
         )
-        self.stress = (0.0 if moving else 1.0) * _flat(share[..., None, None] * stress, 1)
+        self.stress = (0.0 if moving else 1.0) * _flat(self.share[..., None, None] * stress, 1)
         first = mesh.points[mesh.cells[phantom.parent[pieces], 0]]
         shapes = np.einsum("fsid,fqsd->fqsi", gradients, self.points[:, :, None] - first[:, None])
         shapes[..., 0] += 1.0
@@ -200,11 +203,12 @@ class ClosingFaces:
         pairs = np.stack(np.broadcast_arrays(one[:, :, None], other[:, None]), axis=-1)
         return np.unique(np.sort(pairs.reshape(-1, 2), axis=1), axis=0)
 
-    def slid(self, displacement: Floats) -> Floats:
+    def slid(self, displacement: Floats, force: InternalForce) -> Floats:
         """Compute the gap (f, q) in metres by which curved faces open as they slide.
 
         Beside the normal jump: the `slide` of the methods below. See the docstring of the module.
         """
+        del force  # linear: its stress is part of the energy
         if self._bend is None:
             return np.zeros(self.weights.shape)
         return (self._bend @ displacement.ravel()).reshape(self.weights.shape)
@@ -224,13 +228,9 @@ class ClosingFaces:
         squares = self.pressure(displacement, slide) ** 2 - own[:, None] ** 2
         return float(np.sum(self._per_stiffness * squares)) / 2.0
 
-    def force(
-        self, displacement: Floats, slide: Floats | float = 0.0, tied: bool = False
-    ) -> Floats:
-        """Return the slope (N, d) of the energy, in newtons; or with all normal jumps tied."""
-        traction = self.trial_stress(displacement, slide)
-        if not tied:
-            traction = np.minimum(traction, 0.0)
+    def force(self, displacement: Floats, slide: Floats | float = 0.0) -> Floats:
+        """Return the slope (N, d) of the energy, in newtons."""
+        traction = np.minimum(self.trial_stress(displacement, slide), 0.0)
         own = self._per_stiffness.sum(axis=1) * (self._mean @ displacement.ravel())
         total = self._turned[0] @ (self._per_stiffness * traction).ravel() - self._turned[1] @ own
         return total.reshape(displacement.shape)
@@ -269,6 +269,17 @@ class ClosingFaces:
         """Add the derivative of the force of a step by its end to the nodal blocks (B, d, d)."""
         del before
         self.add_stiffness(pattern, blocks, self.touching(after))
+
+    def add_tangent(
+        self, pattern: BlockPattern, blocks: Floats, displacement: Floats,
+        slide: Floats, touching: Floats, rotational: float,
+    ) -> None:  # fmt: skip
+        """Add the second derivative of the energy at a displacement (N, d), as `add_stiffness`.
+
+        `rotational` is the share of what comes from the turn of normals.
+        """
+        del displacement, slide, rotational  # normals do not turn
+        self.add_stiffness(pattern, blocks, touching)
 
     def _stiffness_of_points(self, pattern: BlockPattern, space: int) -> tuple[csc_array, Floats]:
         """Find entries (B d², f q) of blocks by each point that touches, and of −∫ σ²/γ (B d²,)."""
@@ -355,123 +366,88 @@ class ClosedSolution(NamedTuple):
     solver: str
 
 
-_ITERATIONS = 100
-_SLIDES, _SETTLED = 60, 1e-6  # corrections of curved faces; share of the pressure
-_TOLERANCE = 1e-12  # of the residual, over the largest force
-_ENOUGH = 1e-4  # of the fall of the energy that its slope promises (Armijo)
-_UNSEEN = 1e-13  # of the energy: a fall that round-off hides
-_HALVINGS = 6
-_WEAK = (0.0, 1e-6, 1e-3)  # of the stiffness of closed faces, of those that are apart
+_SLIDES, _SETTLED = 60, 1e-9  # corrections of curved or turning faces; share of the pressure
+_ROUNDING = 1e-13  # residual that a linear solve leaves: of that of a factorisation
+_WEAK = 20  # power of the share of rotations held: ties of 1e-6, 3e-3, 0.07 and 1
 
 
-class _Closing:
-    """Newton's method on J; see the docstring of the module."""
+class _Pressed(InternalForce):
+    """Internal force of a body together with its faces, which have slid (f, q)."""
 
-    def __init__(
-        self, force: InternalForce, faces: ClosingFaces, supports: Supports, load: Floats
-    ) -> None:
-        self.force, self.faces, self.load, self.fixed = force, faces, load, supports.fixed
-        self.pattern = body_pattern(force.phantom, faces.couplings)
-        self.elastic = force.stiffness(self.pattern)
-        self.solver = StaticSolver(force, self.pattern, supports.fixed, 1e-13)
-        self.slide = np.zeros(faces.weights.shape)
-        self.solves = 0
+    def __init__(self, force: InternalForce, faces: ClosingFaces) -> None:
+        vars(self).update(vars(force))
+        self.faces, self.slide = faces, np.zeros(faces.weights.shape)
 
-    def energy(self, u: Floats) -> float:
-        elastic, closed = self.force.evaluate(u)[1], self.faces.energy(u, self.slide)
-        return elastic + closed - float(np.vdot(self.load, u))
+    @property
+    def couplings(self) -> Ints:
+        return self.faces.couplings
 
-    def residual(self, u: Floats) -> tuple[Floats, float]:
-        """Residual (N, d), and the largest of the forces in it."""
-        internal, contact = self.force.evaluate(u)[0], self.faces.force(u, self.slide)
-        scale = max(np.abs(internal).max(), np.abs(self.load).max(), np.abs(contact).max())
-        return np.where(self.fixed, 0.0, self.load - internal - contact), float(scale)
+    def evaluate_at(self, at: Configuration, out: Floats | None = None) -> tuple[Floats, float]:
+        force, energy = super().evaluate_at(at, out)
+        force += self.faces.force(at.displacement, self.slide)
+        return force, energy + self.faces.energy(at.displacement, self.slide)
 
-    def correction(self, residual: Floats, touching: Floats) -> Floats:
-        blocks = self.elastic.copy()
-        self.faces.add_stiffness(self.pattern, blocks, touching)
-        constrain(self.pattern, self.fixed, blocks)
-        self.solves += 1
-        self.solver.factorize(blocks)
-        return self.solver.solve(residual)
 
-    def tied(self, values: Floats) -> Floats:
-        """Solve for the displacement (N, d) with all faces tied, from the prescribed one."""
-        force = self.force.evaluate(values)[0]
-        force += self.faces.force(values, tied=True)
-        residual = np.where(self.fixed, 0.0, self.load - force)
-        return values + self.correction(residual, np.ones(self.faces.weights.shape))
+class _Closing(Newton):
+    """Newton's method on the energy of a body and its faces.
 
-    def settled(self, u: Floats) -> Floats:
-        """Minimise J from a displacement (N, d), and correct how far curved faces have slid."""
+    It begins with all faces tied. A part that no face holds on the way needs a weak tie, or it goes
+    anywhere; with the rotations held all faces are tied, which always leads down.
+    """
+
+    force: _Pressed
+
+    def linearise(self, displacement: Floats, rotational: float, least: float = 0.0) -> bsr_array:
+        super().linearise(displacement, rotational, least)
+        faces, slide = self.force.faces, self.force.slide
+        round_off = ROUND_OFF * np.abs(faces.phantom.node_points + displacement).max()
+        shut = faces.trial_stress(displacement, slide) <= faces.stiffness[:, None] * round_off
+        share = np.where(shut, 1.0, (1.0 - rotational) ** _WEAK)
+        faces.add_tangent(self._pattern, self._blocks, displacement, slide, share, rotational)
+        return self._pattern.matrix(self._blocks)
+
+    def settled(self, u: Floats, load: Floats) -> tuple[Floats, int]:
+        """Correct how far faces have slid, from an equilibrium (N, d) with faces that have not."""
+        faces, count = self.force.faces, 0
         for _ in range(_SLIDES):
-            u = self.solved(u)
-            before, self.slide = self.slide, self.faces.slid(u)
-            change = np.abs(self.faces.stiffness[:, None] * (self.slide - before)).max(initial=0.0)
-            if change <= _SETTLED * self.faces.pressure(u, self.slide).max(initial=0.0):
-                return u
+            before, self.force.slide = self.force.slide, faces.slid(u, self.force)
+            slide = self.force.slide
+            change = np.abs(faces.stiffness[:, None] * (slide - before)).max(initial=0.0)
+            if change <= _SETTLED * faces.pressure(u, slide).max(initial=0.0):
+                return u, count
+            u, more = self.solve(u, np.zeros_like(u), load)
+            count += more
         raise NotConvergedError(
-            f"curved faces still slide after {_SLIDES} corrections: pressures change by "
-            f"{change:.3g} Pa. Expected a cut that turns by less from element to element"
+            f"faces still slide after {_SLIDES} corrections: pressures change by {change:.3g} Pa. "
+            "Expected a cut that turns by less from element to element"
         )
-
-    def solved(self, u: Floats) -> Floats:
-        """Minimise J from a displacement (N, d), with the faces slid as they are."""
-        for _ in range(_ITERATIONS):
-            residual, scale = self.residual(u)
-            now = self.faces.touching(u, self.slide)
-            if np.abs(residual).max() <= _TOLERANCE * scale:
-                return u
-            u, whole = self.next(u, residual, now)
-            if whole and np.array_equal(now, self.faces.touching(u, self.slide)):
-                return u
-        left = np.abs(residual).max()
-        raise NotConvergedError(
-            f"contact not found in {_ITERATIONS} iterations: unbalanced force {left:.3g} N against "
-            f"forces of {scale:.3g} N. Expected faces or supports that hold every part"
-        )
-
-    def next(self, u: Floats, residual: Floats, touching: Bools) -> tuple[Floats, bool]:
-        """Lower the energy; and whether by the whole of Newton's correction."""
-        # a part that no face holds now needs a weak tie, or it goes anywhere
-        for tie in _WEAK:
-            try:
-                step = self.correction(residual, np.where(touching, 1.0, tie))
-            except SingularStiffnessError:
-                continue
-            if share := self.share_downhill(u, residual, step):
-                return u + share * step, share == 1.0 and tie == 0.0
-        return u + self.correction(residual, np.ones(touching.shape)), False
-
-    def share_downhill(self, u: Floats, residual: Floats, step: Floats) -> float:
-        """Share of a correction that lowers the energy as its slope says; 0 if none."""
-        energy, fall = self.energy(u), float(np.vdot(residual, step))
-        for share in 0.5 ** np.arange(_HALVINGS):
-            trial = u + share * step
-            if share * fall > _UNSEEN * abs(energy):
-                if self.energy(trial) <= energy - _ENOUGH * share * fall:
-                    return float(share)
-            elif np.abs(self.residual(trial)[0]).max() < np.abs(residual).max():
-                return float(share)
-        return 0.0
 
 
 def solve_closed(
-    force: InternalForce, faces: ClosingFaces, supports: Supports, load: Floats | None = None
+    force: InternalForce,
+    faces: ClosingFaces,
+    supports: Supports,
+    load: Floats | None = None,
+    prescribed: Callable[[float], Floats] | None = None,
+    load_steps: int = 1,
 ) -> ClosedSolution:
-    """Solve for the equilibrium, in linear kinematics, of a body whose faces may touch.
+    """Solve for the equilibrium of a body whose faces may touch.
 
     It begins with all faces tied in the normal direction.
 
     Parameters
     ----------
     force : InternalForce
-        Of linear kinematics, without a penalty.
+        Without a penalty.
     faces : ClosingFaces
-        Of the same body.
+        Of the same body and kinematics.
     supports : Supports
     load : (N, d) float array, optional
         Nodal forces in newtons.
+    prescribed : callable, optional
+        At finite rotation, displacement (N, d) of supports at a load factor; else in proportion.
+    load_steps : int
+        At finite rotation, as for `static_equilibrium`.
 
     Raises
     ------
@@ -480,7 +456,7 @@ def solve_closed(
     NotConvergedError
         If the iterations do not suffice: nothing holds a part that the load draws away.
     XfemError
-        If the force is of another body, of finite rotation or with a penalty, or a load of another
+        If the force is of another body or kinematics or with a penalty, or a load of another
         shape.
 
     Examples
@@ -504,18 +480,29 @@ def solve_closed(
     """
     if (
         not np.array_equal(force.phantom.cells, faces.phantom.cells)
-        or force.is_corotational
+        or force.kinematics != faces.kinematics
         or force.ghost is not None
     ):
-        raise XfemError("contact is solved in linear kinematics, on one body, without a penalty")
-    shape = force.phantom.node_points.shape
+        raise XfemError("contact is solved in one kinematics, on one body, without a penalty")
+    shape, values = force.phantom.node_points.shape, supports.values
     given = finite_array(np.zeros(shape) if load is None else load, "load", shape)
     check_bodies(force.phantom, supports, (faces.nodes, faces.gap))
-    newton = _Closing(force, faces, supports, given)
-    u = newton.settled(newton.tied(supports.values))
-    residual, scale = newton.residual(u)
-    pressure, left = faces.pressure(u, newton.slide), float(np.abs(residual).max() / scale)
+    newton = _Closing(_Pressed(force, faces), supports.fixed, _ROUNDING)
+    try:
+        if force.is_corotational:
+            along = prescribed or (lambda factor: factor * values)
+            path = LoadPath(newton.force, supports.fixed, along, given, newton)
+            u, counts = path.follow(np.zeros(shape), load_steps)
+            u, more = newton.settled(path.settle(u), given)
+        else:
+            u, *counts = newton.solve(np.zeros(shape), values, given)
+            u, more = newton.settled(u, given)
+    except (NotInEquilibriumError, SingularStiffnessError) as error:
+        raise NotConvergedError(
+            f"contact not found: {error}. Expected faces or supports that hold every part"
+        ) from error
+    place = newton.place(u, given)
     return ClosedSolution(
-        u, force.evaluate(u)[1], pressure, left,
-        newton.solves, "direct" if "direct" in newton.solver.used else "iterative",
+        u, force.evaluate(u)[1], faces.pressure(u, newton.force.slide), place.norm / place.scale,
+        sum(counts) + more, "direct" if "direct" in newton.solvers else "iterative",
     )  # fmt: skip

@@ -28,7 +28,8 @@ from verify.xfem.element import (
     tension_forces,
     tension_moduli,
 )
-from verify.xfem.hyperelastic import add_hyperelastic_force, hyperelastic_moduli
+from verify.xfem.hyperelastic import Law as Moduli
+from verify.xfem.hyperelastic import add_hyperelastic_force, averages, hyperelastic_moduli
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
 from verify.xfem.mesh import cells_at
 from verify.xfem.phantom import PhantomMesh
@@ -234,6 +235,16 @@ class InternalForce:
             force[:] = self.phantom.restrict(corner_force)
         self.add_penalty(at.displacement, 1.0, force)
         return force, energy + self.penalty_energy(at.displacement)
+
+    def stress(self, at: Configuration) -> Floats:
+        """Compute the first Piola–Kirchhoff stress (p, d, d) of cells, in pascal."""
+        lam, mu = (x[self.elements.parent] for x in (self.elements.lam, self.elements.mu))
+        if self.law != "hooke":
+            return averages(Moduli(lam, mu, self.law == "stable_neo_hookean"), at.F, at.F).stress
+        strain = at.R.swapaxes(1, 2) @ at.F - np.eye(self._shape[1])
+        volume = lam * np.trace(strain, axis1=1, axis2=2)
+        sides: Floats = mu[:, None, None] * (strain + strain.swapaxes(1, 2))
+        return at.R @ (sides + volume[:, None, None] * np.eye(self._shape[1]))
 
     def penalty_energy(self, displacement: Floats) -> float:
         """Compute energy of the penalty in joules, which `evaluate` includes; zero without one."""

@@ -256,6 +256,8 @@ class Newton:
     ----------
     force : InternalForce
     fixed : (N, d) bool array
+    inexact : float
+        Residual that conjugate gradients may leave of a correction.
 
     Attributes
     ----------
@@ -263,14 +265,14 @@ class Newton:
         As given.
     """
 
-    def __init__(self, force: InternalForce, fixed: Bools) -> None:
+    def __init__(self, force: InternalForce, fixed: Bools, inexact: float = _INEXACT) -> None:
         self.force, self.fixed = force, fixed
         self._pattern = body_pattern(force.phantom, force.couplings)
         space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         self._internal = np.empty(fixed.shape)
         self._held = held_entries(self._pattern, fixed)
-        self._solver = StaticSolver(force, self._pattern, fixed, _INEXACT)
+        self._solver = StaticSolver(force, self._pattern, fixed, inexact)
 
     @property
     def solvers(self) -> frozenset[str]:

@@ -26,11 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verify.xfem.arrays import Floats, Ints
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.block_pattern import BlockPattern, pattern_places
 from verify.xfem.closing import ClosingFaces
 from verify.xfem.element import Material
-from verify.xfem.internal_force import Kinematics
+from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.phantom import PhantomMesh
 
 
@@ -78,9 +78,22 @@ class TurningFaces(ClosingFaces):
         """Compute γ g (f, q) in pascal at a displacement (N, d) of the dof nodes."""
         return self.stiffness[:, None] * (self.gaps(displacement) + slide)
 
-    def force_of_step(self, before: Floats, after: Floats) -> Floats:
+    def slid(self, displacement: Floats, force: InternalForce) -> Floats:
+        """Compute the gap (f, q) that stands for the mean normal stress at rest: σ/γ."""
+        at, stress = self._at(displacement), force.stress(force.configuration(displacement))
+        drawn = np.einsum("fs,fsab,fb->fa", self.share, stress[self.pieces], self.normal)
+        drawn = np.einsum("fa,fab,fb->f", drawn, at.F, at.m) / self.stiffness
+        return np.repeat(drawn[:, None], self.weights.shape[1], axis=1)
+
+    def force(self, displacement: Floats, slide: Floats | float = 0.0) -> Floats:
+        """Return the slope (N, d) of the energy, in newtons."""
+        return self.force_of_step(displacement, displacement, slide)
+
+    def force_of_step(
+        self, before: Floats, after: Floats, slide: Floats | float = 0.0
+    ) -> Floats:
         """Return the force (N, d) of a step; with equal ends it is the slope of the energy."""
-        pressures = self.weights * self.pressure(after)
+        pressures = self.weights * self.pressure(after, slide)
         forces = -np.einsum("fq,fqka->fka", pressures, self.slopes(before, after))
         count, nodes = len(before), self.nodes.ravel()
         columns = forces.reshape(-1, forces.shape[2]).T
@@ -112,17 +125,33 @@ class TurningFaces(ClosingFaces):
         gap, and is of the middle of the step.
         """
         del before
+        self.add_tangent(pattern, blocks, after, 0.0, self.touching(after), 0.0)
+
+    def add_tangent(
+        self, pattern: BlockPattern, blocks: Floats, displacement: Floats,
+        slide: Floats | float, touching: Floats | Bools, rotational: float,
+    ) -> None:  # fmt: skip
+        """Add the second derivative of the energy at a displacement (N, d): see the module."""
+        at = self._at(displacement)
+        n = np.einsum("fab,fb->fa", at.F, at.m)
+        gap = np.einsum("fa,fqa->fq", n, at.jump)
+        slip = np.linalg.solve(at.F[:, None], (at.jump - gap[..., None] * n[:, None])[..., None])
+        steps = self.shapes - np.einsum("fqa,fia->fqi", slip[..., 0], self.gradients)
+        turns = self.gradients @ np.linalg.inv(at.F)
+        turns -= (turns @ n[..., None]) * n[:, None]
+        pressed = rotational * self.weights * self.pressure(displacement, slide)
+        share = self.weights * self.stiffness[:, None] * touching
+        along = np.einsum("fq,fqi,fqj->fij", share, steps, steps)
+        along += np.einsum("fq,fq,fia,fja->fij", pressed, gap, turns, turns)
+        aside = np.einsum("fq,fqj,fa,fib->fijab", pressed, steps, n, turns)
+        added = np.einsum("fij,fa,fb->fijab", along, n, n) + aside + aside.transpose(0, 2, 1, 4, 3)
         if self._places is None or self._places[0] is not pattern:
             rows, columns = np.broadcast_arrays(self.nodes[:, :, None], self.nodes[:, None])
             found = pattern_places(pattern, rows.ravel(), columns.ravel())
             self._places = pattern, found
-        space = blocks.shape[1]
-        slopes = self.slopes(after, after)
-        share = self.weights * self.stiffness[:, None] * self.touching(after)
-        added = np.einsum("fq,fqia,fqjb->fijab", share, slopes, slopes).reshape(-1, space**2)
-        places = self._places[1]
-        for k, entries in enumerate(added.T):
-            blocks.reshape(len(blocks), -1)[:, k] += np.bincount(places, entries, len(blocks))
+        places, count = self._places[1], len(blocks)
+        for k, entries in enumerate(added.reshape(len(places), -1).T):
+            blocks.reshape(count, -1)[:, k] += np.bincount(places, entries, count)
 
     def _at(self, displacement: Floats) -> _Faces:
         """Find the faces as a displacement (N, d) has them."""
