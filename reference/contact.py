@@ -198,12 +198,80 @@ class TurningContact(FaceContact):
         found = self._sums(np.swapaxes(by_F, 1, 2)) @ self._mean + self._sums(by_D) @ self._jump
         return csr_array(found)
 
+    def turning(self, displacement: Array, pressures: Array) -> csr_array:
+        """Return the second derivative (k, k) of pressures (m,) times gaps.
+
+        n = Fμ turns by δn = −(1 − nn)F⁻ᵀδFᵀn. With the slip w = F⁻¹(D − gn) a gap changes by n·v,
+        v = δD − δF w, and δ²g = 2 δn·v − g δn·δn.
+        """
+        F, D, _, y, s = self._at(displacement)
+        n = np.einsum("pak,pk->pa", F, y / s)
+        gap = np.sum(n * D, axis=1, keepdims=True)
+        slip = np.linalg.solve(F, (D - gap * n)[..., None])[..., 0]
+        away = np.linalg.inv(F).swapaxes(1, 2)
+        away = away - n[..., None] * np.einsum("pa,pak->pk", n, away)[:, None]
+        turn = _diagonal(-np.einsum("pak,pb->pakb", away, n)) @ self._mean
+        step = np.einsum("ab,pk->pakb", np.eye(n.shape[1]), slip)
+        step = self._jump - _diagonal(step) @ self._mean
+        press = np.repeat(pressures[self._row], n.shape[1])
+        half = turn.T @ (diags_array(press) @ step)
+        half -= turn.T @ (diags_array(0.5 * press * np.repeat(gap, n.shape[1])) @ turn)
+        return csr_array(half + half.T)
+
     def _sums(self, values: Array) -> csr_array:
         """Make the matrix (m, …) that sums products with values (p, …) over each pressure."""
         flat = values.reshape(len(values), -1)
         columns = np.arange(flat.size).reshape(flat.shape)
         rows = np.broadcast_to(self._row[:, None], flat.shape)
         return _entries(flat, rows, columns, (self._shape[0], flat.size))
+
+
+def _diagonal(blocks: Array) -> csr_array:
+    """Make the matrix of blocks (p, a, …) on its diagonal."""
+    rows = np.arange(len(blocks) * blocks.shape[1]).reshape(len(blocks), -1, 1)
+    flat = blocks.reshape(*blocks.shape[:2], -1)
+    columns = np.arange(flat[:, 0].size).reshape(len(blocks), 1, -1)
+    columns, shape = np.broadcast_to(columns, flat.shape), (rows.size, flat[:, 0].size)
+    return _entries(flat, rows, columns, shape)
+
+
+def answers_of(
+    solver: Any, unknowns: Any, fixed: NDArray[np.int64]
+) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """Return what a factorised system makes of nodal forces, zero at `fixed` unknowns of a rank.
+
+    Parameters
+    ----------
+    solver : PETSc KSP
+    unknowns : reference.space.Unknowns
+    fixed : (f,) int array
+
+    Returns
+    -------
+    forces : function
+        The part of this rank of nodal forces (k,).
+    solve : function
+        Displacements (k, c) on all ranks, of columns of nodal forces.
+    """
+    from petsc4py import PETSc
+
+    def forces(values: Array) -> Array:
+        own = unknowns.own_part(values)
+        own[fixed] = 0.0
+        return np.asarray(own)
+
+    def solve(columns: Array) -> Array:
+        right: Any = np.asfortranarray(np.column_stack([forces(one) for one in columns.T]))
+        size: Any = ((len(right), None), (None, columns.shape[1]))
+        loads = PETSc.Mat().createDense(size, array=right, comm=solver.comm)
+        found = loads.duplicate()
+        solver.matSolve(loads, found)
+        each = [unknowns.everywhere(one).ravel() for one in found.getDenseArray().T]
+        loads.destroy()
+        found.destroy()
+        return np.column_stack(each)
+
+    return forces, solve
 
 
 def _entries(values: Array, rows: Any, columns: Any, shape: tuple[int, int]) -> csr_array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from reference.boundary_conditions import constrained_values, load_form
-from reference.contact import FaceContact, pressures
+from reference.contact import FaceContact, answers_of, pressures
 from reference.deformation import lame
 from reference.inside_out import naming_weak_places
 from reference.law import Law, mass_matrix
@@ -171,29 +171,9 @@ def _press(
     system : solver, matrix, x and vector of PETSc
         Solved without contact.
     """
-    from petsc4py import PETSc
-
-    solver, matrix, x, vector = system
+    solver, _, x, vector = system
     faces = FaceContact(space, held)
-
-    fixed, _ = unknowns.own_unknowns(held)
-
-    def forces(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        own = unknowns.own_part(values)
-        own[fixed] = 0.0
-        return np.asarray(own)
-
-    def solve(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        right: Any = np.asfortranarray(np.column_stack([forces(one) for one in columns.T]))
-        size: Any = ((len(right), None), (None, columns.shape[1]))
-        loads = PETSc.Mat().createDense(size, array=right, comm=matrix.comm)
-        found = loads.duplicate()
-        solver.matSolve(loads, found)
-        each = [unknowns.everywhere(one).ravel() for one in found.getDenseArray().T]
-        loads.destroy()
-        found.destroy()
-        return np.column_stack(each)
-
+    forces, solve = answers_of(solver, unknowns, unknowns.own_unknowns(held)[0])
     gaps = faces.gaps @ unknowns.everywhere(x.array).ravel()
     found, changes = pressures(faces.compliance(solve), gaps)
     vector.array[:] += forces(faces.gaps.T @ found)

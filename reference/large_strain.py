@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_conditions import RigidMotions
+from reference.contact import TurningContact, answers_of, pressures
 from reference.deformation import MembraneStretch
 from reference.inside_out import Orientation, OrientationCheck, place_text
 from reference.law import ENERGIES, Law, quadrature
@@ -21,6 +22,7 @@ from reference.linear_solvers import (
 )
 from reference.space import ConformingSpace, LinearElements
 from verify.scene import Material
+from verify.solution import ContactPressure
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
@@ -33,6 +35,7 @@ _STAGNANT = 0.5  # of the residual of the iteration before, at round-off
 _LASTING = 1e-2  # of the residual of the iteration before: its tangent serves once more
 _DIVERGED = 1e4  # of the first residual or of the force scale
 _MOST_ITERATIONS = 25
+_MOST_TOUCHES, _SLOWLY = 60, 0.1  # of contact; residual over the last one, of an old factorisation
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
 # A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
@@ -61,10 +64,14 @@ class StrainEquations:
         Nodal forces of the dead loads, N.
     most_inverted : float
         Share of the body that may be inside out at singular places.
+    closed : bool
+        Whether faces of cuts press on each other.
 
     Attributes
     ----------
     solution : dolfinx.fem.Function
+    pressure : (m,) array
+        Of the `faces` in contact, Pa.
     orientation : OrientationCheck
         Of the solution.
     method : str
@@ -80,6 +87,7 @@ class StrainEquations:
         held: NDArray[np.int32],
         load: Array | None,
         most_inverted: float,
+        closed: bool = False,
     ) -> None:
         from dolfinx import fem
         from dolfinx.fem import petsc
@@ -104,6 +112,10 @@ class StrainEquations:
         self._vector = self.solution.x.petsc_vec.duplicate()
         self._increment, self._load = self._vector.duplicate(), self._vector.duplicate()
         self._load.array[:] = 0.0 if load is None else self._unknowns.own_part(load)
+        self._turned: Any = None  # tangent of a body with faces in contact
+        self._pushed = np.zeros(len(self._load.array))  # forces of the faces on this rank, N
+        self.faces = TurningContact(space, held) if closed else None
+        self.pressure = np.zeros(0 if self.faces is None else len(self.faces.weights))
         self._force = self._diagonal = 0.0
         self._first_residual = self._residual_before = self._contraction = np.inf
         self._cycle: Cycle | None = None
@@ -138,7 +150,15 @@ class StrainEquations:
         rests = bool(x.comm.tompi4py().allreduce(int(rests)) == x.comm.size)
         self._factor = target
         self._predict(values[self._at])
-        solver = self._solver
+        if lost := self._solved() if self.faces is None else self._pressed(self.faces):
+            return lost
+        if lost := self._inside_out():
+            return lost
+        return self._imbalance(stored, before, moved, is_short or rests)
+
+    def _solved(self) -> str:
+        """Iterate by PETSc, or say why that failed."""
+        solver, x = self._solver, self.solution.x.petsc_vec
         solver.solve(None, x)
         self._take(x)
         self.iterations += solver.getIterationNumber()
@@ -149,9 +169,49 @@ class StrainEquations:
             names = vars(PETSc.SNES.ConvergedReason)
             words = [n for n, value in names.items() if value == reason and n.isupper()]
             return f"SNES {words[0].lower() if words else reason}"
-        if lost := self._inside_out():
-            return lost
-        return self._imbalance(stored, before, moved, is_short or rests)
+        return ""
+
+    def _pressed(self, faces: TurningContact) -> str:
+        """Iterate for displacements and pressures of faces together, or say why that failed.
+
+        Changes of pressures are seen through the compliance of the last factorisation, which serves
+        while the residual contracts.
+        """
+        x, step, left = self.solution.x.petsc_vec, self._increment, self._vector
+        linear, last, compliance = self._solver.getKSP(), np.inf, None
+        forces, solve = answers_of(linear, self._unknowns, self._own)
+        for _ in range(_MOST_TOUCHES):
+            u = self.displacement().ravel()
+            slopes = faces.slopes(u, u)
+            self._pushed = forces(slopes.T @ self.pressure)
+            self._assemble_residual(None, x, left)
+            if compliance is None:
+                linear.setOperators(self._held_tangent())
+                compliance = faces.compliance(solve, slopes)
+                if not np.linalg.eigvalsh(compliance).min(initial=1.0) > 0.0:
+                    return "the tangent is not positive definite where faces touch"
+            size = left.norm()
+            linear.solve(left, step)
+            gaps = faces.opened(u - self._unknowns.everywhere(step.array).ravel())
+            new = pressures(compliance, gaps - compliance @ self.pressure)[0]
+            left.array[:] = forces(slopes.T @ (new - self.pressure))
+            size += left.norm()
+            self._force = max(self._force, float(np.linalg.norm(slopes.T @ new)))
+            if size <= _TOLERANCE * self._force:
+                return ""
+            if size > _STAGNANT * last and size <= self._round_off():
+                return ""
+            x.axpy(-1.0, step)
+            linear.solve(left, step)
+            x.axpy(1.0, step)
+            self._take(x)
+            self.pressure, self.iterations = new, self.iterations + 1
+            if not np.isfinite(size) or size > _DIVERGED * self._force:
+                break
+            if size > _SLOWLY * last:
+                compliance = None
+            last = size
+        return f"contact not found: {size:.3g} N are left of forces of {self._force:.3g} N"
 
     def begin(self, displacement: Array, values: Array) -> str:
         """Find the equilibrium at load factor 1 near a displacement (n, d), or say why not."""
@@ -231,10 +291,25 @@ class StrainEquations:
         linear = self._solver.getKSP()
         if self._is_membrane or linear.getType() != "preonly":
             return None
+        matrix, comm = self._held_tangent(), self._space.function_space.mesh.comm
+        return modes_not_positive(matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
+
+    def _held_tangent(self) -> Any:
+        """Assemble the tangent with the supports, and what faces under pressure turn by."""
         self._assemble(self._matrix)
-        self._matrix.zeroRowsColumns(self._held, self._diagonal)
-        comm = self._space.function_space.mesh.comm
-        return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
+        matrix = self._matrix
+        if self.faces is not None:
+            u = self.displacement().ravel()
+            turning = self.faces.turning(u, self.pressure)
+            self._turned, before = matrix.copy(), self._turned
+            added = self._unknowns.distributed(turning)
+            self._turned.axpy(-1.0, added)
+            for entry in (added, before):
+                if entry is not None:
+                    entry.destroy()
+            matrix = self._turned
+        matrix.zeroRowsColumns(self._held, self._diagonal)
+        return matrix
 
     def displacement(self) -> Array:
         """Compute nodal displacements (n, d) on every rank, m."""
@@ -247,7 +322,7 @@ class StrainEquations:
     def destroy(self) -> None:
         """Free what PETSc holds."""
         for entry in (self._solver, self._matrix, self._vector, self._increment, self._load,
-                      self._held, self._cycle):  # fmt: skip
+                      self._held, self._cycle, self._turned):  # fmt: skip
             if entry is not None:
                 entry.destroy()
 
@@ -255,6 +330,7 @@ class StrainEquations:
         self._take(x)
         self._assemble_forces(out)
         out.axpy(-self._factor, self._load)
+        out.array[:] -= self._pushed
         out.array[self._own] = 0.0
 
     def _assemble_tangent(self, snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
@@ -303,6 +379,7 @@ class StrainEquations:
         self._assemble_forces(vector)
         vector.scale(-1.0)
         vector.axpy(self._factor, self._load)
+        vector.array[:] += self._pushed
         increment.set(0.0)
         increment.array[self._own] = values - x.array[self._own]
         loads = np.delete(vector.array, self._own)
@@ -372,7 +449,8 @@ class StrainEquations:
         # symmetric, but a tangent at finite rotation need not be definite
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         few = space.mesh.cell_dimension == 2 or space.node_points.size <= _MOST_DIRECT
-        if few or self._law.state.p is not None:  # multigrid is for displacements alone
+        alone = self._law.state.p is None and self.faces is None
+        if few or not alone:  # multigrid is for displacements alone
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
             linear.getPC().setFactorSolverType("mumps")
@@ -424,6 +502,8 @@ class LargeStrainSolve:
         Seconds.
     nested : bool
         Whether linear elements on the same mesh took the load steps.
+    contact : ContactPressure or None
+        Of faces that press on each other.
     """
 
     displacement: Array
@@ -438,6 +518,7 @@ class LargeStrainSolve:
     paths: int = 1
     dismissed: float | None = None
     nested: bool = False
+    contact: ContactPressure | None = None
 
 
 def solve_large_strain(
@@ -449,6 +530,7 @@ def solve_large_strain(
     energy: str = "corotated",
     pressure: bool = False,
     first_step: float = 0.25,
+    closed: bool = False,
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
 
@@ -476,6 +558,8 @@ def solve_large_strain(
         material.
     first_step : float
         First increment of the load factor.
+    closed : bool
+        Whether faces of cuts press on each other.
 
     Raises
     ------
@@ -485,7 +569,7 @@ def solve_large_strain(
         If steps below 1e-4, or the last of 100, do not converge; with the load factor reached and
         PETSc's reason. If neither of two paths ends in a stable state; with both energies.
     """
-    problem = _Problem(material, space, unknowns, prescribed, load, energy, pressure)
+    problem = _Problem(material, space, unknowns, prescribed, load, energy, pressure, closed)
     if (nested := _nested(problem, first_step)) is not None:
         return nested
     one = problem.path(first_step)
@@ -523,11 +607,12 @@ class _Problem:
     load: Array | None
     energy: str
     pressure: bool
+    closed: bool
 
     def equations(self) -> StrainEquations:
         law = Law(self.material, self.space, self.energy, self.pressure)
         most_inverted = ENERGIES[self.energy].inverted
-        return StrainEquations(law, self.space, self.held, self.load, most_inverted)
+        return StrainEquations(law, self.space, self.held, self.load, most_inverted, self.closed)
 
     def path(self, first_step: float) -> LargeStrainSolve:
         start = perf_counter()
@@ -571,6 +656,7 @@ def _nested(problem: _Problem, first_step: float) -> LargeStrainSolve | None:
 
 def _state(equations: StrainEquations, steps: int, refused: list[str]) -> LargeStrainSolve:
     """Give the end of a path, and free the equations."""
+    faces = equations.faces
     found = LargeStrainSolve(
         equations.displacement(),
         equations.energy(),
@@ -581,6 +667,7 @@ def _state(equations: StrainEquations, steps: int, refused: list[str]) -> LargeS
         refused,
         equations.negative_modes(),
         {},
+        contact=faces and ContactPressure(faces.points, faces.weights, equations.pressure[None]),
     )
     equations.destroy()
     return found
@@ -597,12 +684,12 @@ def _follow(
         target = min(1.0, factor + step)
         if target > 1.0 - 1e-9:
             target = 1.0
-        before = x.array.copy()
+        before, pressed = x.array.copy(), equations.pressure
         reason = equations.advance(target, prescribed(target), step <= _SHORT)
         if not reason:
             factor, steps, step = target, steps + 1, 1.5 * step
             continue
-        x.array[:] = before
+        x.array[:], equations.pressure = before, pressed
         equations.solution.x.scatter_forward()
         refused.append(f"at {target:.4g}: {reason}")
         step *= 0.5

@@ -83,6 +83,21 @@ class Unknowns:
         """Give the unknowns that this rank owns of a nodal array, with pressures of zero."""
         return np.append(values, 0.0)[self.nodal]
 
+    def distributed(self, matrix: csr_array) -> Any:
+        """Make a PETSc Mat of a matrix (k, k) of nodal displacements, which every rank has."""
+        from petsc4py import PETSc
+
+        place = coo_array(matrix[self.nodal.clip(0)])
+        held = self.nodal[place.row] >= 0
+        number = self.everywhere(np.arange(len(self.nodal)) + self.first).ravel().astype(int)
+        at = place.row[held], number[place.col[held]]
+        total = self.function_space.mesh.comm.allreduce(len(self.nodal))
+        rows = coo_array((place.data[held], at), shape=(len(self.nodal), total)).tocsr()
+        size: Any = ((len(self.nodal), None), (len(self.nodal), None))
+        numbers = (one.astype(PETSc.IntType) for one in (rows.indptr, rows.indices))
+        csr: Any = (*numbers, rows.data)
+        return PETSc.Mat().createAIJ(size, csr=csr, comm=self.function_space.mesh.comm)
+
     def everywhere(self, local: Array) -> Array:
         """Gather nodal displacements (n, d) on all ranks from the unknowns of each."""
         values = np.zeros(self.shape[0] * self.shape[1] + 1)

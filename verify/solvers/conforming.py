@@ -251,6 +251,7 @@ def _equilibrium(
             load_forces(scene, space, exact),
             energy_of(scene.material),
             pressure=pressure,
+            closed=scene.contact.closed,
         )
     state = finite.orientation
     record.notes = {
@@ -264,7 +265,7 @@ def _equilibrium(
     }
     record.iterations |= {"newton": finite.iterations, "load steps": finite.steps}
     record.timings |= finite.timings
-    return at_rest(finite.displacement, finite.strain_energy)
+    return at_rest(finite.displacement, finite.strain_energy) | {"contact": finite.contact}
 
 
 def _stability(finite: LargeStrainSolve) -> str:
