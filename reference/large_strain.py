@@ -180,20 +180,29 @@ class StrainEquations:
         x, step, left = self.solution.x.petsc_vec, self._increment, self._vector
         linear, last, compliance = self._solver.getKSP(), np.inf, None
         forces, solve = answers_of(linear, self._unknowns, self._own)
+        before = x.array.copy()
         for _ in range(_MOST_TOUCHES):
             u = self.displacement().ravel()
             slopes = faces.slopes(u, u)
             self._pushed = forces(slopes.T @ self.pressure)
             self._assemble_residual(None, x, left)
-            if compliance is None:
-                linear.setOperators(self._held_tangent())
-                compliance = faces.compliance(solve, slopes)
-                if not np.linalg.eigvalsh(compliance).min(initial=1.0) > 0.0:
-                    return "the tangent is not positive definite where faces touch"
             size = left.norm()
+            if not size <= _DIVERGED * self._force:  # or none: inside out
+                x.array[:] = 0.5 * (x.array + before)
+                self._take(x)
+                continue
+            before = x.array.copy()
+            if compliance is None:
+                for turning in (True, False):  # a body that faces alone keep stable
+                    linear.setOperators(self._held_tangent(turning))
+                    compliance = faces.compliance(solve, slopes)
+                    if _is_definite(compliance):
+                        break
+                else:
+                    return "the tangent is not positive definite where faces touch"
+            left.scale(-1.0)
             linear.solve(left, step)
-            gaps = faces.opened(u - self._unknowns.everywhere(step.array).ravel())
-            new = pressures(compliance, gaps - compliance @ self.pressure)[0]
+            new = self._pressing(faces, compliance, u, step)
             left.array[:] = forces(slopes.T @ (new - self.pressure))
             size += left.norm()
             self._force = max(self._force, float(np.linalg.norm(slopes.T @ new)))
@@ -201,17 +210,20 @@ class StrainEquations:
                 return ""
             if size > _STAGNANT * last and size <= self._round_off():
                 return ""
-            x.axpy(-1.0, step)
+            x.axpy(1.0, step)
             linear.solve(left, step)
             x.axpy(1.0, step)
             self._take(x)
             self.pressure, self.iterations = new, self.iterations + 1
-            if not np.isfinite(size) or size > _DIVERGED * self._force:
-                break
             if size > _SLOWLY * last:
                 compliance = None
             last = size
         return f"contact not found: {size:.3g} N are left of forces of {self._force:.3g} N"
+
+    def _pressing(self, faces: TurningContact, compliance: Array, u: Array, step: Any) -> Array:
+        """Find the pressures (m,) that keep faces closed or apart after a step (a Vec) from u."""
+        gaps = faces.opened(u + self._unknowns.everywhere(step.array).ravel())
+        return pressures(compliance, gaps - compliance @ self.pressure)[0]
 
     def begin(self, displacement: Array, values: Array) -> str:
         """Find the equilibrium at load factor 1 near a displacement (n, d), or say why not."""
@@ -294,15 +306,14 @@ class StrainEquations:
         matrix, comm = self._held_tangent(), self._space.function_space.mesh.comm
         return modes_not_positive(matrix) - int(comm.allreduce(len(self._unknowns.pressures)))
 
-    def _held_tangent(self) -> Any:
+    def _held_tangent(self, turning: bool = True) -> Any:
         """Assemble the tangent with the supports, and what faces under pressure turn by."""
         self._assemble(self._matrix)
         matrix = self._matrix
-        if self.faces is not None:
-            u = self.displacement().ravel()
-            turning = self.faces.turning(u, self.pressure)
+        if turning and self.faces is not None:
+            second = self.faces.turning(self.displacement().ravel(), self.pressure)
             self._turned, before = matrix.copy(), self._turned
-            added = self._unknowns.distributed(turning)
+            added = self._unknowns.distributed(second)
             self._turned.axpy(-1.0, added)
             for entry in (added, before):
                 if entry is not None:
@@ -393,6 +404,15 @@ class StrainEquations:
             self._unproven = False
         else:
             linear.solve(vector, increment)
+        if (faces := self.faces) is not None:
+            u = self.displacement().ravel()
+            slopes = faces.slopes(u, u)
+            forces, solve = answers_of(linear, self._unknowns, self._own)
+            if _is_definite(compliance := faces.compliance(solve, slopes)):
+                new = self._pressing(faces, compliance, u, increment)
+                pushed = solve((slopes.T @ (new - self.pressure))[:, None])
+                increment.array[:] += self._unknowns.own_part(pushed.ravel())
+                self.pressure = new
         # of the product of the tangent as it was with the increment
         at_supports = reactions.createVecLeft()
         reactions.mult(increment, at_supports)
@@ -459,6 +479,10 @@ class StrainEquations:
         linear.setGMRESRestart(100)
         linear.setTolerances(rtol=_LINEAR, atol=0.0, max_it=400)
         return solver
+
+
+def _is_definite(compliance: Array) -> bool:
+    return bool(np.linalg.eigvalsh(compliance).min(initial=1.0) > 0.0)
 
 
 def quadrature_points(space: ConformingSpace) -> Array:

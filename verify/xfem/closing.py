@@ -411,9 +411,9 @@ class _Closing(Newton):
         faces, count = self.force.faces, 0
         for _ in range(_SLIDES):
             before, self.force.slide = self.force.slide, faces.slid(u, self.force)
-            slide = self.force.slide
-            change = np.abs(faces.stiffness[:, None] * (slide - before)).max(initial=0.0)
-            if change <= _SETTLED * faces.pressure(u, slide).max(initial=0.0):
+            now = faces.pressure(u, self.force.slide)
+            change = np.abs(now - faces.pressure(u, before)).max(initial=0.0)
+            if change <= _SETTLED * now.max(initial=0.0):
                 return u, count
             u, more = self.solve(u, np.zeros_like(u), load)
             count += more
