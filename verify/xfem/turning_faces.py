@@ -89,9 +89,7 @@ class TurningFaces(ClosingFaces):
         """Return the slope (N, d) of the energy, in newtons."""
         return self.force_of_step(displacement, displacement, slide)
 
-    def force_of_step(
-        self, before: Floats, after: Floats, slide: Floats | float = 0.0
-    ) -> Floats:
+    def force_of_step(self, before: Floats, after: Floats, slide: Floats | float = 0.0) -> Floats:
         """Return the force (N, d) of a step; with equal ends it is the slope of the energy."""
         pressures = self.weights * self.pressure(after, slide)
         forces = -np.einsum("fq,fqka->fka", pressures, self.slopes(before, after))
