@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from reference.boundary_conditions import RigidMotions
 from reference.contact import TurningContact, answers_of, pressures
@@ -205,10 +206,10 @@ class StrainEquations:
             new = self._pressing(faces, compliance, u, step)
             left.array[:] = forces(slopes.T @ (new - self.pressure))
             size += left.norm()
-            self._force = max(self._force, float(np.linalg.norm(slopes.T @ new)))
-            if size <= _TOLERANCE * self._force:
+            scale = max(self._force, float(np.linalg.norm(slopes.T @ new)))
+            if size <= _TOLERANCE * scale:
                 return ""
-            if size > _STAGNANT * last and size <= self._round_off():
+            if size > _STAGNANT * last and size <= max(_GOOD_ENOUGH * scale, self._round_off()):
                 return ""
             x.axpy(1.0, step)
             linear.solve(left, step)
@@ -387,6 +388,11 @@ class StrainEquations:
         self._assemble(self._matrix)
         if not self._diagonal:
             self._diagonal = mean_stiffness(self._matrix)
+        if (faces := self.faces) is not None:
+            u = self.displacement().ravel()
+            slopes = faces.slopes(u, u)
+            forces, solve = answers_of(self._solver.getKSP(), self._unknowns, self._own)
+            self._pushed = forces(slopes.T @ self.pressure)
         self._assemble_forces(vector)
         vector.scale(-1.0)
         vector.axpy(self._factor, self._load)
@@ -404,10 +410,7 @@ class StrainEquations:
             self._unproven = False
         else:
             linear.solve(vector, increment)
-        if (faces := self.faces) is not None:
-            u = self.displacement().ravel()
-            slopes = faces.slopes(u, u)
-            forces, solve = answers_of(linear, self._unknowns, self._own)
+        if faces is not None:
             if _is_definite(compliance := faces.compliance(solve, slopes)):
                 new = self._pressing(faces, compliance, u, increment)
                 pushed = solve((slopes.T @ (new - self.pressure))[:, None])
@@ -668,6 +671,9 @@ def _nested(problem: _Problem, first_step: float) -> LargeStrainSolve | None:
             return None
         equations = problem.equations()
         begin = linear.refined(coarse.displacement)
+        if (touched := coarse.contact) is not None and equations.faces is not None:
+            nearest = cKDTree(touched.points).query(equations.faces.points)[1]
+            equations.pressure = touched.pressure[0, nearest]
         refused = equations.begin(begin, problem.prescribed(1.0))
     except RuntimeError:  # as the path of the quadratic elements will report
         return None

@@ -1,12 +1,15 @@
-"""Faces of cuts that touch at finite rotation: objectivity, momenta, energy and steady rotation."""
+"""Faces of cuts that touch at finite rotation: objectivity, momenta, energy and equilibria."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from cut_bodies import rotation, shaken
+from xfem_bodies import boundary_nodes
 
 import verify.xfem as xfem
 from verify.xfem.body import MovingSupports
-from verify.xfem.closing import ClosingFaces
+from verify.xfem.closing import ClosingFaces, solve_closed
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import consistent_mass
@@ -102,6 +105,135 @@ def test_the_force_is_the_gradient_of_the_energy_and_the_stiffness_its_derivativ
         missed.append(np.abs(last - first - found).max() / np.abs(found).max())
     assert missed[1] < 0.05
     assert missed[1] < 0.2 * missed[0]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_tangent_at_rest_is_the_whole_derivative_at_any_overlap(dim):
+    phantom, faces = cut_body(dim)
+    u, nudge = turned(phantom, anywhere(phantom, 3), rotation(dim, 0.9)), 1e-6
+    way = anywhere(phantom, 4, 1.0)
+    slide = 1e-2 * np.random.default_rng(6).uniform(-1.0, 1.0, faces.weights.shape)
+    first, last = (faces.force(u + sign * nudge * way, slide) for sign in (-1.0, 1.0))
+    body = xfem.DynamicBody(
+        xfem.InternalForce(phantom, elastic(dim)), xfem.side_wise_mass(phantom, 1.0), contact=faces
+    )  # fmt: skip
+    blocks = np.zeros((len(body.pattern.columns), dim, dim))
+    faces.add_tangent(body.pattern, blocks, u, slide, faces.touching(u, slide), 1.0)
+    found = body.pattern.matrix(blocks) @ (2.0 * nudge * way).ravel()
+    # no point opens or closes within a millionth, or its force would jump by as much
+    assert np.abs((last - first).ravel() - found).max() < 1e-6 * np.abs(found).max()
+
+
+LAWS = ("hooke", "neo_hookean", "stable_neo_hookean")
+COMPRESSED = 0.8
+
+
+def principal_stress(law, dim, across, along, poisson=0.3):
+    """Nominal stress along a principal axis of stretch `across`, the others `along`; E = 1.
+
+    Of plane strain the third is 1. ∂W/∂λ₁ of the energies in their docstrings.
+    """
+    lam, mu = poisson / ((1 + poisson) * (1 - 2 * poisson)), 0.5 / (1 + poisson)
+    J = across * along ** (dim - 1)
+    if law == "hooke":
+        return 2 * mu * (across - 1) + lam * (across - 1 + (dim - 1) * (along - 1))
+    if law == "neo_hookean":
+        return mu * (across - 1 / across) + lam * np.log(J) / across
+    return mu * across + (-mu + (lam + mu) * (J - 1)) * J / across
+
+
+def pressed(dim, law, angle, origin=(0.47, 0.52, 0.55), beside=1.1, mesh=None):
+    """A body whose boundary is stretched, across a cut pressed together, and turned.
+
+    Stretches are 0.8 along the cut's normal and `beside` across it: no shear on its faces.
+    """
+    if mesh is None:
+        mesh = shaken(xfem.rectangle_mesh((6, 6)) if dim == 2 else xfem.box_mesh((3, 3, 3)), 1)
+    normal = np.array([0.3, 1.0, -0.2][:dim]) / np.linalg.norm([0.3, 1.0, -0.2][:dim])
+    phantom = xfem.cut_mesh(mesh, [xfem.Plane(np.array(origin[:dim]), normal)])
+    across = np.outer(normal, normal)
+    R = rotation(dim, np.radians(angle))
+    F = R @ (COMPRESSED * across + beside * (np.eye(dim) - across))
+    exact = phantom.node_points @ (F - np.eye(dim)).T
+    outer = np.zeros(len(mesh.points), dtype=bool)
+    outer[boundary_nodes(mesh)] = True
+    fixed = np.repeat(outer[phantom.node_parent, None], dim, axis=1)
+    material = replace(elastic(dim), law=law)
+    faces, force = TurningFaces(phantom, material), xfem.InternalForce(phantom, material)
+    found = solve_closed(force, faces, xfem.Supports(fixed, np.where(fixed, exact, 0.0)))
+    return phantom, faces, found, exact
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("dim, angle", [(2, 30.0), (2, 120.0), (3, 120.0)])
+def test_a_pressed_and_turned_cut_is_not_felt(law, dim, angle):
+    _, _, found, exact = pressed(dim, law, angle)
+    assert np.abs(found.displacement - exact).max() < 1e-10
+    pressure = -principal_stress(law, dim, COMPRESSED, 1.1)
+    assert pressure > 0.15
+    assert np.abs(found.pressure / pressure - 1.0).max() < 1e-8
+    assert found.residual < 1e-9
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-6, 1e-12])
+def test_beside_a_sliver_a_pressed_and_turned_cut_is_not_felt_either(share):
+    mesh = shaken(xfem.rectangle_mesh((6, 6)), 1)
+    node = mesh.points[((mesh.points - 0.5) ** 2).sum(axis=1).argmin()]
+    origin = node + share / 6 * np.array([0.3, 1.0]) / np.hypot(0.3, 1.0)
+    _, _, found, exact = pressed(2, "neo_hookean", 120.0, origin, mesh=mesh)
+    assert np.abs(found.displacement - exact).max() < 1e-10
+    assert np.abs(found.pressure / -principal_stress("neo_hookean", 2, 0.8, 1.1) - 1).max() < 1e-8
+
+
+def bent(dim, turn, amount=1.0, linear=False, law="hooke"):
+    """A block cut at an odd angle, its top moved down, aside and tilted; the whole of it turned."""
+    mesh = shaken(xfem.rectangle_mesh((6, 6)) if dim == 2 else xfem.box_mesh((3, 3, 3)), 1)
+    normal = np.array([0.25, 1.0, -0.15][:dim])
+    phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.47, 0.52, 0.55][:dim], normal)])
+    x, y = phantom.node_points, phantom.node_points[:, 1]
+    moved = np.zeros_like(x)
+    moved[:, 1] = np.where(y == 1.0, amount * (-0.04 + 0.12 * (x[:, 0] - 0.5)), 0.0)
+    moved[:, 0] = np.where(y == 1.0, 0.03 * amount, 0.0)
+    fixed = np.repeat(((y == 0.0) | (y == 1.0))[:, None], dim, axis=1)
+    values = np.where(fixed, turned(phantom, moved, turn), 0.0)
+    material = replace(elastic(dim), law=law)
+    force = xfem.InternalForce(phantom, material, "linear" if linear else "corotational")
+    faces = ClosingFaces(phantom, material) if linear else TurningFaces(phantom, material)
+    return phantom, faces, solve_closed(force, faces, xfem.Supports(fixed, values))
+
+
+@pytest.mark.parametrize("law", ["hooke", "neo_hookean"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_an_equilibrium_turns_with_its_supports_and_faces_push_and_turn_nothing(dim, law):
+    R = rotation(dim, np.radians(120.0))
+    phantom, faces, straight = bent(dim, np.eye(dim), law=law)
+    _, _, other = bent(dim, R, law=law)
+    assert 0.1 < np.mean(straight.pressure > 0.0) < 0.9  # open over a part of its length
+    back = turned(phantom, straight.displacement, R)
+    assert np.abs(other.displacement - back).max() < 1e-10
+    assert np.abs(other.pressure - straight.pressure).max() < 1e-8 * straight.pressure.max()
+    assert other.strain_energy == pytest.approx(straight.strain_energy, rel=1e-10)
+    slide = -straight.pressure / faces.stiffness[:, None] - faces.gaps(straight.displacement)
+    force = faces.force(straight.displacement, slide)
+    size = np.abs(force).sum()
+    assert size > 1e-3
+    assert np.abs(force.sum(axis=0)).max() < 1e-12 * size
+    places = phantom.node_points + straight.displacement
+    assert np.abs(moment(places, force)).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_small_loads_at_rest_have_the_contact_of_linear_kinematics(dim):
+    found = []
+    for amount in (2e-3, 1e-3):
+        faces, turning = bent(dim, np.eye(dim), amount)[1:]
+        linear = bent(dim, np.eye(dim), amount, linear=True)[2]
+        forces = [(faces.weights * one.pressure).sum() for one in (turning, linear)]
+        size = np.abs(linear.displacement).max()
+        found.append(np.abs(turning.displacement - linear.displacement).max() / size)
+        # two consistent methods of other stiffness on the coarse mesh
+        assert forces[0] == pytest.approx(forces[1], rel=0.02)
+    assert found[1] < 0.01
 
 
 @pytest.mark.parametrize("dim", [2, 3])
