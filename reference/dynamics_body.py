@@ -357,9 +357,12 @@ class MovingBody:
             return self._filled([one.values(share * factor, 0.0) for one, factor in pairs])
 
         material = self.scene.material
+        closed, energy = self.contact is not None, energy_of(material)
         found = solve_large_strain(
-            material, self.space, self.held, prescribed, load, energy_of(material)
+            material, self.space, self.held, prescribed, load, energy, closed=closed
         )
+        if found.contact is not None:
+            self.pressure_before = self.pressure = found.contact.pressure[0]
         return found.displacement.ravel()
 
     @property

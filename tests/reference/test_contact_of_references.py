@@ -324,6 +324,11 @@ def test_gaps_that_turn_are_objective_and_their_forces_turn_nothing(d, degree):
     nudge = 1e-6 * way
     ends = [faces.opened((other + sign * nudge).ravel()) for sign in (1.0, -1.0)]
     assert np.abs(found - (ends[0] - ends[1]) / 2e-6).max() < 1e-8 * np.abs(found).max()
+    pressed = random.uniform(0.0, 1.0, len(gaps))
+    ends = [faces.slopes(end, end).T @ pressed
+            for end in (after.ravel() + sign * nudge.ravel() for sign in (1.0, -1.0))]  # fmt: skip
+    second = faces.turning(after.ravel(), pressed) @ way.ravel()
+    assert np.abs(second - (ends[0] - ends[1]) / 2e-6).max() < 1e-7 * np.abs(second).max()
     off = [np.abs(faces.opened(share * way.ravel()) - linear.opened(share * way.ravel())).max()
            for share in (1e-3, 5e-4)]  # fmt: skip
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)  # of second order

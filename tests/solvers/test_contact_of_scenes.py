@@ -187,15 +187,109 @@ def test_other_laws_press_alike_keep_spin_and_gain_nothing_from_a_cut_that_opens
         assert np.abs(forces[model] - forces["hooke"]).max() < 0.02 * forces["hooke"].max()
 
 
-@pytest.mark.parametrize("name", ["xfem", "conforming", "snapping"])
-def test_contact_at_finite_rotation_is_of_motion(name):
-    solver, still = find_solver(name), {"kind": "static", "kinematics": "finite_rotation"}
-    assert solver.refuses(spinning()) is None
-    held = {"initial": None, "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}]}
-    why = solver.refuses(spinning(analysis=still, **held))
-    assert "('static finite_rotation') is not offered" in why
-    begins = {**held, "initial": {"kind": "equilibrium", "cuts": "open"}}
-    assert "('static finite_rotation')" in solver.refuses(spinning(**begins))
+LEAN, PRESS = np.deg2rad(25.0), 0.2
+
+
+def turn_of(angle):
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    return np.array([[c, -s], [s, c]])
+
+
+def stack(angle, model, **changes):
+    """A stack that leans by 25°, cut across, between plates that turn and press it to 0.8.
+
+    Without lateral contraction F = R (1 − 0.2 a⊗a), and the pressure is −∂W/∂λ, by E = 1 and λ = 0:
+    1 − λ of Hooke's law, ½ (1/λ − λ) of the neo-Hookean one.
+    """
+    along = np.array([np.cos(LEAN), np.sin(LEAN)])
+    across = np.array([-along[1], along[0]])
+    corners = [s * along + 0.4 * t * across for s, t in ((0, -1), (1, -1), (1, 1), (0, 1))]
+    cut = [0.47 * along + sign * 0.6 * across for sign in (-1.0, 1.0)]
+    turn = {"angle": angle, "centre": [0.0, 0.0]}
+    moved = -PRESS * turn_of(angle) @ along
+    content = {
+        "geometry": {"kind": "polygon", "corners": [one.tolist() for one in corners]},
+        "mesh": {"pattern": "unstructured", "sizes": [0.2]}, "reference": {"size": 0.5},
+        "material": scenes.soft(poisson=0.0, model=model), "contact": {"expected": "closed"},
+        "analysis": {"kind": "static", "kinematics": "finite_rotation"},
+        "supports": [
+            {"where": f"{along[0]}*x + {along[1]}*y < 1e-6", "displacement": [0.0, 0.0],
+             "rotation": turn},
+            {"where": f"{along[0]}*x + {along[1]}*y > 0.999999", "displacement": moved.tolist(),
+             "rotation": turn},
+        ],
+    }  # fmt: skip
+    line = {"kind": "polyline", "points": [one.tolist() for one in cut]}
+    F = turn_of(angle) @ (np.eye(2) - PRESS * np.outer(along, along))
+    left = 1.0 - PRESS
+    pressure = PRESS if model == "hooke" else 0.5 * (1.0 / left - left)
+    return scenes.scene([line], **content | changes), F, pressure
+
+
+@pytest.mark.parametrize("model", ["hooke", "neo_hookean"])
+@pytest.mark.parametrize(
+    "name, given",
+    [("xfem", {}), ("virtual_node", {}), ("snapping", {}), ("subdivision", {}),
+     ("conforming", {}), ("conforming", {"mesh": "remeshed", "degree": 2}), ("reference", {})],
+)  # fmt: skip
+def test_a_stack_that_is_pressed_and_turned_has_the_stress_of_one_piece(name, given, model):
+    for angle in (30.0, 120.0):
+        scene, F, pressure = stack(angle, model)
+        solver = find_solver(name)
+        assert solver.refuses(scene) is None
+        found = solver.solve(scene, 0, 0, **given)
+        exact = found.points @ (F - np.eye(2)).T
+        assert np.abs(found.displacement[0] - exact).max() < 1e-10
+        assert np.abs(found.contact.pressure / pressure - 1.0).max() < 1e-8
+        assert found.contact.weights.sum() == pytest.approx(0.8, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["xfem", "conforming"])
+def test_a_motion_that_is_pressed_and_turned_begins_in_its_equilibrium(name):
+    """The first state is that at rest, and nothing moves from there but by the firmer contact."""
+    analysis = {"kind": "dynamic", "kinematics": "finite_rotation", "duration": 1.0,
+                "outputs": 3, "time_step": 0.05}  # fmt: skip
+    initial = {"kind": "equilibrium", "cuts": "open"}
+    material = scenes.soft(poisson=0.0, density=1.0)
+    scene, F, pressure = stack(
+        120.0, "hooke", analysis=analysis, initial=initial, material=material
+    )
+    found = find_solver(name).solve(scene, 0, 0, scheme="energy_momentum")
+    exact = found.points @ (F - np.eye(2)).T
+    assert np.abs(found.displacement[0] - exact).max() < 1e-9
+    # of xfem a penalty holds the faces in motion: they spring by p/γ, 0.04 p h/E
+    assert np.abs(found.displacement - exact).max() < (0.1 * 0.2 * 0.2 if name == "xfem" else 1e-8)
+    force = found.contact.pressure[1:] @ found.contact.weights
+    assert np.abs(force / (0.8 * pressure) - 1.0).max() < (0.1 if name == "xfem" else 1e-6)
+
+
+@pytest.mark.parametrize("name", ["conforming", "xfem"])
+def test_a_motion_that_is_damped_ends_in_the_equilibrium(name):
+    """A block turned by 70° and pressed aslant: its cut is shut over a part of its length."""
+    turn = {"angle": 70.0, "centre": [0.5, 0.0]}
+    R = turn_of(70.0)
+    content = {
+        "material": scenes.soft(density=1.0), "contact": {"expected": "closed"},
+        "supports": [{"where": "bottom", "displacement": [0.0, 0.0], "rotation": turn},
+                     {"where": "top", "displacement": (R @ [0.02, -0.05]).tolist(),
+                      "rotation": turn | {"angle": 76.0}}],
+    }  # fmt: skip
+    cut = {"kind": "polyline", "points": [[-0.1, 0.41], [1.1, 0.57]]}
+    still = {"kind": "static", "kinematics": "finite_rotation"}
+    rest = find_solver(name).solve(scenes.scene([cut], analysis=still, **content), 0, 0)
+    assert 0.1 < np.mean(rest.contact.pressure > 0.0) < 0.9
+    # implicit Euler divides what swings by ωΔt, 10 at least, in each of 20 steps
+    motion = {"kind": "dynamic", "kinematics": "finite_rotation", "duration": 400.0,
+              "time_step": 20.0, "outputs": 2}  # fmt: skip
+    scene = scenes.scene(
+        [cut], analysis=motion, initial={"kind": "equilibrium", "cuts": "open"}, **content
+    )
+    found = find_solver(name).solve(scene, 0, 0, scheme="implicit_euler")
+    far = np.abs(found.displacement[-1] - rest.displacement[0]).max()
+    force, other = (one.contact.pressure[-1] @ one.contact.weights for one in (found, rest))
+    # the motion of xfem has another contact, whose faces overlap by 0.04 p h/E
+    assert far < (1e-9 if name == "conforming" else 0.1 * 0.25 * rest.contact.pressure.max())
+    assert force == pytest.approx(other, rel=1e-8 if name == "conforming" else 0.05)
 
 
 @pytest.mark.parametrize("name", ["xfem", "conforming"])
