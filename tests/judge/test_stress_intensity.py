@@ -62,7 +62,6 @@ MOTION = {"kind": "dynamic", "duration": 1.0, "outputs": 5}
         ),
         ({"analysis": {"kinematics": "corotational"}}, {}, "linear kinematics"),
         ({"analysis": MOTION | {"damping": [0, 0.1]}}, {}, "stiffness"),
-        ({"analysis": MOTION}, {"time": 0.4}, "no output time"),
         ({"analysis": MOTION}, {"time": 0.0}, "opened"),
         ({"analysis": MOTION, "cuts": OPENS_LATER}, {"time": 0.5}, "opened"),
         ({"analysis": MOTION, "loads": JUMP}, {}, r"body force\) jumps"),

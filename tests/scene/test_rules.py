@@ -242,6 +242,13 @@ BROKEN = [
      "quantities[0].time: belongs to a dynamic analysis"),
     ({"quantities": [{"kind": "maximum_displacement", "time": 1.5}], **MOVING},
      "quantities[0].time: 1.5 s is after the end, 1 s"),
+    # a line between two output times is no motion
+    *(({"quantities": [{**asked, "time": 0.55}], "cuts": [LINE], **MOVING},
+       "quantities[0].time: 0.55 s is no output time")
+      for asked in ({"kind": "maximum_displacement"}, {"kind": "opening", "name": "o", "at": 0.5},
+                    {"kind": "displacement", "name": "u", "point": [0.1, 0.2], "component": "x"},
+                    {"kind": "stress", "name": "s", "point": [0.2, 0.1], "radius": 0.05,
+                     "component": "xx"})),
     ({"cuts": [{**LINE, "opens_at": 0.5}]}, "cuts[0].opens_at: belongs to a dynamic analysis"),
     ({"cuts": [{**LINE, "opens_at": 1.5}], **MOVING}, "cuts[0].opens_at: 1.5 s is after the end,"),
     ({"supports": held(history=[[0.0, 1.0]])}, "supports[0].history: belongs to a dynamic"),

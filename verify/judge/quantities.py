@@ -16,7 +16,7 @@ from verify.compare.cut_deviation import RealisedCut
 from verify.compare.cut_profile import cut_place, opening, point_displacement
 from verify.compare.hooke import Law, strain_energy
 from verify.compare.locate import Field
-from verify.compare.motion import SolutionMotion
+from verify.compare.motion import SolutionMotion, step_at
 from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplex_bodies import MembraneBody
 from verify.compare.simplices import cells_of, points_in, simplices
@@ -112,6 +112,8 @@ class Measured:
             if isinstance(asked, StressIntensityQuantity) and asked.at_blade:
                 return blade_intensity(self.scene, self.motion, self.body, asked)
             return solution_intensity(self.scene, self.solution, asked, self._factors)
+        if (time := getattr(asked, "time", None)) is not None:
+            step_at(self.solution, time)  # a line between two outputs is not its answer
         if isinstance(asked, PartQuantity):
             return part_quantity(self.scene, self.solution, self.motion, self.law, asked)
         if isinstance(asked, ReactionQuantity):

@@ -90,8 +90,6 @@ def _defect_in_time(scene: Scene, asked: FractureQuantity) -> str | None:
         )
     if still_closed and time <= opens + slack:
         return f"at {time:.6g} s cut '{asked.cut}' has not opened yet (opens_at = {opens:.6g} s)"
-    if min(abs(time - t) for t in scene.analysis.output_times) > slack:
-        return f"{time:.6g} s is no output time, and accelerations are known at those only"
     forces: list[BodyForce | CutFaces] = [x for x in scene.loads if isinstance(x, BodyForce)]
     for load in [*forces, *_face_loads(scene, asked)]:
         if any(abs(time - t) <= slack for t in jumps(load.history)):
