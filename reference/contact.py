@@ -201,8 +201,8 @@ class TurningContact(FaceContact):
     def turning(self, displacement: Array, pressures: Array) -> csr_array:
         """Return the second derivative (k, k) of pressures (m,) times gaps.
 
-        n = Fμ turns by δn = −(1 − nn)F⁻ᵀδFᵀn. With the slip w = F⁻¹(D − gn) a gap changes by n·v,
-        v = δD − δF w, and δ²g = 2 δn·v − g δn·δn.
+        n = Fμ turns by δn = −(1 − nn)F⁻ᵀδFᵀn. A gap changes by n·v, where v = δD − δF w with the
+        slip w = F⁻¹(D − gn). Hence δ²g = 2 δn·v − g δn·δn.
         """
         F, D, _, y, s = self._at(displacement)
         n = np.einsum("pak,pk->pa", F, y / s)
@@ -213,9 +213,8 @@ class TurningContact(FaceContact):
         turn = _diagonal(-np.einsum("pak,pb->pakb", away, n)) @ self._mean
         step = np.einsum("ab,pk->pakb", np.eye(n.shape[1]), slip)
         step = self._jump - _diagonal(step) @ self._mean
-        press = np.repeat(pressures[self._row], n.shape[1])
-        half = turn.T @ (diags_array(press) @ step)
-        half -= turn.T @ (diags_array(0.5 * press * np.repeat(gap, n.shape[1])) @ turn)
+        press, gaps = (np.repeat(one, n.shape[1]) for one in (pressures[self._row], 0.5 * gap))
+        half = turn.T @ (diags_array(press) @ (step - diags_array(gaps) @ turn))
         return csr_array(half + half.T)
 
     def _sums(self, values: Array) -> csr_array:
@@ -233,45 +232,6 @@ def _diagonal(blocks: Array) -> csr_array:
     columns = np.arange(flat[:, 0].size).reshape(len(blocks), 1, -1)
     columns, shape = np.broadcast_to(columns, flat.shape), (rows.size, flat[:, 0].size)
     return _entries(flat, rows, columns, shape)
-
-
-def answers_of(
-    solver: Any, unknowns: Any, fixed: NDArray[np.int64]
-) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """Return what a factorised system makes of nodal forces, zero at `fixed` unknowns of a rank.
-
-    Parameters
-    ----------
-    solver : PETSc KSP
-    unknowns : reference.space.Unknowns
-    fixed : (f,) int array
-
-    Returns
-    -------
-    forces : function
-        The part of this rank of nodal forces (k,).
-    solve : function
-        Displacements (k, c) on all ranks, of columns of nodal forces.
-    """
-    from petsc4py import PETSc
-
-    def forces(values: Array) -> Array:
-        own = unknowns.own_part(values)
-        own[fixed] = 0.0
-        return np.asarray(own)
-
-    def solve(columns: Array) -> Array:
-        right: Any = np.asfortranarray(np.column_stack([forces(one) for one in columns.T]))
-        size: Any = ((len(right), None), (None, columns.shape[1]))
-        loads = PETSc.Mat().createDense(size, array=right, comm=solver.comm)
-        found = loads.duplicate()
-        solver.matSolve(loads, found)
-        each = [unknowns.everywhere(one).ravel() for one in found.getDenseArray().T]
-        loads.destroy()
-        found.destroy()
-        return np.column_stack(each)
-
-    return forces, solve
 
 
 def _entries(values: Array, rows: Any, columns: Any, shape: tuple[int, int]) -> csr_array:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from reference.boundary_conditions import constrained_values, load_form
-from reference.contact import FaceContact, answers_of, pressures
+from reference.contact import FaceContact, pressures
 from reference.deformation import lame
 from reference.inside_out import naming_weak_places
 from reference.law import Law, mass_matrix
 from reference.linear_solvers import (
     Answer,
+    answers_of,
     factorised,
     mean_stiffness,
     solve_by_multigrid,

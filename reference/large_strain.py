@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from reference.boundary_conditions import RigidMotions
-from reference.contact import TurningContact, answers_of, pressures
+from reference.contact import TurningContact, pressures
 from reference.deformation import MembraneStretch
 from reference.inside_out import Orientation, OrientationCheck, place_text
 from reference.law import ENERGIES, Law, quadrature
 from reference.linear_solvers import (
     Cycle,
+    answers_of,
     mean_stiffness,
     modes_not_positive,
     options,
@@ -410,12 +411,11 @@ class StrainEquations:
             self._unproven = False
         else:
             linear.solve(vector, increment)
-        if faces is not None:
-            if _is_definite(compliance := faces.compliance(solve, slopes)):
-                new = self._pressing(faces, compliance, u, increment)
-                pushed = solve((slopes.T @ (new - self.pressure))[:, None])
-                increment.array[:] += self._unknowns.own_part(pushed.ravel())
-                self.pressure = new
+        if faces is not None and _is_definite(compliance := faces.compliance(solve, slopes)):
+            new = self._pressing(faces, compliance, u, increment)
+            pushed = solve((slopes.T @ (new - self.pressure))[:, None])
+            increment.array[:] += self._unknowns.own_part(pushed.ravel())
+            self.pressure = new
         # of the product of the tangent as it was with the increment
         at_supports = reactions.createVecLeft()
         reactions.mult(increment, at_supports)

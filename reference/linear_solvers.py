@@ -113,6 +113,46 @@ def factorised(matrix: Any, kind: Kind = "definite", controls: dict[int, int] | 
     return solver
 
 
+Answers = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def answers_of(solver: Any, unknowns: Any, fixed: NDArray[np.int64]) -> tuple[Answers, Answers]:
+    """Return what a factorised system makes of nodal forces, zero at `fixed` unknowns of a rank.
+
+    Parameters
+    ----------
+    solver : PETSc KSP
+    unknowns : reference.space.Unknowns
+    fixed : (f,) int array
+
+    Returns
+    -------
+    forces : function
+        The part of this rank of nodal forces (k,).
+    solve : function
+        Displacements (k, c) on all ranks, of columns of nodal forces.
+    """
+    from petsc4py import PETSc
+
+    def forces(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        own = unknowns.own_part(values)
+        own[fixed] = 0.0
+        return np.asarray(own)
+
+    def solve(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        right: Any = np.asfortranarray(np.column_stack([forces(one) for one in columns.T]))
+        size: Any = ((len(right), None), (None, columns.shape[1]))
+        loads = PETSc.Mat().createDense(size, array=right, comm=solver.comm)
+        found = loads.duplicate()
+        solver.matSolve(loads, found)
+        each = [unknowns.everywhere(one).ravel() for one in found.getDenseArray().T]
+        loads.destroy()
+        found.destroy()
+        return np.column_stack(each)
+
+    return forces, solve
+
+
 def preconditioned_gradients(matrix: Any, tolerance: float) -> Any:
     """Prepare conjugate gradients with an incomplete Cholesky factor; gives a PETSc KSP.
 

@@ -315,7 +315,10 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
         if not isinstance(entry, Gravity):
             load += first_factor(entry.history) * forces_of(scene, i, phantom, exact)
     path = path_of_supports(scene, phantom, exact)
-    prescribed: Callable[[float], _Floats] = lambda share: path(share).values
+
+    def prescribed(share: float) -> _Floats:
+        return path(share).values
+
     if (faces := faces_of(scene, phantom)) is not None:
         return solve_closed(body.force, faces, path(1.0), load, prescribed).displacement
     check_bodies(phantom, path(1.0))
@@ -492,13 +495,16 @@ def solve_equilibrium(
         path = path_of_supports(scene, phantom, exact)
         supports = path(1.0)
         load = loads_of(scene, phantom, exact)
+
+    def prescribed(share: float) -> _Floats:
+        return path(share).values
+
     body = resisting or phantom
     material, kinematics = material_of(scene, body.mesh), scene.analysis.kinematics
     if (faces := faces_of(scene, phantom, penalise)) is not None:
         with record.timed("solve"):
             elastic = InternalForce(body, material, kinematics, kernels)
-            along: Callable[[float], _Floats] = lambda share: path(share).values
-            closed = solve_closed(elastic, faces, supports, load, along, load_steps or 1)
+            closed = solve_closed(elastic, faces, supports, load, prescribed, load_steps or 1)
         record.iterations["contact"] = closed.iterations
         record.notes["linear solver"] = _solver_text(closed.solver, kernels)
         record.notes["residual"] = f"{closed.residual:.3e}"
@@ -516,9 +522,7 @@ def solve_equilibrium(
     check_bodies(body, supports)
     with record.timed("solve"):
         force = law(body, material, kinematics, kernels=kernels)
-        found = static_equilibrium(
-            force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
-        )
+        found = static_equilibrium(force, supports.fixed, prescribed, load, load_steps or 1)
     record.iterations["newton"] = sum(found.iterations)
     record.notes |= {
         "linear solver": " and ".join(_solver_text(one, kernels) for one in sorted(found.solvers)),

@@ -367,7 +367,7 @@ class ClosedSolution(NamedTuple):
 
 
 _SLIDES, _SETTLED = 60, 1e-9  # corrections of curved or turning faces; share of the pressure
-_ROUNDING = 1e-13  # residual that a linear solve leaves: of that of a factorisation
+_ROUNDING = 1e-13  # residual that conjugate gradients leave, as a factorisation does
 _WEAK = 20  # power of the share of rotations held: ties of 1e-6, 3e-3, 0.07 and 1
 
 

@@ -1,4 +1,4 @@
-"""Contact of the faces of cuts in motion at finite rotation: normals turn with the faces.
+"""Contact of the faces of cuts at finite rotation: normals turn with the faces.
 
 F is the mean of the deformation gradients on both sides of a facet, N its undeformed normal and Δ
 the jump of the displacement. With C = FᵀF and d = FᵀΔ the gap along the deformed normal
@@ -20,6 +20,13 @@ without a quotient that is 0/0. As the energy is convex in g the work of the for
 change of the energy: an impact gains nothing. C and d are invariant and quadratic in positions. So
 G, taken in the middle of the step, turns nothing (Simo & Tarnow, ZAMP 43, 1992; Gonzalez, Comput.
 Methods Appl. Mech. Engrg. 190, 2000): momenta of a body stay, whatever the step.
+
+At rest the pressure is −[σ + γ g]₋ as in `verify.xfem.closing`, with the nominal mean stress
+σ = n·PN of the last solution: a given gap σ/γ, corrected from solution to solution. With γ = 10 of
+the stability bound a correction leaves 0.16 of the error before. In n = Fm, the slip
+w = F⁻¹(Δ − g n) and v = δΔ − δF w
+
+    δg = n·v,   δn = −(1 − nn) F⁻ᵀ δFᵀ n,   δ²g = 2 δn·v − g δn·δn.
 """
 
 from typing import NamedTuple
@@ -50,7 +57,7 @@ class _Faces(NamedTuple):
 
 
 class TurningFaces(ClosingFaces):
-    """Faces of the cuts of a body in motion at finite rotation.
+    """Faces of the cuts of a body at finite rotation.
 
     Parameters
     ----------
