@@ -686,7 +686,9 @@ def _nested(problem: _Problem, first_step: float) -> LargeStrainSolve | None:
 
 def _state(equations: StrainEquations, steps: int, refused: list[str]) -> LargeStrainSolve:
     """Give the end of a path, and free the equations."""
-    faces = equations.faces
+    faces, contact = equations.faces, None
+    if faces is not None:
+        contact = ContactPressure(faces.points, faces.weights, equations.pressure[None])
     found = LargeStrainSolve(
         equations.displacement(),
         equations.energy(),
@@ -697,7 +699,7 @@ def _state(equations: StrainEquations, steps: int, refused: list[str]) -> LargeS
         refused,
         equations.negative_modes(),
         {},
-        contact=faces and ContactPressure(faces.points, faces.weights, equations.pressure[None]),
+        contact=contact,
     )
     equations.destroy()
     return found

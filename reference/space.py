@@ -89,7 +89,7 @@ class Unknowns:
 
         place = coo_array(matrix[self.nodal.clip(0)])
         held = self.nodal[place.row] >= 0
-        number = self.everywhere(np.arange(len(self.nodal)) + self.first).ravel().astype(int)
+        number = self.everywhere(np.arange(len(self.nodal)) + float(self.first)).ravel().astype(int)
         at = place.row[held], number[place.col[held]]
         total = self.function_space.mesh.comm.allreduce(len(self.nodal))
         rows = coo_array((place.data[held], at), shape=(len(self.nodal), total)).tocsr()

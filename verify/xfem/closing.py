@@ -172,12 +172,8 @@ class ClosingFaces:
         smooth = _curved(self.normal, self.points, step, cuts)
         turned = self.shapes[..., None] * (smooth - self.normal[:, None])[:, :, None]
         self.nodes: Ints = np.concatenate(list(phantom.cells[pieces.T]), axis=1)
-        self.stiffness = (
-            (FIRMNESS if moving else STABILITY)
-            * _faces_of_pieces(phantom.part[pieces])
-            * largest
-            / flexible.sum(axis=1)
-        )
+        firmness = (FIRMNESS if moving else STABILITY) * _faces_of_pieces(phantom.part[pieces])
+        self.stiffness = firmness * largest / flexible.sum(axis=1)
         self._rows = self.stress[:, None] + self.stiffness[:, None, None, None] * self.gap
         self._per_stiffness = self.weights / self.stiffness[:, None]
         self._trial = self._of_nodes(self._rows)
@@ -495,7 +491,8 @@ def solve_closed(
             u, counts = path.follow(np.zeros(shape), load_steps)
             u, more = newton.settled(path.settle(u), given)
         else:
-            u, *counts = newton.solve(np.zeros(shape), values, given)
+            u, count = newton.solve(np.zeros(shape), values, given)
+            counts = (count,)
             u, more = newton.settled(u, given)
     except (NotInEquilibriumError, SingularStiffnessError) as error:
         raise NotConvergedError(
