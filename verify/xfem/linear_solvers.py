@@ -124,7 +124,7 @@ class SparseLU(LinearSolver):
 def scaled_inverse(
     matrix: sparray, definite: bool = True, block: int = 1
 ) -> Callable[[Floats], Floats]:
-    """Factorise a matrix (n, n); what is returned multiplies (n,) or (n, k) by its inverse.
+    """Factorise a matrix (n, n); the result multiplies (n,) or (n, k) by its inverse.
 
     Rows and columns are scaled by the diagonal before: the entries of a sliver are many orders
     smaller than others, and a pivot among numbers of both sizes would lose them.
