@@ -1,7 +1,7 @@
 """Supports that jump in a motion are refused before a run: nothing follows a jump.
 
-A bar of n elements whose end jumps by d stores ½ E A d² n / L beside it at once, and its end moves
-by d in a step of L / (n c): there is no limit.
+A bar of n elements whose end jumps by d stores ½ E A d² n / L beside it at once. Its end moves
+by d in a step of L / (n c). There is no limit.
 """
 
 import pytest
