@@ -42,6 +42,7 @@ STATED = {"initial": {"kind": "field", "displacement": ["0.01 * x", "-0.02 * x"]
     [
         (moving({"displacement": MOVED, "history": [*SLOWLY[:2], [0.3, 0.4]]}), "0.3 s"),
         (moving({"displacement": MOVED, "history": THERE}, **STILL), "0.3 s"),
+        (moving({"displacement": MOVED, "history": [*SLOWLY[:2], [0.3 + 3e-10, 0.4]]}), "0.3 s"),
         (moving({"displacement": MOVED, "history": [[0.0, 0.0], [0.0, 1.0]]}, **STILL), "0 s"),
         (moving({"displacement": MOVED}), "0 s"),
         (moving({"displacement": ["0.02 * y", "0.01 * cos(9 * t)"]}), "0 s"),
