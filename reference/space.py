@@ -89,8 +89,8 @@ class Unknowns:
 
         place = coo_array(matrix[self.nodal.clip(0)])
         held = self.nodal[place.row] >= 0
-        number = self.everywhere(np.arange(len(self.nodal)) + float(self.first)).ravel().astype(int)
-        at = place.row[held], number[place.col[held]]
+        number = self.everywhere(self.first + np.arange(len(self.nodal), dtype=float))
+        at = place.row[held], number.ravel()[place.col[held]].astype(int)
         total = self.function_space.mesh.comm.allreduce(len(self.nodal))
         rows = coo_array((place.data[held], at), shape=(len(self.nodal), total)).tocsr()
         size: Any = ((len(self.nodal), None), (len(self.nodal), None))
