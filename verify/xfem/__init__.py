@@ -100,9 +100,10 @@ which re-exports `faceted_cuts` and is easier read first:
 `polar`, `element`, `hyperelastic`, `loads_and_supports`
     nearest rotations; material, force and tangents of an element, linear elasticity being R = I;
     load vectors, prescribed displacements
-`block_pattern`, `mass`, `linear_solvers`, `internal_force`
-    sparsity and supports in a matrix; masses, side-wise and consistent; SciPy behind one protocol,
-    and the operations that `verify.accelerated` replaces; force, energy and stiffness of a body
+`block_pattern`, `linear_solvers`, `mass`, `internal_force`
+    sparsity and supports in a matrix; SciPy behind one protocol, and the operations that
+    `verify.accelerated` replaces; masses, side-wise and consistent; force, energy and stiffness of
+    a body
 `statics`
     linear; Newton's method with a line search on the potential energy
 `body`, `explicit`, `implicit`
