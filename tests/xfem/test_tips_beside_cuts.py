@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cut_bodies import shaken
 
-from verify.xfem.cuts import Plane, PolygonPatch
-from verify.xfem.mesh import box_mesh, rectangle_mesh
+from verify.xfem.cuts import PolygonPatch
+from verify.xfem.mesh import box_mesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.subdivision import subdivide
 
@@ -41,15 +41,6 @@ def assert_conforming(mesh, cuts):
     torn = facet_measures(divided.cut_facets).sum()
     assert torn > 0.0
     assert exterior(divided) == pytest.approx(2.0 * mesh.dim + 2.0 * torn, abs=1e-9)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_subdivision_by_crossing_planes_fills_the_body_and_leaves_no_hanging_nodes(dim):
-    for seed in range(2):
-        rng = np.random.default_rng(seed)
-        mesh = shaken(rectangle_mesh((3, 3)) if dim == 2 else box_mesh((2, 2, 2)), seed)
-        cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(2)]
-        assert_conforming(mesh, cuts)
 
 
 @pytest.mark.parametrize("seed", range(3))
