@@ -129,7 +129,12 @@ def write_json(content: Any, path: Path) -> None:
     OSError
         With the name of the file; what was there before stays.
     """
-    write_whole(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+    write_plain(plain(content), path)
+
+
+def write_plain(content: Any, path: Path, indent: int | None = 1) -> None:
+    """Write what `plain` has made, as `write_json` does; several times as fast without indent."""
+    write_whole(path, json.dumps(content, indent=indent, allow_nan=False) + "\n")
 
 
 def read_json(path: Path, what: str = "a JSON file") -> dict[str, Any]:
@@ -206,6 +211,8 @@ def plain(value: Any, lost: dict[str, str] | None = None, place: str = "") -> An
     """
 
     def inside(key: object, entry: Any) -> Any:
+        if type(entry) is float and math.isfinite(entry):  # nearly all that there is
+            return entry
         return plain(entry, lost, f"{place}/{str(key).replace('~', '~0').replace('/', '~1')}")
 
     match value:

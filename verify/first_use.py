@@ -27,8 +27,10 @@ from verify.accelerated.two_level import TwoLevel
 from verify.compare.body import Body
 from verify.compare.body_rule import area_rule
 from verify.compare.cell_tree import build_cell_tree, find_cells
+from verify.compare.hooke import Corotated
 from verify.compare.locate import (
     SolutionField,
+    bends_of,
     difference_squares,
     evaluate_linear,
     evaluate_quadratic,
@@ -168,7 +170,11 @@ def _comparison() -> None:
         squares(points)
         still, gradients = np.zeros((1, *mesh.points.shape)), np.zeros((1, mesh.space, mesh.space))
         difference_squares(gradients, gradients)
-        kinetic(Solution(mesh.points, mesh.cells, still, velocity=still), 1.0)
+        solution = Solution(mesh.points, mesh.cells, still, velocity=still)
+        kinetic(solution, 1.0)
+        SolutionField(solution)
+        bends_of(mesh.points, np.zeros((1, 4 * mesh.space - 2), dtype=np.int64))
+        Corotated(1.0, 1.0).error_density(gradients, gradients)
         distance_to_segments(points, np.stack([points, points], axis=1), 1.0)
     nowhere = np.zeros((0, 2))
     area_rule(Body((np.eye(3, 2),), {}, [], nowhere, nowhere), 1.0)

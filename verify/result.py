@@ -16,7 +16,7 @@ from statistics import median
 from typing import Any, Literal
 
 from verify.errors import InputError
-from verify.files import plain, read_json, write_json
+from verify.files import plain, read_json, write_plain
 from verify.printable import one_line, words_of
 
 
@@ -830,7 +830,7 @@ def write_result(result: CaseResult, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     lost: dict[str, str] = {}
     content = plain(result.content(), lost)
-    write_json({**content, "not_finite": lost} if lost else content, path)
+    write_plain({**content, "not_finite": lost} if lost else content, path)
 
 
 def read_result(path: Path) -> CaseResult:

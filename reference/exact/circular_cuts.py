@@ -16,6 +16,7 @@ from reference.exact.solution import (
     complex_gradient,
     matrices,
     plane_axes,
+    turned,
 )
 from verify.errors import InputError
 from verify.geometry.simplices import unit_rule
@@ -434,8 +435,7 @@ class Penny(ExactSolution):
             local = self._opens * self._opening(s, z, upper, f)
             if self._slides > 0.0:
                 local += self._slides * self._shearing(s, z, upper, f)
-            turned: Array = self._axes.T @ (local + self._strain) @ self._axes
-        return turned
+            return turned(local + self._strain, self._axes)
 
     def _opening(self, s: Array, z: Array, upper: Array, f: _Derivatives) -> Array:
         """Compute the gradient of the opening by a pull, of B = 2μ."""

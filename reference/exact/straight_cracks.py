@@ -21,6 +21,7 @@ from reference.exact.solution import (
     complex_gradient,
     outline_of,
     plane_axes,
+    turned,
 )
 from verify.errors import InputError
 from verify.geometry.planar import inner_parts
@@ -346,19 +347,23 @@ class StraightFrontField(ExactSolution):
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement (n, 3), m; see `ExactSolution`."""
-        x, beside = self._local(points), None if near is None else self._local(near)
+        x, beside = self._places(points, near)
         third = 2 * self._k[2] / self.law.shear * self._unit.potentials(x, beside).phi.imag
         return np.column_stack([self._plane.displacement(x, beside), third]) @ self._axes
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Compute the displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
-        x, beside = self._local(points), None if near is None else self._local(near)
+        x, beside = self._places(points, near)
         slope = 2 * self._k[2] / self.law.shear * self._unit.potentials(x, beside).phi_1
         local = np.zeros((len(x), 3, 3))
         local[:, :2, :2] = self._plane.gradient(x, beside)
         local[:, 2, 0], local[:, 2, 1] = slope.imag, slope.real
-        turned: Array = self._axes.T @ local @ self._axes
-        return turned
+        return turned(local, self._axes)
+
+    def _places(self, points: Array, near: Array | None) -> tuple[Array, Array | None]:
+        x = self._local(points)
+        # the same array says that points are on their own side, which costs nothing
+        return x, x if near is points else None if near is None else self._local(near)
 
     def _local(self, points: Array) -> Array:
         """Find places (n, 2) ahead of the front and across the crack, m."""

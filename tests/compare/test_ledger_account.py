@@ -8,6 +8,7 @@ from case_texts import body_text
 from cut_meshes import grid, quadratic
 from solid_meshes import cube_grid
 
+from verify.compare import mass
 from verify.compare.blade import blade_forces, driving_force, swept_area
 from verify.compare.mass import kinetic
 from verify.compare.motion_account import balance, energy_scale, total_energy
@@ -75,9 +76,11 @@ def spinning(points, spin, centre, push):
     return turn + push
 
 
+@pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order):
+def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order, compiled, monkeypatch):
+    monkeypatch.setattr(mass, "COMPILED", compiled)
     points, cells = grid(3, 2) if d == 2 else cube_grid(2, 2, 2)
     if order == 2:
         points, cells = quadratic(points, cells)
@@ -103,6 +106,22 @@ def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order):
         ]  # fmt: skip
         assert found.angular[step] == pytest.approx(inertia * rate + orbit, rel=1e-12)
         assert found.spin[step] == pytest.approx(inertia * rate, rel=1e-12)
+
+
+@pytest.mark.parametrize(("d", "order"), [(2, 1), (2, 2), (3, 1), (3, 2)])
+def test_scales_of_momenta_do_not_depend_on_whether_kernels_are_there(d, order, monkeypatch):
+    points, cells = grid(5, 4) if d == 2 else cube_grid(3, 2, 4)
+    if order == 2:
+        points, cells = quadratic(points, cells)
+    u, v = np.random.default_rng(2).normal(size=(2, 3, *points.shape))
+    one = Solution(points, cells, u, times=np.arange(3.0), velocity=v, order=order)
+    some, found = np.arange(len(cells))[::3], []
+    for compiled in (True, False):
+        monkeypatch.setattr(mass, "COMPILED", compiled)
+        found.append(kinetic(one, 2.0, some))
+    assert found[0].linear_scale == pytest.approx(found[1].linear_scale, rel=1e-13)
+    assert found[0].angular_scale == pytest.approx(found[1].angular_scale, rel=1e-13)
+    assert found[0].linear_scale > np.linalg.norm(found[0].linear, axis=1).max()
 
 
 def test_a_blade_that_rests_has_no_driving_force_and_one_that_moves_has_the_mean():

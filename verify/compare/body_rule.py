@@ -30,7 +30,7 @@ from verify.compare.simplices import KUHN, bisect, heights, in_frames, points_in
 from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
-from verify.geometry.simplices import measures, unit_rule
+from verify.geometry.simplices import bounds_of, measures, unit_rule
 
 Array = NDArray[np.float64]
 
@@ -338,7 +338,8 @@ def body_rule(
 def _thick(cells: Array, least: float) -> NDArray[np.bool_]:
     """Tell whether simplices (m, k + 1, d) are higher than `least`, m."""
     k = cells.shape[1] - 1
-    reach = np.sqrt(squares(np.ptp(cells, axis=1)))  # of any face: no more than its power k − 1
+    low, high = bounds_of(cells)
+    reach = np.sqrt(squares(high - low))  # of any face: no more than its power k − 1
     thick = k * measures(cells) > least * reach ** (k - 1)
     thin = np.flatnonzero(~thick)
     thick[thin] = heights(cells[thin]) > least
@@ -372,7 +373,7 @@ def _split(cells: Array, patch: Patch, spacing: float) -> Array:
     margin = 1e-9 * float(np.linalg.norm(upper - lower))
 
     def reached(c: Array) -> NDArray[np.bool_]:
-        low, high = c.min(axis=1), c.max(axis=1)
+        low, high = bounds_of(c)
         return np.asarray(((low <= upper + margin) & (high >= lower - margin)).all(axis=1))
 
     here = reached(cells)
@@ -381,7 +382,8 @@ def _split(cells: Array, patch: Patch, spacing: float) -> Array:
         limit = (8 / 30 * spacing / patch.curvature) ** 0.5  # sagitta: limit² · curvature / 8
 
         def fine(c: Array) -> Array:
-            longest = np.linalg.norm(np.ptp(c, axis=1), axis=1)
+            low, high = bounds_of(c)
+            longest = np.linalg.norm(high - low, axis=1)
             met = np.abs(patch.level(c.mean(axis=1))) < longest
             return np.where(met & reached(c), limit, np.inf)
 

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.cell_walk import Walk
 from verify.compiled import COMPILED, njit
+from verify.geometry.simplices import bounds_of
 
 LEAF = 4  # cells per leaf
 _AT_ONCE, _WORTH = 1 << 15, 0.125  # in numpy: points at once; points per cell that are worth a walk
@@ -93,13 +94,13 @@ def build_cell_tree(
     lo, up = np.full((2 * leaves, d), np.inf), np.full((2 * leaves, d), -np.inf)
     held = cells.reshape(leaves, LEAF)
     full = held >= 0
-    lo[leaves:] = np.where(full[..., None], lower[held], np.inf).min(axis=1)
-    up[leaves:] = np.where(full[..., None], upper[held], -np.inf).max(axis=1)
+    lo[leaves:], _ = bounds_of(np.where(full[..., None], lower[held], np.inf))
+    _, up[leaves:] = bounds_of(np.where(full[..., None], upper[held], -np.inf))
     first = leaves // 2
     while first >= 1:
         children = slice(2 * first, 4 * first)
-        lo[first : 2 * first] = lo[children].reshape(first, 2, d).min(axis=1)
-        up[first : 2 * first] = up[children].reshape(first, 2, d).max(axis=1)
+        lo[first : 2 * first], _ = bounds_of(lo[children].reshape(first, 2, d))
+        _, up[first : 2 * first] = bounds_of(up[children].reshape(first, 2, d))
         first //= 2
     return CellTree(lo, up, cells)
 
@@ -141,8 +142,11 @@ def axes_of(dimension: int) -> tuple[int, ...]:
 
 
 @njit(inline="always")
-def _depth(x, normals, corners, axes):
-    """Compute the distance of `x` to the nearest facet plane of a simplex, positive inside."""
+def _depth(x, normals, corners, axes, least):
+    """Compute the distance of `x` to the nearest facet plane of a simplex, positive inside.
+
+    Below `least` it may be the distance to any plane: most points are outside of most cells.
+    """
     d = len(axes)
     depth = np.inf
     for facet in range(d + 1):
@@ -151,6 +155,8 @@ def _depth(x, normals, corners, axes):
         for a in range(d):
             distance += normals[facet, a] * (x[a] - corners[on_it, a])
         depth = min(depth, distance)
+        if depth < least:
+            break
     return depth
 
 
@@ -248,7 +254,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, sta
             cell = cells[k]
             if cell < 0:
                 break
-            depth = _depth(x, normals[cell], corners[cell], axes)
+            depth = _depth(x, normals[cell], corners[cell], axes, -tolerance)
             if depth < -tolerance or not allowed(wish, sides[cell]):
                 continue
             if depth > tolerance:
@@ -292,7 +298,7 @@ def _nearest(x, wish, searched, sides, axes, stack):
                 break
             if not allowed(wish, sides[cell]):
                 continue
-            if _depth(x, normals[cell], corners[cell], axes) >= 0.0:
+            if _depth(x, normals[cell], corners[cell], axes, 0.0) >= 0.0:
                 return cell
             distance2 = _outside_distance2(x, normals[cell], corners[cell], axes)
             if distance2 < best2:
@@ -409,9 +415,7 @@ def pairs_met(
     whether they meet the boxes of these numbers (n,), from ``low[box]`` to ``high[box]``.
     """
     leaves = len(tree.lower) // 2
-    low, high = corners[:, 0], corners[:, 0]
-    for k in range(1, corners.shape[1]):  # corner by corner: ten times as fast
-        low, high = np.minimum(low, corners[:, k]), np.maximum(high, corners[:, k])
+    low, high = bounds_of(corners)
     for begin in range(0, len(rows), _AT_ONCE):
         row = rows[begin : begin + _AT_ONCE]
         node = np.ones(len(row), dtype=np.int64)
@@ -453,9 +457,11 @@ def _find_cells(
         wish = wanted[i]
         # points follow each other closely: one well inside the cell of the last belongs to it
         held = cell >= 0 and allowed(wish, sides[cell])
-        if held and _depth(points[i], normals[cell], corners[cell], axes) > tolerance:
-            found[i] = cell
-            continue
+        if held:
+            depth = _depth(points[i], normals[cell], corners[cell], axes, tolerance)
+            if depth > tolerance:
+                found[i] = cell
+                continue
         for _ in range(2):
             cell = _containing(
                 points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack

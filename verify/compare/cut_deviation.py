@@ -9,6 +9,8 @@ space.
 
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.cut_rule import CutRule, cut_rule_of
-from verify.compare.locate import ROUND_OFF, nearest_of_triangles
+from verify.compare.locate import ROUND_OFF, nearest_of_triangles, squares
 from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, deep_inside
 from verify.compare.simplices import cells_of, heights, points_in
@@ -205,14 +207,13 @@ def _nearest_facets(points: Array, facets: Array, same: float) -> tuple[Array, A
 def _element(solution: Solution, facets: Array) -> float:
     """Find the longest edge of cells within their diameter of the facets, or of all, m."""
     corners = cells_of(solution).corners
-    longest = np.max(
-        [np.linalg.norm(corners - np.roll(corners, k, axis=1), axis=2).max(axis=1)
-         for k in range(1, corners.shape[1])], axis=0,
-    )  # fmt: skip
+    ends = combinations(np.moveaxis(corners, 1, 0), 2)
+    longest = np.sqrt(reduce(np.maximum, [squares(b - a) for a, b in ends]))
     if not len(facets):
         return float(longest.max())
     places = np.concatenate([*np.swapaxes(facets, 0, 1), facets.mean(axis=1)])
-    away, _ = cKDTree(places).query(corners.mean(axis=1))
+    reach = float(longest.max()) * (1.0 + 1e-9)  # most cells are farther off
+    away, _ = cKDTree(places).query(corners.mean(axis=1), distance_upper_bound=reach)
     return float(longest[away <= longest].max(initial=0.0))
 
 

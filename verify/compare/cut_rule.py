@@ -16,7 +16,7 @@ from verify.compare.sides import distance_to_cut, distance_to_segments, nearest_
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, SurfaceLines
 from verify.compare.simplices import divide, points_in, split_at_level
 from verify.geometry.patches import Patch, PlanePatch
-from verify.geometry.simplices import measures, unit_rule
+from verify.geometry.simplices import bounds_of, measures, unit_rule
 
 Array = NDArray[np.float64]
 
@@ -255,7 +255,8 @@ def _cells(patch: Patch, body: SolidBody, spacing: float, depth: float) -> tuple
         if patch.curvature:  # a chord of a radius at most has its arc within itself
             margin += np.where(sizes * patch.curvature <= 1.0, sizes, np.inf)
         corners = in_space(some)
-        low, high = corners.min(axis=1) - margin[:, None], corners.max(axis=1) + margin[:, None]
+        low, high = bounds_of(corners)
+        low, high = low - margin[:, None], high + margin[:, None]
         return np.asarray(((low <= upper) & (high >= lower)).all(axis=1))
 
     def wanted(some: Array, _: Array) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from plane strain, plane stress or the membrane.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Self
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from verify.compare.body_rule import Rule
 from verify.compare.locate import Field, SolutionField, difference_squares, squares
 from verify.compare.mass import separated_parts
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
+from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.geometry.simplices import determinants
 from verify.scene import Material, Scene
@@ -112,8 +114,8 @@ class Corotated(Hooke):
 
     def compared(self, found: Array, expected: Array) -> tuple[Array, Array, Array]:
         """Return `error_density`, `energy_density`, and squares, as of linear elasticity."""
-        difference = self.error_density(found - expected, expected)
-        return difference, self.energy_density(expected), squares(expected)
+        turn, energy, entries = _of_expected(self, expected)
+        return self._turned_back(found - expected, turn), energy, entries
 
     def error_density(self, difference: Array, expected: Array) -> Array:
         """Compute energy density (n,) of sym(Rᵀ δ), δ the difference and R the expected rotation.
@@ -121,8 +123,10 @@ class Corotated(Hooke):
         It is the linear one in the frame that turns with the expected field: it does not
         change if both fields are turned, and is the exact one to second order.
         """
-        turned = np.swapaxes(_rotations(expected), 1, 2) @ difference
-        return Hooke.energy_density(self, turned)
+        return self._turned_back(difference, _rotations(expected))
+
+    def _turned_back(self, difference: Array, turn: Array) -> Array:
+        return Hooke.energy_density(self, np.swapaxes(turn, 1, 2) @ difference)
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,24 @@ class NeoHookean(Corotated):
 
 
 Law = Hooke | Corotated | NeoHookean
+_made: dict[int, tuple[Law, tuple[Array, Array, Array]]] = {}
+
+
+def _of_expected(law: Corotated, expected: Array) -> tuple[Array, Array, Array]:
+    """Give rotations, energy density, and squares of the entries, of gradients that are kept.
+
+    Several solvers are held against the same array of a reference. Its results are kept as long as
+    it lives, unless materials differ by region.
+    """
+    key = id(expected)
+    if key in _made and _made[key][0] is law:
+        return _made[key][1]
+    found = _rotations(expected), law.energy_density(expected), squares(expected)
+    if np.ndim(law.lame) == 0:
+        if key not in _made:
+            finalize(expected, _made.pop, key)
+        _made[key] = law, found
+    return found
 
 
 def hooke(material: Material) -> Hooke:
@@ -260,7 +282,9 @@ def _rotations(gradient: Array) -> Array:
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
     turned, rest = np.empty(deformation.shape), np.ones(len(deformation), dtype=bool)
-    if gradient.shape[2] == 3:
+    if COMPILED and gradient.shape[2] == 3:
+        _polar(deformation, turned, rest)
+    elif gradient.shape[2] == 3:
         for begin in range(0, len(deformation), _AT_ONCE):
             here = slice(begin, begin + _AT_ONCE)
             turned[here], rest[here] = _by_newton(deformation[here])
@@ -291,6 +315,34 @@ def _by_newton(F: Array) -> tuple[Array, NDArray[np.bool_]]:
             if found.all():
                 break
     return np.moveaxis(A, -1, 0), ~found
+
+
+@njit(cache=True)
+def _polar(F, turned, rest):
+    """Do as `_by_newton`, one matrix after the other."""
+    cofactors = np.empty((3, 3))
+    for n in range(len(F)):
+        A = turned[n]
+        A[:] = F[n]
+        for _ in range(_NEWTON_STEPS):
+            for i in range(3):
+                for j in range(3):
+                    cofactors[i, j] = A[i - 2, j - 2] * A[i - 1, j - 1]
+                    cofactors[i, j] -= A[i - 2, j - 1] * A[i - 1, j - 2]
+            volume = 0.0
+            for j in range(3):
+                volume += A[0, j] * cofactors[0, j]
+            if not volume > 0.0:  # its sign stays
+                break
+            largest = 0.0
+            for i in range(3):
+                for j in range(3):
+                    step = 0.5 * (cofactors[i, j] / volume - A[i, j])
+                    A[i, j] += step
+                    largest = max(largest, abs(step))
+            if largest <= _SETTLED:
+                rest[n] = False
+                break
 
 
 def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]:

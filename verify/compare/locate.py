@@ -31,6 +31,7 @@ from verify.compare.simplices import (
 )
 from verify.compiled import COMPILED, njit
 from verify.errors import InputError
+from verify.geometry.simplices import bounds_of
 from verify.solution import Solution
 
 
@@ -57,26 +58,72 @@ def _evaluate_linear(points, found, origins, values, slopes, axes, result):
             result[i, c] = value
 
 
-def bends_of(values: Floats) -> Floats:
-    """Give P2 fields (m, n, d) at the nodes of m cells as polynomials in their coordinates λ.
+def bends_of(nodal: Floats, cells: Ints) -> Floats:
+    """Give P2 fields of nodal values (n, d) on m cells as polynomials in their coordinates λ.
 
     Returns (m, d, k, 1 + k) arrays (b, B): u = u_0 + b·λ + ½ λ·Bλ, with the k coordinates λ that
     are 0 at the first corner, of value u_0. Straight edges.
     """
-    corners = {3: 2, 6: 3, 10: 4}[values.shape[1]]
-    first, others = values[:, 0], values[:, 1:corners]
-    middle = {}  # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
+    corners = {3: 2, 6: 3, 10: 4}[cells.shape[1]]
+    middle = np.zeros((corners, corners), dtype=np.int64)  # VTK: 01 12 20, of tetrahedra 03 13 23
     for number, edge in enumerate([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]):
-        if corners + number < values.shape[1]:
-            middle[edge] = values[:, corners + number]
-    found = np.empty((len(values), values.shape[2], corners - 1, corners))
+        if corners + number < cells.shape[1]:
+            middle[edge] = middle[edge[::-1]] = corners + number
+    found = np.empty((len(cells), nodal.shape[1], corners - 1, corners))
+    if COMPILED:
+        _bends(nodal, cells, middle, axes_of(nodal.shape[1]), axes_of(corners - 1), found)
+        return found
+    values = nodal[cells]
+    first, others = values[:, 0], values[:, 1:corners]
     for k in range(1, corners):
-        found[:, :, k - 1, 0] = 4.0 * middle[0, k] - others[:, k - 1] - 3.0 * first
-        found[:, :, k - 1, k] = 4.0 * (first + others[:, k - 1] - 2.0 * middle[0, k])
+        found[:, :, k - 1, 0] = 4.0 * values[:, middle[0, k]] - others[:, k - 1] - 3.0 * first
+        found[:, :, k - 1, k] = 4.0 * (first + others[:, k - 1] - 2.0 * values[:, middle[0, k]])
         for j in range(1, k):
-            bend = 4.0 * (first + middle[j, k] - middle[0, j] - middle[0, k])
+            bend = first + values[:, middle[j, k]] - values[:, middle[0, j]]
+            bend = 4.0 * (bend - values[:, middle[0, k]])
             found[:, :, k - 1, j] = found[:, :, j - 1, k] = bend
     return found
+
+
+@njit(cache=True)
+def _bends(nodal, cells, middle, axes, across, found):
+    for i in range(len(cells)):
+        for c in axes:
+            first = nodal[cells[i, 0], c]
+            for k in across:
+                corner, half = nodal[cells[i, 1 + k], c], nodal[cells[i, middle[0, 1 + k]], c]
+                found[i, c, k, 0] = 4.0 * half - corner - 3.0 * first
+                found[i, c, k, 1 + k] = 4.0 * (first + corner - 2.0 * half)
+                for j in range(k):
+                    other = nodal[cells[i, middle[0, 1 + j]], c]
+                    bend = 4.0 * (first + nodal[cells[i, middle[1 + j, 1 + k]], c] - other - half)
+                    found[i, c, k, 1 + j] = found[i, c, j, 1 + k] = bend
+
+
+def slopes_of(nodal: Floats, cells: Ints, gradients: Floats) -> Floats:
+    """Compute gradients (m, d, a) of P1 fields of nodal values (n, d) on m cells.
+
+    `gradients` (m, k, a) belong to the coordinates that are 0 at the first corner.
+    """
+    if not COMPILED:
+        values = nodal[cells]
+        return np.asarray(np.einsum("mkc,mka->mca", values[:, 1:] - values[:, :1], gradients))
+    found = np.empty((len(cells), nodal.shape[1], gradients.shape[2]))
+    _slopes(nodal, cells, gradients, axes_of(nodal.shape[1]), axes_of(gradients.shape[1]), found)
+    return found
+
+
+@njit(cache=True)
+def _slopes(nodal, cells, gradients, axes, across, found):
+    for i in range(len(cells)):
+        for c in axes:
+            first = nodal[cells[i, 0], c]
+            for a in axes:
+                found[i, c, a] = 0.0
+            for k in across:
+                rise = nodal[cells[i, 1 + k], c] - first
+                for a in axes:
+                    found[i, c, a] += rise * gradients[i, k, a]
 
 
 def evaluate_quadratic(
@@ -231,7 +278,7 @@ def _checked(solution: Solution) -> Simplices:
 def _searched(solution: Solution) -> SearchedCells:
     """Return the cells of a solution in a tree, those without volume left out."""
     shape = cells_of(solution)
-    lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
+    lower, upper = bounds_of(shape.corners)
     lower[shape.degenerate] = np.nan
     tree = build_cell_tree(lower, upper, surface=solution.cell_dimension < solution.dimension)
     return tree.over(shape.corners, shape.normals)
@@ -267,13 +314,12 @@ class SolutionField:
         self._set_nodal(solution.displacement[step])
 
     def _set_nodal(self, displacement: Array) -> None:
-        self._nodal = np.ascontiguousarray(displacement)
-        values = self._nodal[self._cells]
-        self._first = np.ascontiguousarray(values[:, 0])
+        self._nodal = np.ascontiguousarray(displacement, dtype=float)
+        self._first = self._nodal[self._cells[:, 0]]
         self._slope = (
-            np.einsum("mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:])
+            slopes_of(self._nodal, self._cells, self.shape.gradients[:, 1:])
             if self.solution.order == 1
-            else bends_of(values)
+            else bends_of(self._nodal, self._cells)
         )
 
     @property
@@ -366,7 +412,7 @@ def nearest_of_triangles(
     """
     corners = np.ascontiguousarray(corners)
     shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
+    tree = build_cell_tree(*bounds_of(corners), surface=True)
     found: tuple[NDArray[np.int64], Array] = nearest_triangles(
         np.ascontiguousarray(points), np.zeros((0, 3)), no_sides(points),
         tree.over(corners, shape.normals),

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, issparse
 from scipy.spatial import cKDTree
 
+from verify.compare.cell_tree import axes_of
 from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import EDGES, cells_of, kept_with, simplex_rule
+from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.geometry.simplices import boundary_facets as alone
 from verify.geometry.simplices import connected_cells
@@ -24,6 +26,8 @@ from verify.solution import Solution
 from verify.solution_checks import CONSISTENT
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+_Pairs = tuple[tuple[int, int], ...]
 
 _FEW = 2048  # cells whose numbers stay near the processor
 _TURNS = {2: ((0, 1),), 3: ((1, 2), (2, 0), (0, 1))}  # axes that a rotation mixes
@@ -103,21 +107,14 @@ def kinetic(
     if cells is not None:
         nodes, own = nodes[cells], own[cells]
     at, share = simplex_rule(k, 2 if solution.order == 1 else 4)
-    hats, total, count = shape_functions(at, k, solution.order), float(own.sum()), len(own)
+    hats, total = shape_functions(at, k, solution.order), float(own.sum())
     of_nodes = np.outer(own, share @ hats)  # ∫ρ N
     weights = np.bincount(nodes.ravel(), of_nodes.ravel(), len(solution.points))
     moved, pairs = solution.points + solution.displacement[steps], _TURNS[d]
     rows = []
     for x, v in zip(moved, solution.velocity[steps], strict=True):
         centre, linear = weights @ x / max(total, 1e-300), weights @ v
-        both, sums = np.concatenate([(x - centre).T, v.T]), np.zeros(3 + len(pairs))
-        for few in (slice(first, first + _FEW) for first in range(0, count, _FEW)):
-            values = np.take(both, nodes[few], axis=1) @ hats.T
-            (arm, speed), mass = values.reshape(2, d, -1), np.outer(own[few], share).ravel()
-            moment, square = mass * speed, (speed**2).sum(axis=0)
-            size, reach = np.sqrt(square), np.sqrt((arm**2).sum(axis=0))
-            turns = [arm[a] @ moment[b] - arm[b] @ moment[a] for a, b in pairs]
-            sums += [0.5 * mass @ square, mass @ size, mass @ (reach * size), *turns]
+        sums = _moments(x - centre, v, nodes, own, hats, share, pairs)
         orbit = [centre[a] * linear[b] - centre[b] * linear[a] for a, b in pairs]
         rows.append([*centre, *sums[:3], *linear, *(sums[3:] + orbit), *sums[3:]])
     ends = np.cumsum([d, 1, 2, d, len(pairs)])
@@ -125,6 +122,57 @@ def kinetic(
     return Kinetic(
         total, centres, energy[:, 0], linears, angular, spin, *scales.max(axis=0).tolist()
     )
+
+
+def _moments(
+    arms: Array, speeds: Array, nodes: Ints, own: Array, hats: Array, share: Array, pairs: _Pairs
+) -> Array:
+    """Integrate ½ v², |v|, |r||v| and r × v of nodal r and v (n, d), cells of masses `own` (c,)."""
+    if COMPILED:
+        columns, axes = np.ascontiguousarray(hats.T), axes_of(arms.shape[1])
+        at_points = _moments_at(arms, speeds, nodes, own, columns, axes, pairs)
+        return np.asarray(at_points @ share)
+    both, sums = np.concatenate([arms.T, speeds.T]), np.zeros(3 + len(pairs))
+    for few in (slice(first, first + _FEW) for first in range(0, len(own), _FEW)):
+        values = np.take(both, nodes[few], axis=1) @ hats.T
+        arm, speed = values.reshape(2, len(both) // 2, -1)
+        mass = np.outer(own[few], share).ravel()
+        moment, square = mass * speed, (speed**2).sum(axis=0)
+        size, reach = np.sqrt(square), np.sqrt((arm**2).sum(axis=0))
+        turns = [arm[a] @ moment[b] - arm[b] @ moment[a] for a, b in pairs]
+        sums += [0.5 * mass @ square, mass @ size, mass @ (reach * size), *turns]
+    return sums
+
+
+@njit(cache=True)
+def _moments_at(arms, speeds, nodes, own, columns, axes, pairs):
+    """Sum over cells at each point (q,) of a rule; `columns` (n, q) are the shape functions."""
+    points = columns.shape[1]
+    arm, speed = np.empty((len(axes), points)), np.empty((len(axes), points))
+    sums = np.zeros((3 + len(pairs), points))
+    for i in range(len(nodes)):
+        arm[:], speed[:] = 0.0, 0.0
+        for n in range(len(columns)):
+            node = nodes[i, n]
+            for a in axes:
+                x, v = arms[node, a], speeds[node, a]
+                for q in range(points):  # the inner loop, so that it is vectorised
+                    arm[a, q] += x * columns[n, q]
+                    speed[a, q] += v * columns[n, q]
+        for q in range(points):
+            square = reach = 0.0
+            for a in axes:
+                square += speed[a, q] ** 2
+                reach += arm[a, q] ** 2
+            size = np.sqrt(square)
+            sums[0, q] += own[i] * 0.5 * square
+            sums[1, q] += own[i] * size
+            sums[2, q] += own[i] * np.sqrt(reach) * size
+            row = 3
+            for a, b in pairs:
+                sums[row, q] += own[i] * (arm[a, q] * speed[b, q] - arm[b, q] * speed[a, q])
+                row += 1
+    return sums
 
 
 def shape_functions(place: Array, k: int, order: int) -> Array:
@@ -249,9 +297,6 @@ def _along_cuts(solution: Solution) -> NDArray[np.bool_]:
         found = tree.query(places, distance_upper_bound=near)[1]
         on[found[found < len(on)]] = True
     return on[solution.cells].any(axis=1)
-
-
-Ints = NDArray[np.int64]
 
 
 _ALIKE = 0.01  # of the body's size: centres this close in a direction are ordered by the next one

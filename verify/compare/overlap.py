@@ -24,7 +24,13 @@ from verify.compare.cell_tree import (
 from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.simplices import Simplices, heights, nodes_of_facets, simplices
 from verify.errors import UnsupportedSceneError
-from verify.geometry.simplices import boundary_facets, determinants, distances, unit_normals
+from verify.geometry.simplices import (
+    boundary_facets,
+    bounds_of,
+    determinants,
+    distances,
+    unit_normals,
+)
 from verify.solution import Solution
 
 Ints = NDArray[np.int64]
@@ -129,16 +135,20 @@ def deformed_cells(
         Of its nodes, m.
     """
     places = solution.points + displacement
-    around = places[solution.cells]
-    met = (around.min(axis=1) <= high).all(axis=1) & (around.max(axis=1) >= low).all(axis=1)
-    nodes = solution.cells[met]
+    nodes = solution.cells[_meet(places[solution.cells], low, high)]
     if solution.order == 2:
         nodes = nodes[:, np.array(_PARTS[solution.dimension])].reshape(-1, solution.dimension + 1)
     shape = simplices(places, nodes)
     upright = ~shape.degenerate & (_turn(places[nodes]) * _turn(solution.points[nodes]) > 0.0)
-    lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
+    lower, upper = bounds_of(shape.corners)
     tree = build_cell_tree(np.where(upright[:, None], lower, np.nan), upper)
     return DeformedCells(nodes, shape, tree)
+
+
+def _meet(corners: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Tell whether boxes around corners (m, k, d) meet the box from `low` to `high` (d,)."""
+    lower, upper = bounds_of(corners)
+    return np.asarray((lower <= high).all(axis=1) & (upper >= low).all(axis=1))
 
 
 def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[np.bool_]:
@@ -246,8 +256,7 @@ class OverlapSearch:
         region = places[faces.nodes[cut]].reshape(-1, places.shape[1])
         margin = _LONGEST * self._size
         low, high = region.min(axis=0) - margin, region.max(axis=0) + margin
-        corners = places[faces.nodes]
-        near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
+        near = _meet(places[faces.nodes], low, high)
         cells = deformed_cells(self.solution, u, low, high)
         return replace(self._overlap(faces.take(near), cells, places), inside_out=turned)
 
@@ -288,7 +297,7 @@ class OverlapSearch:
         step, outside = step[inside], outside[inside]
         if not len(which):
             return np.zeros(0), shares, which
-        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+        tree = build_cell_tree(*bounds_of(corners))
         along, leaving = first_exits(outside, -normals[which], tree, corners, normals)
         depth = np.where(np.isfinite(along), along - step, 0.0)
         out = self._ways_out(faces, cells, held, outside)
@@ -313,7 +322,7 @@ class OverlapSearch:
         shares = height * np.linalg.norm(shape.gradients[held], axis=2)
         places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
         corners = self.solution.points[faces.nodes]
-        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+        tree = build_cell_tree(*bounds_of(corners))
         return nearest_before(places, tree, corners, np.nan_to_num(unit_normals(corners)))
 
 

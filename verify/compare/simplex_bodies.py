@@ -17,7 +17,7 @@ from verify.compare.sides import distance_to_segments, nearest_segments
 from verify.compare.simplices import KUHN, simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.geometry.patches import Patch, PlanePatch
-from verify.geometry.simplices import feet, inner_range, measures, rim_edges
+from verify.geometry.simplices import bounds_of, feet, inner_range, measures, rim_edges
 from verify.scene import Scene
 from verify.scene.cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.geometry import Box, MeshFile
@@ -152,7 +152,7 @@ def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
 
 def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
     shape = simplices(points, cells)
-    tree = build_cell_tree(shape.corners.min(axis=1), shape.corners.max(axis=1))
+    tree = build_cell_tree(*bounds_of(shape.corners))
     searched = tree.over(shape.corners, shape.normals)
     margin = _MARGIN * float(np.linalg.norm(np.ptp(points, axis=0)))
 

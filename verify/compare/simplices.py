@@ -8,7 +8,7 @@ Volumes add up to round-off.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache, reduce, wraps
 from itertools import combinations, pairwise, permutations
 from math import factorial
 from weakref import finalize
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from verify.errors import InputError
-from verify.geometry.simplices import determinants, halves, measures, split_at_zeros
+from verify.geometry.simplices import bounds_of, determinants, halves, measures, split_at_zeros
 from verify.solution import Solution
 
 Array = NDArray[np.float64]
@@ -72,17 +72,18 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
         others = [k for k in range(count) if k != i]
         edges = [corners[:, b] - corners[:, a] for a, b in pairwise(others)]
         areas[:, i] = _perpendicular(edges if across is None else [across, *edges])
-        inward = np.sum(areas[:, i] * (corners[:, i] - corners[:, others[0]]), axis=1)
+        inward = np.einsum("ma,ma->m", areas[:, i], corners[:, i] - corners[:, others[0]])
         areas[:, i] *= np.where(inward < 0, -1.0, 1.0)[:, None]
     # the determinant from the largest facet: the smallest height, hence the least cancellation
-    sizes = np.linalg.norm(areas, axis=2)
+    sizes = np.sqrt(np.einsum("mka,mka->mk", areas, areas))
     largest = np.argmax(sizes, axis=1)
     rows = np.arange(len(corners))
     apex, foot = corners[rows, largest], corners[rows, (largest + 1) % count]
     determinant = np.sum(areas[rows, largest] * (apex - foot), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         height = determinant / sizes[rows, largest]
-        resolved = 4 * np.finfo(float).eps * np.abs(corners).max(axis=(1, 2))
+        low, high = bounds_of(corners)
+        resolved = 4 * np.finfo(float).eps * reduce(np.maximum, np.maximum(-low, high).T)
         degenerate = ~(height > resolved)
         gradients = areas / determinant[:, None, None]
         normals = areas / sizes[..., None]

@@ -18,7 +18,7 @@ import numpy as np
 from verify.compare.body import body_of
 from verify.compare.errors import truth_of, write_error_field
 from verify.errors import InputError
-from verify.files import read_json, write_json, write_whole
+from verify.files import plain, read_json, write_json, write_plain, write_whole
 from verify.judge.accuracy import assess_accuracy, not_compared
 from verify.judge.models import adequacy_notice
 from verify.judge.openings import with_openings
@@ -116,7 +116,8 @@ class _Measurements:
     def keep(self, record: SolveRecord) -> None:
         """Keep a solve that was measured."""
         self._folder.mkdir(exist_ok=True)
-        write_json({"key": self._key, "record": asdict(record)}, self._file(record))
+        kept = plain({"key": self._key, "record": asdict(record)})
+        write_plain(kept, self._file(record), indent=None)
 
     def _file(self, record: SolveRecord) -> Path:
         return self._folder / f"{folder_name(record.solver)}-{record.level}.json"
