@@ -155,7 +155,7 @@ class TurningFaces(ClosingFaces):
             found = pattern_places(pattern, rows.ravel(), columns.ravel())
             self._places = pattern, found
         places, count = self._places[1], len(blocks)
-        for k, entries in enumerate(added.reshape(len(places), -1).T):
+        for k, entries in enumerate(added.reshape(len(places), blocks.shape[1] ** 2).T):
             blocks.reshape(count, -1)[:, k] += np.bincount(places, entries, count)
 
     def _at(self, displacement: Floats) -> _Faces:
