@@ -227,8 +227,8 @@ def _sofa(evidence: Evidence) -> Found | None:
         return None
     ratios = [float(row["ratio"]) for row in rows]
     text = (
-        f"On uncut bodies a step without surfaces takes {number(min(ratios), 2)} to "
-        f"{number(max(ratios), 2)} of SOFA's time, recorded elsewhere and scaled."
+        f"On uncut bodies its step takes {number(min(ratios), 2)} to {number(max(ratios), 2)} of "
+        "SOFA's recorded time."
     )
     numbers = "scaled by memory bandwidth: " + ", ".join(
         f"{row['ratio']} at {row['size']}" for row in rows
@@ -267,13 +267,13 @@ def _step_kept(evidence: Evidence) -> Found | None:
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
     text = (
-        "The step is not quite the uncut body's: with a mass lumped on each side of the cut XFEM "
-        f"keeps {number(least, 3)} of it in two families, however close to nodes"
+        "Not quite the uncut body's step: with a mass lumped on each side of the cut XFEM keeps "
+        f"{number(least, 3)} of it in two families, however close to nodes"
     )
     text += f", and {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
     text += (
-        "; through cuts never go below the smallest uncut element's. [Ends of cuts]"
-        "(../theory/xfem.md) keep less."
+        ", never less than the smallest uncut element's. [Ends of cuts](../theory/xfem.md) keep "
+        "less."
     )
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
@@ -312,8 +312,8 @@ def _still(evidence: Evidence) -> Found | None:
     above = [f"{name} ({number(d, 2)})" for name, d in found.items() if d > STILL]
     held = len(found) - len(above)
     text = (
-        f"Over the {number(count)} steps of C7 the energy of XFEM drifts by "
-        f"{number(found['xfem'], 2)}, relative; {held} of the {len(found)} solvers that answered "
+        f"Over the {number(count)} steps of C7 XFEM's energy drifts by "
+        f"{number(found['xfem'], 2)}; {held} of {len(found)} solvers "
         f"stay below {number(STILL, 1)}{', not ' if above else ''}{', '.join(above)}."
     )
     numbers = ", ".join(f"{name} {number(drift, 2)}" for name, drift in found.items())
@@ -344,13 +344,13 @@ _RUN_BOTH = "XFEM beside a conforming mesh on three such scenes"
 QUESTIONS: dict[str, tuple[Sentence, ...]] = {
     "Accuracy at rest": (
         Sentence("through", _RUN_BOTH, partial(
-            _close, kind="through", least=1 / QUARTER, template="XFEM or a conforming mesh: "
-            "where cuts go through, XFEM's error is {} times a conforming mesh's.")),
+            _close, kind="through", least=1 / QUARTER, template="Where cuts go through, XFEM's "
+            "error is {} times a conforming mesh's.")),
     ),
     "Accuracy at a tip": (
         Sentence("tip", _RUN_BOTH, partial(
-            _close, kind="tip", template="No mesh has to know the tip: where cuts end inside "
-            "elements, XFEM's error is {} times a conforming mesh's, whose node is the tip.")),
+            _close, kind="tip", template="Where cuts end inside elements, XFEM's error is {} times "
+            "a conforming mesh's, whose node is the tip.")),
         Sentence("tip functions", "tip functions, on several positions of the mesh",
                  _tip_functions),
     ),
@@ -364,7 +364,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
             factor=QUARTER, words=(
              "Beside a mesh made for its cuts it is more accurate, {} times its error.",
-             "Its error is {} times that of a mesh made for its cuts, to which no state moves.",
+             "Its error is {} times that of a mesh made for its cuts.",
              "Beside a mesh made for its cuts it is less accurate, {} times its error."))),
         Sentence("motion in space", "errors of XFEM on three moving scenes in space",
                  _moving_in_space),

@@ -253,18 +253,21 @@ class Beside:
         if self.scatter is None:
             return ""
         told = {name_of(n): own for n, own in self.by_scene.items()}
-        if len(told) == 2:
+        if len(told) == 2 and any(map(_side, told.values())):
             words = (f"{n} {_over(o)}{'' if _side(o) else ', not told apart'}"
                      for n, o in told.items())  # fmt: skip
             return f" Over positions: {'; '.join(words)}"
+        if len(told) == 2:
+            both = ", ".join(f"{n} {_over(o)}" for n, o in told.items())
+            return f" Over positions: {both}, not told apart"
         said = f" Over positions: {_over(self.scatter)}"
         if len(told) < 2:
             return said
         sides = (([n for n, o in told.items() if _side(o) == side], word)
                  for side, word in ((-1, "below"), (1, "above")))  # fmt: skip
-        parts = [f"{word} 1 in {len(own)} ({', '.join(own)})" if 0 < len(own) < 3
-                 else f"{word} 1 in {len(own) or 'none'}" for own, word in sides]  # fmt: skip
-        return f"{said}; of {len(told)} scenes {', '.join(parts)}"
+        parts = [f"{word} 1 in {len(own)} of {len(told)} scenes{_named(own)}"
+                 for own, word in sides if own]  # fmt: skip
+        return f"{said}, {' and '.join(parts) or f'not told apart in {len(told)} scenes'}"
 
     @property
     def contradicted(self) -> bool:
@@ -289,6 +292,10 @@ class Beside:
 
 def _side(scatter: tuple[float, float, float]) -> int:
     return (scatter[1] > 1.0) - (scatter[2] < 1.0)
+
+
+def _named(scenes: Sequence[str]) -> str:
+    return f" ({', '.join(scenes)})" if len(scenes) < 3 else ""
 
 
 def _over(scatter: tuple[float, float, float]) -> str:
