@@ -259,7 +259,8 @@ class MovingBody:
     contact : FaceContact or None
         Of a scene with contact.
     pressures : sequence of (m,) array
-        On its faces in the last three steps, the last first, or in the initial equilibrium, Pa.
+        On its faces in the last three steps, the last first, or in the initial equilibrium, Pa;
+        fewer after an opening: those before it were of other faces.
 
     Raises
     ------

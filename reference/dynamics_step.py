@@ -175,7 +175,7 @@ class Stepper:
         body, faces = self.body, self.body.contact
         assert faces is not None
         share, load = self.size**2 * self.scheme.beta, self._load
-        pressure, contact, last = np.zeros_like(body.pressures[0]), np.zeros_like(load), np.inf
+        pressure, contact, last = np.zeros(len(faces.weights)), np.zeros_like(load), np.inf
         if faces.opened(self._end(start, a)[0]).min(initial=0.0) == 0.0:  # none overlap
             body.pressures = [pressure, *body.pressures[:2]]
             return a, forces

@@ -312,6 +312,7 @@ class TiedMotion:
                 self._tie(self.closed & ~due)
             else:
                 self._release(due, time)
+        self.body.pressures = []
         self.openings += 1
         return True
 
@@ -391,7 +392,12 @@ class TiedMotion:
         The one of a step is of the time at which it balances forces, α_f before its end. Undamped,
         pressures alternate from step to step about their mean. From three of them.
         """
-        last, second, third = self.body.pressures
+        known = self.body.pressures
+        if len(known) < 3:  # nothing, or the mean, after an opening
+            faces = self.body.contact
+            none = np.zeros(0 if faces is None else len(faces.weights))
+            return np.asarray(sum(known, none) / max(len(known), 1))
+        last, second, third = known
         late = 0.25 + 0.5 * (0.5 if self.averaged else self.scheme.alpha_f)
         return np.maximum(0.5 * (last + second) + late * (last - third), 0.0)
 
