@@ -147,7 +147,7 @@ def _tip_functions(evidence: Evidence) -> Found | None:
     if own is None or own.scatter is None:
         return None
     text = (
-        "Tip functions, where a program has them: GetFEM's cut the energy-norm error to "
+        "GetFEM's tip functions cut the energy-norm error to "
         f"{number(own.ratio, 2)} of a conforming mesh's."
     )
     return Found(text, own.written, f"at most {1 / QUARTER:g}; scatter wholly below 1",
