@@ -260,7 +260,7 @@ class MovingBody:
         Of a scene with contact.
     pressures : sequence of (m,) array
         On its faces in the last three steps, the last first, or in the initial equilibrium, Pa;
-        fewer after an opening: those before it were of other faces.
+        NaN on faces that were tied then.
 
     Raises
     ------

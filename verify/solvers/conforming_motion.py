@@ -307,14 +307,23 @@ class TiedMotion:
         due = self.closed & (times <= time + self.timeline.close)
         if not due.any():
             return False
+        before = self._apart()
         with self.record.timed("loading"):
             if self.opening.shares is None or times is self.opening.passed:
                 self._tie(self.closed & ~due)
             else:
                 self._release(due, time)
-        self.body.pressures = []
+        freed = self._apart() & ~before  # they pressed nobody before
+        self.body.pressures = [np.where(freed, np.nan, one) for one in self.body.pressures]
         self.openings += 1
         return True
+
+    def _apart(self) -> NDArray[np.bool_]:
+        """Whether the faces at each place of contact pressure (m,) are not tied."""
+        if (faces := self.body.contact) is None:
+            return np.zeros(0, dtype=bool)
+        one, other = self.body.ties.leader[faces.pairs].T
+        return np.asarray(one != other)
 
     def _release(self, due: NDArray[np.bool_], time: float) -> None:
         """Untie the nodes that are due, and hold them by their tie forces of before."""
@@ -392,14 +401,13 @@ class TiedMotion:
         The one of a step is of the time at which it balances forces, α_f before its end. Undamped,
         pressures alternate from step to step about their mean. From three of them.
         """
-        known = self.body.pressures
-        if len(known) < 3:  # nothing, or the mean, after an opening
-            faces = self.body.contact
-            none = np.zeros(0 if faces is None else len(faces.weights))
-            return np.asarray(sum(known, none) / max(len(known), 1))
+        known = np.array(self.body.pressures)
         last, second, third = known
         late = 0.25 + 0.5 * (0.5 if self.averaged else self.scheme.alpha_f)
-        return np.maximum(0.5 * (last + second) + late * (last - third), 0.0)
+        whole = 0.5 * (last + second) + late * (last - third)
+        count = np.isfinite(known).sum(axis=0)  # of steps, on faces just freed fewer: their mean
+        mean = np.nansum(known, axis=0) / np.maximum(count, 1)
+        return np.maximum(np.where(count == 3, whole, mean), 0.0)
 
     def _over_time(self, name: str) -> Array:
         """Return a field (t, n, d) at the outputs."""
