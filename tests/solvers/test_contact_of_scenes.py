@@ -306,6 +306,26 @@ def test_strains_of_a_thousandth_in_space_press_as_in_linear_kinematics(name, tm
     assert np.abs(forces[1] - forces[0]).max() < 0.02 * forces[0].max()
 
 
+def test_faces_keep_their_pressure_when_another_cut_opens():
+    """A pressed body bears the same force across the first cut before, at and after the second."""
+    squeezed = [{"where": "bottom", "displacement": [0.0, 0.0]},
+                {"where": "top", "displacement": [0.0, -0.02]}]  # fmt: skip
+    scene = scenes.scene(
+        [{"kind": "polyline", "points": [[-0.1, 0.31], [1.1, 0.33]], "opens_at": 0.05},
+         {"kind": "polyline", "points": [[-0.1, 0.71], [1.1, 0.68]], "opens_at": 0.4,
+          "name": "second"}],
+        supports=squeezed, material=scenes.soft(density=1.0), contact={"expected": "closed"},
+        analysis={"kind": "dynamic", "duration": 0.6, "outputs": 4, "time_step": 0.025},
+        initial={"kind": "equilibrium"},
+    )  # fmt: skip
+    contact = find_solver("conforming").solve(scene, 0, 0).contact
+    first = contact.points[:, 1] < 0.5
+    forces = contact.pressure[:, first] @ contact.weights[first]
+    # between a bar with free sides, E/(1 − ν²), and one whose sides are held, λ + 2μ
+    assert forces[1:].min() > 0.02 / (1.0 - 0.3**2) * 0.9
+    assert forces[1:].max() < 0.02 * 1.35
+
+
 @pytest.mark.parametrize(
     "name, given",
     [("xfem", {}), ("conforming", {}), ("conforming", {"mesh": "remeshed", "degree": 2})],
