@@ -26,7 +26,7 @@ def test_its_counts_are_those_of_the_repository() -> None:
     shown = [rows for rows in catalogue().values() if "demo" in rows[0].tags]
     assert count(r"solves (\d+) small scenes") == len(shown)
     arena = (ROOT / "docs/results/arena/index.md").read_text("utf-8").splitlines()[0]
-    assert re.search(r"\d+ solvers on \d+ scenes", TEXT)[0] in arena
+    assert re.search(r"\d+ solvers on \d+ cases", TEXT)[0] in arena
 
 
 def test_its_result_stands_on_the_page_that_it_links_with_the_command_that_makes_it() -> None:
