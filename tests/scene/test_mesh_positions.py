@@ -89,6 +89,15 @@ def test_sixteen_meshes_of_one_body(d):
     assert found[0][0].points.tobytes() == background_mesh(scene(d, 0), 0)[0].points.tobytes()
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_mesh_made_anew_is_another_at_each_position(d):
+    """Diagonals and nodes of a grid are nothing to it: eight and four positions were one mesh."""
+    cells = {2: [14, 10], 3: [4, 3, 3]}[d]
+    found = [peer_mesh(scene(d, k, cells=[cells]), 0, "remeshed") for k in range(POSITIONS)]
+    meshes = [coordinates(mesh.points, mesh.cells) for mesh in found]
+    assert all(a != b for a, b in combinations(meshes, 2))
+
+
 def test_a_layer_stays_a_layer_and_its_nodes_move_along_it():
     """A slab of antiplane scenes: 16 meshes of one body, with one element across each."""
     lower, upper, _ = (np.array(one) for one in BODY[3])

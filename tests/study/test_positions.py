@@ -11,7 +11,7 @@ from command_line import forking
 
 from verify.cli import main
 from verify.judge.models import coarsest
-from verify.report.study_page import positions_lead, render_study
+from verify.report.study_page import positions_lead, positions_view, render_study
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 from verify.runner.fingerprint import physics_digest
 from verify.scene import load_scene
@@ -104,6 +104,21 @@ def test_a_difference_is_said_only_where_the_range_excludes_1():
     assert "Nothing is claimed" in lead_of(study_of({"a": above})).sentences[0]
     barely = study_of(dict.fromkeys("abcdef", [(1.0003, 1.0)] * 16))
     assert "differ: mine 1 (1.0003 to 1.0003)" in lead_of(barely).sentences[1]
+
+
+def test_a_page_counts_the_meshes_won_and_shows_the_worst_by_hand():
+    """Plane: 1/2, 3/4 and 2 of the measure; in space one mesh, whose error is round-off."""
+    study = study_of({"a": [(1.0, 2.0), (3.0, 4.0), (8.0, 4.0)], "b": [(1e-16, 0.1)]})
+    record = asdict(study) | {"dimensions": {"a": 2, "b": 3}}
+    won, errors = positions_view(record)["tables"][-2:]
+    texts = [[[cell.text for cell in row] for row in table.rows] for table in (won, errors)]
+    assert texts[0] == [["mine", "2 of 3", "2.00", "–", "–"]]
+    assert ["mine", "3.0, 7.5, 8.0", "1.0×10⁻¹⁶, 1.0×10⁻¹⁶, 1.0×10⁻¹⁶"] in texts[1]
+
+
+def test_what_is_not_told_apart_over_all_scenes_is_where_single_ones_tell_it():
+    study = study_of({"a": [(2.0, 1.0), (3.0, 1.0)], "b": [(1.0, 2.0), (1.0, 3.0)]})
+    assert "mine 1.25 (0.358 to 2.85), apart in 2 of 2 scenes" in " ".join(lead_of(study).sentences)
 
 
 def test_a_page_says_once_what_its_scenes_levels_and_limit_are(tmp_path):

@@ -7,11 +7,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from verify.errors import InputError
 from verify.files import read_json, write_whole
 from verify.printable import shown
 from verify.report.notation import (
     NORMS,
+    ROUND_OFF,
     Cell,
     Drawing,
     Lead,
@@ -63,6 +66,7 @@ def positions_view(record: Mapping[str, Any]) -> dict[str, Any]:
             rows.append([solver_title(solver), *cells])
         heads = ["solver", *(short.get(place, place) for place in places)]
         tables.append(Table(title, heads, rows, "", True))
+    tables += [_won(record), _errors(record, short)]
     levels = dict.fromkeys(record["scenes"].values())
     at = [
         f"level {level}: "
@@ -73,6 +77,50 @@ def positions_view(record: Mapping[str, Any]) -> dict[str, Any]:
     ]
     scenes = f"Scenes, at {'; at '.join(at)}."
     return {"lead": positions_lead(record, panels), "scenes": scenes, "tables": tables}
+
+
+def _won(record: Mapping[str, Any]) -> Table:
+    """Return the table of meshes on which each solver errs less than the measure, and its worst."""
+    measure, where = record["measure"], record["dimensions"]
+    values = {
+        (e["scene"], e["position"], e["solver"]): e["value"]
+        for e in _displacements(record) if e["value"] > ROUND_OFF and e["low"] > 0.0
+    }  # fmt: skip
+    rows = []
+    for solver in (name for name in record["solvers"] if name != measure):
+        row: list[Cell | str] = [solver_title(solver)]
+        for d in (2, 3):
+            ratios = [
+                values[place, number, solver] / values[place, number, measure]
+                for place, number, name in values
+                if name == solver and where[place] == d and (place, number, measure) in values
+            ]
+            better = sum(ratio < 1.0 for ratio in ratios)
+            row += [f"{better} of {len(ratios)}", number(max(ratios), 3)] if ratios else ["–", "–"]
+        rows.append(row)
+    heads = ["solver", "plane: meshes with less error", "largest ratio",
+             "space: meshes with less error", "largest ratio"]  # fmt: skip
+    title = f"{metric_title('displacement_l2')}, mesh by mesh beside {solver_title(measure)}"
+    return Table(title, heads, rows, "", True)
+
+
+def _errors(record: Mapping[str, Any], short: Mapping[str, str]) -> Table:
+    """Return the table of errors over the meshes of each scene: median, 95 %, largest."""
+    rows = []
+    for solver in record["solvers"]:
+        row = [solver_title(solver)]
+        for scene in record["scenes"]:
+            own = [e["value"] for e in _displacements(record)
+                   if (e["scene"], e["solver"]) == (scene, solver)]  # fmt: skip
+            found = [*np.quantile(own, [0.5, 0.95, 1.0])] if own else []
+            row.append(", ".join(number(float(value), 2) for value in found) or "–")
+        rows.append(row)
+    title = f"{metric_title('displacement_l2')}: median, 95 % and largest over meshes"
+    return Table(title, ["solver", *(short[place] for place in record["scenes"])], rows, "", True)
+
+
+def _displacements(record: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return listed(record["errors"], metric="displacement_l2")
 
 
 def _short(scenes: Iterable[str]) -> dict[str, str]:
@@ -100,7 +148,10 @@ def positions_lead(record: Mapping[str, Any], panels: Sequence[Drawing | None] =
         first += f" Nothing is claimed from fewer than {_FEWEST[0]} scenes on {_FEWEST[1]} meshes."
     own, said = listed(over_all, metric="displacement_l2", rival=measure), []
     for differ, words in ((True, "these differ"), (False, "these are not told apart")):
-        names = [f"{solver_title(p['solver'])} {_ratio(p)}" for p in listed(own, differs=differ)]
+        names = [
+            f"{solver_title(p['solver'])} {_ratio(p)}{'' if differ else _apart(record, p)}"
+            for p in listed(own, differs=differ)
+        ]
         if names:
             said.append(f"{words}: {', '.join(names)}")
     second = f"From {solver_title(measure)}, by the displacement (median ratio, range of 90 %), "
@@ -114,6 +165,15 @@ def positions_lead(record: Mapping[str, Any], panels: Sequence[Drawing | None] =
         "mesh; left of 1 is better. Dot and line are the median and the range of 90 % of the "
         "points. Solvers differ where that range excludes 1.",
     )  # fmt: skip
+
+
+def _apart(record: Mapping[str, Any], pair: Mapping[str, Any]) -> str:
+    """Say in how many scenes a pair differs that does not over all of them."""
+    keys = "metric", "solver", "rival"
+    own = [p for p in listed(record["pairs"], **{key: pair[key] for key in keys})
+           if p["scene"] != _ALL]  # fmt: skip
+    differ = sum(one["differs"] for one in own)
+    return f", apart in {differ} of {len(own)} scenes" if differ and len(own) > 1 else ""
 
 
 def _ratio(pair: Mapping[str, Any]) -> str:

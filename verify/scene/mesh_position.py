@@ -12,6 +12,7 @@ Cells = NDArray[np.int64]
 POSITIONS = 16
 _MOVED = 0.2  # of an element
 _SEED = 1811
+_SHARE = 0.03  # of its size, by which a mesh without a structure is finer or coarser
 
 
 class MeshPosition(NamedTuple):
@@ -40,6 +41,15 @@ def mesh_position(number: int) -> MeshPosition:
     """
     more, late = (0, -1, 0, 1)[number % 4], number // 8
     return MeshPosition(more, number // 4 % 2 == 1, late + 2 * (number % 4 == 2))
+
+
+def size_share(number: int) -> float:
+    """Return by which factor the elements of a mesh that is made anew are larger at a position.
+
+    Such a mesh has no diagonals and no nodes of the structured one: without this factor, all
+    positions of equal counts would be one mesh. Position 0 has 1, no two have the same.
+    """
+    return 1.0 + _SHARE * ((7 * number + POSITIONS // 2) % POSITIONS / (POSITIONS // 2) - 1.0)
 
 
 def moved_mesh(

@@ -27,7 +27,7 @@ from verify.errors import InputError
 from verify.geometry.simplices import mesh_edges, refine_uniformly
 from verify.scene import Box, MeshFile, Polygon, PolygonCut, Rectangle, Scene, SweptCut, read_mesh
 from verify.scene.acceptance import FractureQuantity
-from verify.scene.mesh_position import moved_mesh
+from verify.scene.mesh_position import moved_mesh, size_share
 from verify.scene.tool_path import Cut
 from verify.solvers.runs import grid_of
 
@@ -69,6 +69,7 @@ def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
         edge = np.sqrt(2 / np.sqrt(3)) if scene.dimension == 2 else 0.88
         sides = np.subtract(scene.geometry.upper, scene.geometry.lower)  # type: ignore[union-attr]
         size = float(np.prod(sides / counts) ** (1 / len(sides)) * edge)
+        size *= size_share(scene.mesh.position)
     return conforming_mesh(scene, Grading(size, np.zeros((0, scene.dimension))))
 
 

@@ -16,6 +16,7 @@ from verify.errors import InputError
 from verify.judge.convergence import ROUND_OFF
 from verify.judge.intervals import number_on_finest
 from verify.judge.models import changed, on_one_level
+from verify.report.evidence import dimension_of
 from verify.report.notation import metric_title
 from verify.result import CaseResult
 from verify.scene import Scene, scene_content
@@ -59,6 +60,8 @@ class PositionsStudy(Study):
     ----------
     scenes : dict of str to int
         Level of each that was solved.
+    dimensions : dict of str to int
+        Of the body of each.
     positions : int
     solvers : list of str
     measure : str
@@ -76,6 +79,7 @@ class PositionsStudy(Study):
     """
 
     scenes: dict[str, int]
+    dimensions: dict[str, int]
     positions: int
     solvers: list[str]
     measure: str
@@ -186,7 +190,8 @@ def summary(
     measure = "conforming" if "conforming" in solvers else solvers[0]
     positions = len({number for _, number in found})
     return PositionsStudy(
-        scenes=dict(levels), positions=positions, solvers=list(solvers), measure=measure,
+        scenes=dict(levels), dimensions={at[0]: dimension_of(r.scene) for at, r in found.items()},
+        positions=positions, solvers=list(solvers), measure=measure,
         errors=errors, pairs=pairs,
         ratios=[
             {"metric": metric, "solver": solver,
