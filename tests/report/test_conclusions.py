@@ -178,6 +178,57 @@ def test_the_step_kept_is_told_for_unstructured_meshes_too():
     assert ", and 0.80 on meshes with moved nodes, never less than" in found.text
 
 
+def test_steps_are_held_at_one_distance_and_a_lumped_mass_has_its_price():
+    """At 1e-6 both keep least: 1e-6 and 1e-5. At 1e-9 one has moved the cut onto nodes."""
+    rows = [
+        *made().slivers,
+        *({"family": "f", "size": "1e-09", "solver": name, "quantity": quantity, "value": value}
+          for name, step in (("xfem mass=consistent", "1e-9"), ("conforming", "0.99"))
+          for quantity, value in (("critical explicit step", step),
+                                  ("critical explicit step, uncut", "1.0"))),
+        *({"family": "f", "size": "0.5", "solver": name, "value": value,
+           "quantity": "lowest natural frequency"}
+          for name, value in (("xfem", "0.87"), ("conforming", "1.0"))),
+    ]  # fmt: skip
+    found = {k: v for own in answer(made(slivers=rows)) for k, v in own.found.items()}
+    assert "At ε = 10⁻⁶ a consistent mass leaves 1.0×10⁻⁶ of its own" in found["step lost"].text
+    assert found["step lost"].text.endswith("split 1.0×10⁻⁵.")
+    assert "least 1.00e-09 at ε = 1e-09" in found["step lost"].numbers
+    assert "lowers the lowest frequency by up to 13 %" in found["step kept"].text
+    drawn = figures(made(slivers=rows))["Explicit steps with slivers"]
+    assert "1e-05 at 1e-06" in drawn.alt
+    assert "0.99" not in drawn.alt
+
+
+def test_all_runs_of_the_hand_are_told_and_the_slowest_decides():
+    runs = [{"slowest": one} for one in (0.036, 0.016, 0.012)]
+    (sentence,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
+                   if s.name == "real time")  # fmt: skip
+    found = sentence.of(made(hand={**made().hand, "slowest": 0.016, "runs": runs}))
+    assert "does not cut" in found.text
+    assert "took 12 to 36 ms of processor time in 3 runs" in found.text
+
+
+def test_times_beside_other_programs_are_not_drawn(tmp_path):
+    """Of two scenes the one whose solves were contended has its errors, and no curve of time."""
+    busy = case("benchmark/c2_meeting", "inner")
+    for solve in busy.solves:
+        solve.notes["timing"] = "contended: load 4 on 2 cores"
+    write_benchmark(evidence_of([case("benchmark/c1_slit", "inner"), busy]), tmp_path)
+    page = (tmp_path / "index.md").read_text("utf-8")
+    assert page.count("](benchmark-pictures/") == 1
+    assert "timed beside other programs: C2." in page
+
+
+def test_a_scene_in_space_is_no_member_of_the_one_in_the_plane():
+    """Their errors have a common median that belongs to neither."""
+    plane, space = (case(f"benchmark/c8_{n}", "through") for n in ("slivers", "slivers_space"))
+    space.scene["geometry"] = {"kind": "box"}
+    moving = case("benchmark/c8_slivers_corner", "through", True)
+    assert list(benchmark_scenes([plane, space, moving])) == ["C8", "C8 space", "C8 motion"]
+    assert list(benchmark_scenes([space])) == ["C8"]
+
+
 def slower(evidence):
     rows = [{**row, "value": "0.5"} if row["solver"] == "xfem" and row["quantity"].endswith("step")
             else row for row in evidence.slivers]  # fmt: skip
@@ -351,7 +402,7 @@ def test_of_many_scenes_those_are_counted_that_positions_of_the_mesh_tell_apart(
     ]  # fmt: skip
     evidence = made(positions=rows[:32], benchmark_positions=rows[32:], tips=frozenset(factors))
     text = beside(evidence, "tip", METRIC, "xfem").over_positions
-    assert text.endswith(", above 1 in 2 of 3 scenes (C4, fracture/front)")
+    assert text.endswith(", above 1 in 2 of 3 scenes (C4 1.4, fracture/front 2.0)")
 
 
 def test_two_scenes_whose_positions_contradict_each_other_are_told_one_by_one():
@@ -493,7 +544,9 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     head = "\n".join(arena_head(evidence, answer(evidence), tmp_path))
     assert head.startswith("- **Accuracy at rest**: Where cuts go through")
     assert "answered of asked. " in head
-    assert "**Verdicts of XFEM**: of 0 checks 0 [failed](verdicts.md)" in head  # none were made
+    assert (
+        "**Verdicts of XFEM**: of 0 checks, C7's among them, 0 [failed](verdicts.md)" in head
+    )  # none were made
     assert "SOFA" not in head  # of another run
     assert "snapping 7 of 8" in head  # bars count scenes
     assert "getfem 6 of 7" in head

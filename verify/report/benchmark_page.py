@@ -53,7 +53,9 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     """
     beside = Beside(folder / PICTURES)
     scenes = benchmark_scenes(evidence.results)
-    drawn = [plot for label, own in scenes.items() if (plot := time_plot(label, own))]
+    busy = [label for label, own in scenes.items() if _shared(own)]
+    drawn = [plot for label, own in scenes.items()
+             if label not in busy and (plot := time_plot(label, own))]  # fmt: skip
     figures = [f"![{plot.alt}]({beside.drawing(plot)})" for plot in drawn]
     lines = [
         "# Benchmark: the table of the whole", "",
@@ -61,13 +63,20 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
         *whole_table(evidence), "", " ".join([_LEGEND, *_without_row(evidence)]), "",
         "## Time against error", "",
         "Wall time of what each cut costs anew, from the coarsest level to the finest; lower left "
-        "is better. C5 and C8 show the middle of their members. Grey: the other discretisations.",
+        "is better. C5 and C8 show the middle of their members. Grey: the other discretisations."
+        + (f" Not drawn, timed beside other programs: {', '.join(busy)}." if busy else ""),
         "", "\n".join(figures), "",
         "<details><summary>Commands</summary>", "",
         *(f"- `{evidence.commands[name]}`" for name in JUDGED
           if name in evidence.commands), "", "</details>",
     ]  # fmt: skip
     write_whole(folder / "index.md", "\n".join(lines) + "\n")
+
+
+def _shared(members: Sequence[CaseResult]) -> bool:
+    """Tell whether most solves of a scene shared the machine: their times are no result."""
+    notes = [s.notes.get("timing", "") for r in members for s in r.solves if s.metrics]
+    return 2 * sum("contended" in note for note in notes) > len(notes)
 
 
 def discretisations(evidence: Evidence) -> list[list[str]]:

@@ -161,7 +161,7 @@ def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Return the results that are compared together: by kind of scene, and the benchmark's scenes.
 
     The kinds are ``"rest"`` and ``"motion"``, and at rest ``"through"`` and ``"tip"``, by where
-    cuts end. The scenes are ``"C1"`` to ``"C8"``, with those in motion apart where both are.
+    cuts end. The scenes are ``"C1"`` to ``"C8"``, with what moves and what is in space apart.
     """
     kinds = {
         kind: [r for r in results if _is(kind, moves(r), ends_inside(r.scene))]
@@ -171,15 +171,20 @@ def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
 
 
 def benchmark_scenes(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
-    """Return the members of C1 to C8 by label; a scene at rest and in motion counts as two."""
-    scenes: dict[tuple[str, bool], list[CaseResult]] = {}
+    """Return the members of C1 to C8 by label.
+
+    A scene in the plane and in space, at rest and in motion, counts as two.
+    """
+    scenes: dict[tuple[str, bool, int], list[CaseResult]] = {}
     for result in results:
         if found := _SCENE.match(result.case):
-            scenes.setdefault((f"C{found[1]}", moves(result)), []).append(result)
+            key = f"C{found[1]}", moves(result), dimension_of(result.scene)
+            scenes.setdefault(key, []).append(result)
     return {
-        f"{label} motion" if moving and (label, False) in scenes else label: own
-        for (label, moving), own in sorted(scenes.items())
-    }
+        label + " space" * (d == 3 and (label, moving, 2) in scenes)
+        + " motion" * (moving and any((label, False, other) in scenes for other in (2, 3))): own
+        for (label, moving, d), own in sorted(scenes.items())
+    }  # fmt: skip
 
 
 def _with_tips(names: set[str]) -> frozenset[str]:
@@ -263,7 +268,7 @@ class Beside:
         said = f" Over positions: {_over(self.scatter)}"
         if len(told) < 2:
             return said
-        sides = (([n for n, o in told.items() if _side(o) == side], word)
+        sides = (({n: o for n, o in told.items() if _side(o) == side}, word)
                  for side, word in ((-1, "below"), (1, "above")))  # fmt: skip
         parts = [f"{word} 1 in {len(own)} of {len(told)} scenes{_named(own)}"
                  for own, word in sides if own]  # fmt: skip
@@ -294,8 +299,10 @@ def _side(scatter: tuple[float, float, float]) -> int:
     return (scatter[1] > 1.0) - (scatter[2] < 1.0)
 
 
-def _named(scenes: Sequence[str]) -> str:
-    return f" ({', '.join(scenes)})" if len(scenes) < 3 else ""
+def _named(scenes: Mapping[str, tuple[float, float, float]]) -> str:
+    """Name few scenes with their medians, which a range over all scenes hides."""
+    told = [f"{name} {number(own[0], 2)}" for name, own in scenes.items()]
+    return f" ({', '.join(told)})" if len(told) < 3 else ""
 
 
 def _over(scatter: tuple[float, float, float]) -> str:
