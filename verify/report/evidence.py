@@ -161,7 +161,7 @@ def subsets(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Return the results that are compared together: by kind of scene, and the benchmark's scenes.
 
     The kinds are ``"rest"`` and ``"motion"``, and at rest ``"through"`` and ``"tip"``, by where
-    cuts end. The scenes are ``"C1"`` to ``"C8"``, with what moves and what is in space apart.
+    cuts end. The scenes are ``"C1"`` to ``"C8"``, those in motion and in space apart.
     """
     kinds = {
         kind: [r for r in results if _is(kind, moves(r), ends_inside(r.scene))]
