@@ -147,9 +147,8 @@ def _tip_functions(evidence: Evidence) -> Found | None:
     if own is None or own.scatter is None:
         return None
     text = (
-        "GetFEM's tip functions cut the energy-norm error to "
-        f"{number(own.ratio, 2)} of a conforming mesh's, over positions of coarser ones "
-        f"{number(own.scatter[0], 2)}."
+        f"GetFEM's tip functions have {number(own.ratio, 2)} of a conforming mesh's energy-norm "
+        f"error, over positions {number(own.scatter[0], 2)}."
     )
     return Found(text, own.written, f"at most {1 / QUARTER:g}; scatter wholly below 1",
                  own.ratio <= 1 / QUARTER and own.scatter[2] < 1.0)  # fmt: skip
@@ -214,7 +213,7 @@ def _real_time(evidence: Evidence) -> Found | None:
     took = " to ".join(dict.fromkeys(number(1e3 * one, 2) for one in (slowest[0], worst)))
     text = (
         f"XFEM's engine {'may cut' if busy else cuts} a hand of {number(cells)} tetrahedra at 60 "
-        f"frames a second: its slowest step took {took} ms of processor time"
+        f"frames a second: slowest step {took} ms of processor time"
         f"{f' in {len(slowest)} runs' if len(slowest) > 1 else ''}"
         f"{' on a busy machine' if busy else ''}."
     )
@@ -278,19 +277,17 @@ def _step_kept(evidence: Evidence) -> Found | None:
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
     text = (
-        "Not quite the uncut body's step: with a mass lumped on each side of the cut XFEM keeps "
-        f"{number(least, 3)} of it in two families, however close to nodes"
+        "Not quite the uncut body's: a mass lumped on each side of the cut leaves XFEM "
+        f"{number(least, 3)} of it, however close to nodes"
     )
-    text += f", and {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
-    text += (
-        ", never less than the smallest uncut element's. [Ends of cuts](../theory/xfem.md) keep "
-        "less."
-    )
+    text += f", {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
+    text += ", [less at ends of cuts](../theory/xfem.md)"
     if off := _flattened(evidence, "xfem"):
         text += (
-            f" The lumped mass {'raises' if off > 0.0 else 'lowers'} the lowest frequency by up to "
-            f"{number(100 * abs(off), 2)} %."
+            f"; the lowest frequency is up to {number(100 * abs(off), 2)} % too "
+            f"{'high' if off > 0.0 else 'low'}"
         )
+    text += "."
     return Found(text, f"least at ε = {size:g}", f"at least {KEPT:g}", least >= KEPT, "slivers")
 
 
@@ -301,8 +298,8 @@ def _step_lost(evidence: Evidence) -> Found | None:
         return None
     at = min(common, key=lambda size: max(mass[size], split[size]))
     text = (
-        f"At ε = {number(at, 1)} a consistent mass leaves {number(mass[at], 2)} of its own, a "
-        f"conforming mesh whose cut cells are split {number(split[at], 2)}."
+        f"At ε = {number(at, 1)} a consistent mass leaves {number(mass[at], 2)} of its own, on a "
+        f"conforming mesh {number(split[at], 2)}."
     )
     numbers = ", ".join(
         f"{name}: least {min(own.values()):.2e} at ε = {min(own, key=lambda s: own[s]):g}"
@@ -333,7 +330,7 @@ def _still(evidence: Evidence) -> Found | None:
     above = [f"{name} ({number(d, 2)})" for name, d in found.items() if d > STILL]
     held = len(found) - len(above)
     text = (
-        f"Over the {number(count)} steps of C7 XFEM's energy drifts by "
+        f"In {number(count)} steps of C7 XFEM's energy drifts by "
         f"{number(found['xfem'], 2)}; {held} of {len(found)} solvers "
         f"stay below {number(STILL, 1)}{', not ' if above else ''}{', '.join(above)}."
     )
@@ -349,7 +346,7 @@ def _cost(evidence: Evidence) -> Found | None:
     if not told:
         return None
     written = " and ".join(f"{o.over_scenes} of {t}'s" for t, o in told.items())
-    text = f"At rest and at equal error XFEM takes {written} time"
+    text = f"At rest, at equal error XFEM takes {written} time"
     fitted = _claimed(evidence, "rest", "time", "xfem")
     if fitted is not None:
         text += f", and {fitted.over_scenes} times a conforming mesh's, that mesh's making included"
@@ -388,7 +385,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
             factor=QUARTER, words=(
              "Beside a mesh made for its cuts it is more accurate, {} times its error.",
-             "Its error is {} times that of a mesh made for its cuts.",
+             "Beside a mesh made for its cuts it is {} times.",
              "Beside a mesh made for its cuts it is less accurate, {} times its error."))),
         Sentence("motion in space", "errors of XFEM on three moving scenes in space",
                  _moving_in_space),
@@ -407,7 +404,7 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
         Sentence("remeshed", "remeshing, on several positions of the mesh", partial(
             _weighed, kind="rest", metric="displacement_l2", solver=_REMESHED, rival="xfem",
             factor=QUARTER, words=tuple(
-                f"{lead}: on a mesh made for the cuts the error is {{}} times XFEM's."
+                f"{lead}: the error is {{}} times XFEM's."
                 for lead in (
                     "Remesh for accuracy at rest",
                     "Remeshing gains accuracy in {won} of {scenes} scenes at rest, loses it in "
