@@ -151,15 +151,16 @@ def test_substeps_pay_where_the_whole_error_at_equal_work_is_a_fifth_less():
     assert "8 are not enough on c" in sentence
 
 
-def test_whose_claim_fails_is_said_in_words():
+def test_whose_claim_fails_is_said_in_words_and_numbers():
     def finding(whose, verdict, topic):
-        return {"topic": topic, "expected": f"{topic} holds", "verdict": verdict, "whose": whose}
+        return {"topic": topic, "expected": f"{topic} holds", "verdict": verdict, "whose": whose,
+                "sentence": f"{topic} is 33 % (7 %); and so on; more"}  # fmt: skip
 
     said = _said([
         finding("the thesis", "PASS", "a"), finding("the thesis", "FAIL", "b"),
         finding("this project", "UNDECIDED", "c"),
     ])  # fmt: skip
     assert said == [
-        "Of 2 claims of the thesis 1 hold. Failed: b holds.",
-        "Of 1 claims of this project 0 hold. Undecided: c holds.",
+        "Of 2 claims of the thesis 1 hold. Failed: b holds (b is 33 % (7 %)).",
+        "Of 1 claims of this project 0 hold. Undecided: c holds (c is 33 % (7 %)).",
     ]

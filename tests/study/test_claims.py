@@ -5,10 +5,12 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from verify.methods import cut_by
 from verify.report.study_page import _claim, render_study
 from verify.scene import load_scene, load_scenes
 from verify.solution import Solution
 from verify.solvers import find_solver
+from verify.solvers.body_of_scene import cuts_of
 from verify.study import claims_measured as measured
 from verify.study.claims import (
     ClaimsStudy,
@@ -151,27 +153,96 @@ def test_a_number_that_is_not_installed_decides_nothing_and_gives_its_reason():
     assert "no_such_solver" in in_words(found)
 
 
+def test_the_page_counts_claims_whose_limits_are_not_of_before_their_numbers(tmp_path):
+    moved = [c for c in CLAIMS.values() if c.moved]
+    judged = [Judged(c, [exactly(1.0)] * len(c.limits), [""] * len(c.limits), Judgement.IN_PART)
+              for c in (*moved, CLAIMS["removal"])]  # fmt: skip
+    write_study(tmp_path, "claims", ClaimsStudy(judged=judged, findings=[]), "verify study claims")
+    text = render_study(tmp_path, "claims", "markdown").read_text("utf-8")
+    assert f"but for those of {len(moved)} claims: dropped afterwards" in text
+    assert all(claim.moved in text for claim in moved)
+
+
 def test_no_text_of_a_claim_has_marks_that_its_page_would_show():
     for claim in CLAIMS.values():
-        texts = [claim.sense, claim.who, claim.made]
+        texts = [claim.sense, claim.who, claim.made, claim.ran, claim.moved]
         texts += [text for limit in claim.limits for text in (limit.number, limit.why)]
         assert not [text for text in texts if set("*`[]") & set(text)]
 
 
-def test_the_number_beside_a_verdict_is_the_first_that_breaks_a_limit():
+def test_numbers_beside_a_verdict_are_those_that_decide_it():
     claim = CLAIMS["uncut_step"]
     numbers = [
         exactly(4.44e-16, "0 to 4.44e-16"),
         *(exactly(value) for value in (0.995, 0.894, 1.2)),
     ]
+
+    def seen():
+        shown = [in_words(one) for one in numbers]
+        return _claim(asdict(Judged(claim, numbers, shown, judgement_of(claim.limits, numbers))))
+
+    first, second, third, _ = (limit.number for limit in claim.limits)
+    broken, kept = f"{third} = 0.894 (at least 0.99)", f"{first} = 4.44×10⁻¹⁶ (at most 10⁻⁶)"
+    assert seen()["decides"] == f"{broken}; kept: {kept}"
+    assert seen()["answer"] == broken
+    assert seen()["bounds"][0] == "at most 10⁻⁶"
+    assert seen()["authors"] == "Menouillard, Réthoré, Moës, Combescure and Bung 2008"
+    numbers[1:] = [Number(0.9, 0.85, 0.98), exactly(0.894), exactly(0.5)]
+    more = f"{second} = 0.900 [0.850, 0.980] (at least 0.99); {broken}; 1 more; kept: {kept}"
+    assert seen()["decides"] == more
+    numbers[1:] = [exactly(1.0), exactly(0.991), exactly(1.2)]
+    assert seen()["decides"] == seen()["answer"] == kept
+
+
+def test_a_number_without_a_limit_stands_beside_those_that_decide():
+    claim = CLAIMS["fewer_unknowns"]
+    numbers = [exactly(0.014), exactly(0.009), Number(0.588, 0.588, 2.14), exactly(0.98)]
     shown = [in_words(one) for one in numbers]
-    judged = Judged(claim, numbers, shown, judgement_of(claim.limits, numbers))
-    seen = _claim(asdict(judged))
-    assert seen["decides"] == f"{claim.limits[2].number} = 0.894 (at least 0.99)"
-    assert seen["bounds"][0] == "at most 10⁻⁶"
-    assert seen["authors"] == "Menouillard, Réthoré, Moës, Combescure and Bung 2008"
-    numbers[2] = exactly(0.991)
-    assert _claim(asdict(judged))["decides"].startswith(f"{claim.limits[0].number} = 4.44×10⁻¹⁶ (")
+    seen = _claim(asdict(Judged(claim, numbers, shown, judgement_of(claim.limits, numbers))))
+    first, other = claim.limits[0].number, claim.limits[2].number
+    assert seen["decides"] == f"{first} = 0.0140 (at most 1); beside: {other} = 0.588 [0.588, 2.14]"
+    untold = CLAIMS["open_question"]
+    numbers = [exactly(0.97), exactly(1.8)]
+    seen = _claim(asdict(Judged(untold, numbers, shown, judgement_of(untold.limits, numbers))))
+    assert seen["decides"] == seen["answer"] == f"{untold.limits[0].number} = 0.970"
+
+
+def test_errors_over_positions_begin_with_the_mesh_as_it_is_asked(monkeypatch):
+    """Position 0 is a level of the case; ends are over all positions."""
+    monkeypatch.setattr(measured, "_POSITIONS", 1)
+    one, other = (measured._solved("statics/f3_inclined", name, 1)[1]
+                  for name in ("xfem", "conforming"))  # fmt: skip
+    for found, name in zip(
+        measured._over_positions("statics/f3_inclined", 1),
+        ("displacement_l2", "energy_norm"), strict=True,
+    ):  # fmt: skip
+        assert found.value == pytest.approx(one[name].value / other[name].value, rel=1e-6)
+        assert found.low == found.value == found.high
+    monkeypatch.setattr(measured, "_POSITIONS", 2)
+    two = measured._over_positions("statics/f3_inclined", 1)[0]
+    assert two.low < two.high
+    assert two.value == pytest.approx(0.5 * (two.low + two.high))
+
+
+def test_the_shape_of_snapped_triangles_is_that_of_their_sides(tmp_path):
+    """2r/R = 16 A² / (P a b c); a cut along a line of nodes moves none."""
+    mesh = rectangle_mesh((5, 5))
+
+    def shape(snapped):
+        corners = snapped.points[snapped.cells]
+        a, b, c = (np.linalg.norm(corners[:, k] - corners[:, k - 1], axis=1) for k in range(3))
+        half = (a + b + c) / 2.0  # Heron
+        area = np.sqrt(half * (half - a) * (half - b) * (half - c))
+        return (8.0 * area**2 / (half * a * b * c)).min()
+
+    at, normal = np.array([0.4, 0.47]), np.array([0.3, 1.0])
+    scene = measured._given(tmp_path, mesh.points, mesh.cells, at, normal)
+    snapped = cut_by("snapping", mesh, cuts_of(scene, 0.2)).phantom.mesh
+    found = measured._snapped_shape(scene)
+    assert found == pytest.approx(shape(snapped) / shape(mesh), rel=1e-9)
+    assert found < 0.99
+    level = measured._given(tmp_path, mesh.points, mesh.cells, np.array([0.4, 0.4]), np.eye(2)[1])
+    assert measured._snapped_shape(level) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path):
@@ -189,12 +260,14 @@ def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path
     text = render_study(tmp_path, "claims", "markdown").read_text("utf-8")
     first = [line for line in text.splitlines() if line][:3]
     assert first[1] == "Of 3 claims 1 hold, 0 hold in part, 1 does not hold, 1 cannot be told here."
-    assert first[2] == f"**Does not hold**: {judged[1].claim.sense}"
+    number = f"{judged[1].claim.limits[0].number} = 0.01"
+    assert first[2].startswith(f"**Does not hold**: {judged[1].claim.sense} {number}")
+    assert "Limits were argued before their first number. Numbers" in text
     for one in judged:
         assert f"`{one.claim.command}`" in text
     assert "1.25" in text
     (row,) = [line for line in text.splitlines() if line.startswith(f"| {judged[1].claim.sense}")]
-    assert f"{judged[1].claim.limits[0].number} = 0.01" in row
-    assert "(at least 0.01) | Van Gelder 1998 |" in row
+    assert number in row
+    assert f"(at least 0.75) | {judged[1].claim.ran} | Van Gelder 1998 |" in row
     assert len(study.rows()) == sum(len(one.claim.limits) for one in judged)
     assert render_study(tmp_path, "claims").is_file()

@@ -331,7 +331,10 @@ def thesis_view(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Say whose claims hold and whose fail, each by what it demands."""
+    """Say whose claims hold and whose fail, each by what it demands and what was found.
+
+    What was found is a finding's sentence up to its first semicolon.
+    """
     said = []
     for whose in ("the thesis", "this project"):
         own = listed(findings, whose=whose)
@@ -340,7 +343,10 @@ def _said(findings: Sequence[Mapping[str, Any]]) -> list[str]:
         held = len(listed(own, verdict="PASS"))
         text = f"Of {len(own)} claims of {whose} {held} hold."
         for verdict, lead in (("FAIL", "Failed"), ("UNDECIDED", "Undecided")):
-            rest = [one["expected"] for one in listed(own, verdict=verdict)]
+            rest = [
+                f"{one['expected']} ({one['sentence'].partition(';')[0]})"
+                for one in listed(own, verdict=verdict)
+            ]
             text += f" {lead}: {'; '.join(rest)}." if rest else ""
         said.append(text)
     return said or ["No claim was judged."]
@@ -350,7 +356,11 @@ _IDENTIFIER = re.compile(r",? (10\.\d{4,}/\S+?|arXiv \S+?)(?=[;)\s]|$)")
 
 
 def _claim(one: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a claim with its authors, and its number that breaks a limit, else the first."""
+    """Return a claim with its authors, and the numbers that decide.
+
+    They are two that break limits, else the first; if the claim holds in part the first that keeps
+    its limit; and the first that is shown without one.
+    """
     bounds = [
         scientific(" and ".join(
             f"{words} {limit[key]:g}"
@@ -360,11 +370,26 @@ def _claim(one: Mapping[str, Any]) -> dict[str, Any]:
         for limit in one["claim"]["limits"]
     ]  # fmt: skip
     rows = list(zip(one["claim"]["limits"], one["numbers"], bounds, strict=True))
-    name, found, bound = next((row for row in rows if _broken(*row[:2])), rows[0])
-    value = number(found["value"], 3)
-    decides = f"{name['number']} = {value}" + (f" ({bound})" if bound else "")
+    broken = [row for row in rows if _broken(*row[:2])]
+    kept = [row for row in rows if row[2] and row not in broken]
+    decide = broken[:2] or kept[:1]
+    told = "; ".join(_told(*row) for row in decide)
+    if len(broken) > 2:
+        told += f"; {len(broken) - 2} more"
+    if broken and kept:
+        told += f"; kept: {_told(*kept[0])}"
+    beside = [_told(*row) for row in rows if not row[2]][:1]
+    decides = "; beside: ".join([told, *beside] if told else beside)
+    answer = _told(*(decide or rows)[0])
     authors = _IDENTIFIER.sub("", one["claim"]["who"])
-    return {**one, "bounds": bounds, "decides": decides, "authors": authors}
+    return {**one, "bounds": bounds, "decides": decides, "answer": answer, "authors": authors}
+
+
+def _told(limit: Mapping[str, Any], found: Mapping[str, Any], bound: str) -> str:
+    value = number(found["value"], 3)
+    if found["value"] is not None and found["low"] < found["high"]:
+        value += f" [{number(found['low'], 3)}, {number(found['high'], 3)}]"
+    return f"{limit['number']} = {value}" + (f" ({bound})" if bound else "")
 
 
 def _broken(limit: Mapping[str, Any], found: Mapping[str, Any]) -> bool:

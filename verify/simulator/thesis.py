@@ -78,6 +78,8 @@ class FaceCount:
     step : dict of str to float
         Critical explicit step of the plan as a free sheet, masses lumped, over the step of the
         uncut sheet.
+    shape : dict of str to float
+        `least_shape` of the plan's elements over that of the uncut plan.
     thesis : dict of str to int
         The thesis' increments.
     """
@@ -88,6 +90,7 @@ class FaceCount:
     added: dict[str, int]
     smallest: dict[str, float]
     step: dict[str, float]
+    shape: dict[str, float]
     thesis: dict[str, int]
 
 
@@ -133,9 +136,13 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
         added |= {name: size.nodes - size.nodes_before for name, size in sizes.items()}
         step = {name: _step_of_body(body) / uncut for name, body in bodies.items()}
         smallest = {name: body.smallest_fraction for name, body in bodies.items()}
+        shape = {
+            name: least_shape(body.phantom.mesh) / least_shape(plan)
+            for name, body in bodies.items()
+        }
         own = thesis[asked]
         said = {"xfem": int(own[3]), "snapping_subdivision": int(own[4])}
-        counts.append(FaceCount(asked, cuts, len(lines), added, smallest, step, said))
+        counts.append(FaceCount(asked, cuts, len(lines), added, smallest, step, shape, said))
     return counts
 
 
@@ -177,6 +184,19 @@ def _step_of_body(body: CutBody) -> float:
     pattern = block_pattern(body.resisting.cells, body.resisting.node_count)
     blocks = InternalForce(body.resisting, material, "linear").stiffness(pattern)
     return critical_step(csr_array(pattern.matrix(blocks)), side_wise_mass(body.phantom, 1000.0))
+
+
+def least_shape(mesh: SimplexMesh) -> float:
+    """Return the least ratio of inradius to circumradius, times the dimension: 1 if regular.
+
+    The error of a linear element's gradient is bounded by h²/2r (Ciarlet): half the ratio, twice
+    the bound.
+    """
+    slopes = mesh.gradients  # of lengths 1/height; r = 1/Σ 1/height
+    inverse = np.linalg.norm(slopes, axis=2).sum(axis=1)
+    squares = (mesh.edge_vectors**2).sum(axis=2)
+    centres = 0.5 * np.einsum("ki,kij->kj", squares, slopes[:, 1:])  # from the first corner
+    return float((mesh.dim / inverse / np.linalg.norm(centres, axis=1)).min())
 
 
 @cache
@@ -522,8 +542,8 @@ class RealTime:
     resting, cutting : dict
         Median by phase, and of the whole step, of steps without and with newly split elements:
         processor time, s.
-    slowest : float
-        Processor time, s.
+    slowest, slowest_wall : float
+        Of all steps, processor and wall time, s.
     kernel : float
         Processor time of the calibration kernel beside it, s.
     volume_error, loose_edges, inverted : float, int, int
@@ -542,6 +562,7 @@ class RealTime:
     resting: dict[str, float]
     cutting: dict[str, float]
     slowest: float
+    slowest_wall: float
     kernel: float
     volume_error: float
     loose_edges: int
@@ -581,6 +602,7 @@ def real_time() -> RealTime:
         resting={name: float(np.median(values[~cutting])) for name, values in phases.items()},
         cutting={name: float(np.median(values[cutting])) for name, values in phases.items()},
         slowest=float(total.max()),
+        slowest_wall=float(wall.max()),
         kernel=kernel,
         volume_error=volume,
         loose_edges=loose,

@@ -76,10 +76,13 @@ class Claim:
         Function of `verify.study.claims_measured`.
     solvers : list of str
         That it runs.
-    sense, who, made, command : str
-        The claim, its authors, where they made it and what differs here, and what runs it again.
+    sense, who, made, ran, command : str
+        The claim, its authors, where they made it and what differs here, what was run in short,
+        and what runs it again.
     limits : list of Limit
         Of the numbers, in their order.
+    moved : str
+        What was dropped, or set when its number was known; empty if nothing was.
     """
 
     measure: str
@@ -87,8 +90,10 @@ class Claim:
     sense: str
     who: str
     made: str
+    ran: str
     command: str
     limits: list[Limit]
+    moved: str = ""
 
 
 def claims() -> list[Claim]:
