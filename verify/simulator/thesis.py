@@ -79,7 +79,7 @@ class FaceCount:
         Critical explicit step of the plan as a free sheet, masses lumped, over the step of the
         uncut sheet.
     shape : dict of str to float
-        `least_shape` of the plan's elements over that of the uncut plan.
+        `least_shape` of the cut plan over the uncut plan's.
     thesis : dict of str to int
         The thesis' increments.
     """

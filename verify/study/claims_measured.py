@@ -548,7 +548,7 @@ def snapping() -> list[Number]:
 
 
 def _snapped_shape(scene: Scene) -> float:
-    """Least shape of a snapped mesh over that of the mesh as given."""
+    """Least shape of a snapped mesh over the given mesh's."""
     mesh, size = background_mesh(scene, 0)
     snapped = cut_by("snapping", mesh, cuts_of(scene, size)).phantom.mesh
     return least_shape(snapped) / least_shape(mesh)
