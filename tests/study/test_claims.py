@@ -187,9 +187,12 @@ def test_numbers_beside_a_verdict_are_those_that_decide_it():
     assert seen()["answer"] == broken
     assert seen()["bounds"][0] == "at most 10⁻⁶"
     assert seen()["authors"] == "Menouillard, Réthoré, Moës, Combescure and Bung 2008"
-    numbers[1:] = [Number(0.9, 0.85, 0.98), exactly(0.894), exactly(0.5)]
-    more = f"{second} = 0.900 [0.850, 0.980] (at least 0.99); {broken}; 1 more; kept: {kept}"
-    assert seen()["decides"] == more
+    numbers[1:] = [Number(0.9, 0.85, 0.98), exactly(0.894), Number(1.1, 0.9, 1.2)]
+    both = f"{second} = 0.900 [0.850, 0.980] (at least 0.99); {broken}"
+    assert seen()["answer"] == both
+    assert seen()["decides"] == f"{both}; 1 more; kept: {kept}"
+    numbers[1] = Number(1.0, 0.98, 1.01)  # its interval may break the limit: after those that do
+    assert seen()["answer"].startswith(f"{broken}; {second} = 1.00 [0.980, 1.01]")
     numbers[1:] = [exactly(1.0), exactly(0.991), exactly(1.2)]
     assert seen()["decides"] == seen()["answer"] == kept
 
@@ -261,7 +264,8 @@ def test_the_page_counts_verdicts_and_shows_numbers_limits_and_commands(tmp_path
     first = [line for line in text.splitlines() if line][:3]
     assert first[1] == "Of 3 claims 1 hold, 0 hold in part, 1 does not hold, 1 cannot be told here."
     number = f"{judged[1].claim.limits[0].number} = 0.01"
-    assert first[2].startswith(f"**Does not hold**: {judged[1].claim.sense} {number}")
+    sense = judged[1].claim.sense.rstrip(".")
+    assert first[2].startswith(f"**Does not hold**: {sense} (Van Gelder 1998): {number}")
     assert "Limits were argued before their first number. Numbers" in text
     for one in judged:
         assert f"`{one.claim.command}`" in text

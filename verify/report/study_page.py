@@ -358,8 +358,8 @@ _IDENTIFIER = re.compile(r",? (10\.\d{4,}/\S+?|arXiv \S+?)(?=[;)\s]|$)")
 def _claim(one: Mapping[str, Any]) -> dict[str, Any]:
     """Return a claim with its authors, and the numbers that decide.
 
-    They are two that break limits, else the first; if the claim holds in part the first that keeps
-    its limit; and the first that is shown without one.
+    They are two that break limits, or whose intervals may, else the first. If the claim holds in
+    part the first that keeps its limit follows, then the first that is shown without one.
     """
     bounds = [
         scientific(" and ".join(
@@ -370,19 +370,24 @@ def _claim(one: Mapping[str, Any]) -> dict[str, Any]:
         for limit in one["claim"]["limits"]
     ]  # fmt: skip
     rows = list(zip(one["claim"]["limits"], one["numbers"], bounds, strict=True))
-    broken = [row for row in rows if _broken(*row[:2])]
-    kept = [row for row in rows if row[2] and row not in broken]
-    decide = broken[:2] or kept[:1]
-    told = "; ".join(_told(*row) for row in decide)
-    if len(broken) > 2:
-        told += f"; {len(broken) - 2} more"
-    if broken and kept:
-        told += f"; kept: {_told(*kept[0])}"
+    states: dict[bool | None, list[str]] = {True: [], False: [], None: []}
+    for limit, found, bound in rows:
+        if bound:
+            states[_kept(limit, found)].append(_told(limit, found, bound))
+    kept, missed = states[True], states[False] + states[None]
     beside = [_told(*row) for row in rows if not row[2]][:1]
-    decides = "; beside: ".join([told, *beside] if told else beside)
-    answer = _told(*(decide or rows)[0])
+    decide = missed[:2] or kept[:1] or beside
+    parts = [*decide]
+    if len(missed) > 2:
+        parts.append(f"{len(missed) - 2} more")
+    if missed and kept:
+        parts.append(f"kept: {kept[0]}")
+    parts += [f"beside: {told}" for told in beside if told not in decide]
     authors = _IDENTIFIER.sub("", one["claim"]["who"])
-    return {**one, "bounds": bounds, "decides": decides, "answer": answer, "authors": authors}
+    return {
+        **one, "bounds": bounds, "authors": authors,
+        "answer": "; ".join(decide), "decides": "; ".join(parts),
+    }  # fmt: skip
 
 
 def _told(limit: Mapping[str, Any], found: Mapping[str, Any], bound: str) -> str:
@@ -392,15 +397,17 @@ def _told(limit: Mapping[str, Any], found: Mapping[str, Any], bound: str) -> str
     return f"{limit['number']} = {value}" + (f" ({bound})" if bound else "")
 
 
-def _broken(limit: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+def _kept(limit: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
+    """Say whether all of a number's interval keeps a limit (True) or breaks it (False)."""
     if found["value"] is None:
-        return False
-    least, most = limit["at_least"], limit["at_most"]
-    below, above = (
-        least is not None and found["high"] < least,
-        most is not None and found["low"] > most,
+        return None
+    least, most = (
+        end if limit[key] is None else limit[key]
+        for key, end in (("at_least", -float("inf")), ("at_most", float("inf")))
     )
-    return below or above
+    if least <= found["low"] and found["high"] <= most:
+        return True
+    return False if found["high"] < least or most < found["low"] else None
 
 
 Settings = Sequence[Mapping[str, Any]]
