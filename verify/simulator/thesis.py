@@ -26,7 +26,7 @@ from verify.simulator.semi_progressive import Crossings, SemiProgressiveCutter
 from verify.simulator.session import LIMITS
 from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.cuts import Polyline, ToolPath
+from verify.xfem.cuts import Cut, Polyline, ToolPath
 from verify.xfem.element import isotropic
 from verify.xfem.explicit import critical_step
 from verify.xfem.internal_force import InternalForce
@@ -197,6 +197,11 @@ def least_shape(mesh: SimplexMesh) -> float:
     squares = (mesh.edge_vectors**2).sum(axis=2)
     centres = 0.5 * np.einsum("ki,kij->kj", squares, slopes[:, 1:])  # from the first corner
     return float((mesh.dim / inverse / np.linalg.norm(centres, axis=1)).min())
+
+
+def shape_left(method: str, mesh: SimplexMesh, cuts: Sequence[Cut]) -> float:
+    """Cut a mesh by a method, and return `least_shape` over the uncut mesh's."""
+    return least_shape(cut_by(method, mesh, cuts).phantom.mesh) / least_shape(mesh)
 
 
 @cache

@@ -19,7 +19,6 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.judge.convergence import observed_rate
 from verify.judge.intervals import quotient_half_width
 from verify.judge.models import changed, on_one_level
-from verify.methods import cut_by
 from verify.printable import words_of
 from verify.result import Metric
 from verify.scene import Scene, load_scene, load_scenes, scene_content
@@ -30,7 +29,7 @@ from verify.simulator.thesis import (
     count_face,
     count_strips,
     delays,
-    least_shape,
+    shape_left,
 )
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh, cuts_of
@@ -550,8 +549,7 @@ def snapping() -> list[Number]:
 def _snapped_shape(scene: Scene) -> float:
     """Least shape of a snapped mesh over the given mesh's."""
     mesh, size = background_mesh(scene, 0)
-    snapped = cut_by("snapping", mesh, cuts_of(scene, size)).phantom.mesh
-    return least_shape(snapped) / least_shape(mesh)
+    return shape_left("snapping", mesh, cuts_of(scene, size))
 
 
 def removal() -> list[Number]:
