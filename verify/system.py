@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, issparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, cg, eigsh, splu
 
 from verify.errors import InputError
 from verify.scene import Scene
@@ -73,12 +73,15 @@ def checked_system(given: Any) -> System:
 CONDITION, SCALED = "condition number", "condition number scaled by the diagonal"
 STEP = "critical explicit step"
 FREQUENCY = "lowest natural frequency"
+ITERATIONS = "iterations of conjugate gradients"
 
 _TRUSTED = 1e13  # condition number up to which the smallest eigenvalue has two digits and more
 _LEAST_MASS = 1e-13  # eigenvalue of the scaled mass: below, its inverse has no three digits
 _LARGEST = 6000  # unknowns of a dense matrix
 _DENSE = 500  # unknowns up to which all eigenvalues cost less than a Lanczos iteration
 _LANCZOS = 1e-8  # relative tolerance of an eigenvalue
+_RESIDUAL = 1e-8  # at which conjugate gradients end, of the load
+_MOST_ITERATIONS = 10  # for each unknown; exact arithmetic needs one
 _Floats = NDArray[np.float64]
 
 
@@ -151,6 +154,31 @@ def lowest_frequency(system: System) -> float:
     # M x = μ K x: the largest μ belongs to the lowest frequency
     largest = _largest(mass, M=stiffness, Minv=inverse)
     return float(1.0 / (2.0 * np.pi * np.sqrt(largest)))
+
+
+def gradient_iterations(system: System) -> int:
+    """Count the iterations of conjugate gradients under a uniform body force, M·1.
+
+    Preconditioned by the diagonal, to a residual of 1e-8 of the load in the norm of the
+    preconditioner: what condition number and spectrum cost together.
+
+    Raises
+    ------
+    InputError
+        If there is no mass, an unknown without stiffness, or no convergence.
+    """
+    stiffness, mass = _scaled("stiffness", system, "the matrix is singular")
+    scale = np.sqrt(csr_array(system.stiffness).diagonal()[_unknowns(system)])
+    most, count = _MOST_ITERATIONS * len(scale), 0
+
+    def counted(_: Any) -> None:
+        nonlocal count
+        count += 1
+
+    given: dict[str, Any] = {"rtol": _RESIDUAL, "maxiter": most, "callback": counted}
+    if cg(stiffness, mass @ scale, **given)[1]:
+        raise InputError(f"conjugate gradients do not converge in {most} iterations")
+    return count
 
 
 def _scaled(by: Literal["mass", "stiffness"], system: System, so: str) -> list[csc_array]:

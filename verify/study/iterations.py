@@ -106,12 +106,13 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class IterationsStudy(Study):
-    """What the study found."""
+    """What the study found; `left_out` says of the other cases why they are not compared."""
 
     solver: str
     truth: str
     tolerance: float
     settings: list[Setting]
+    left_out: dict[str, str]
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the lines of its table."""
@@ -167,6 +168,7 @@ def iterations_study(
     ]
     return IterationsStudy(
         solver=variant.label, truth=truth.label, tolerance=tolerance, settings=settings,
+        left_out={case: problem.what for case, problem in without.items()},
         findings=[*_findings(variant.label, settings, tolerance, grid.names), *left_out],
     )  # fmt: skip
 

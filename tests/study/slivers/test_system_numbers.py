@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh
+from scipy.linalg import block_diag, eigh
 from scipy.sparse import csr_array, diags_array
 
 from verify.errors import InputError
@@ -17,7 +17,14 @@ from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.study.measured_scenes import Measurement
 from verify.study.slivers import findings, growth, step_by_running
-from verify.system import System, checked_system, condition_numbers, critical_step, lowest_frequency
+from verify.system import (
+    System,
+    checked_system,
+    condition_numbers,
+    critical_step,
+    gradient_iterations,
+    lowest_frequency,
+)
 
 SIZES = [0.5, 1e-1, *(10.0**-k for k in range(2, 13)), 0.0]
 
@@ -103,6 +110,41 @@ def test_a_sliver_whose_mass_and_stiffness_vanish_together_is_measured_to_round_
     assert scaled == pytest.approx(expected, rel=1e-8)
     assert 0.1 / size**2 < raw < 1e3 / size**2
     assert critical_step(thin) == pytest.approx(critical_step(whole), rel=1e-8)
+
+
+@pytest.mark.parametrize("stiffnesses", [[3.0], [3.0, 700.0], [3.0, 700.0, 1e-9]])
+def test_conjugate_gradients_take_an_iteration_for_each_scaled_eigenvalue(stiffnesses):
+    """Pairs of unknowns on springs k, coupled by k/2: scaled 1 ± 1/3, whatever k."""
+    pair = np.array([[1.5, -0.5], [-0.5, 1.5]])
+    stiffness = csr_array(block_diag(*[k * pair for k in stiffnesses]))
+    n = stiffness.shape[0]
+    mass = csr_array(diags_array(np.arange(1.0, n + 1.0)))  # unequal: a load on both modes
+    assert gradient_iterations(System(stiffness, mass, np.zeros(n, dtype=bool))) == 2
+
+
+@pytest.mark.parametrize("n", [30, 200])
+def test_conjugate_gradients_end_within_the_bound_of_the_condition_number(n):
+    """Errors in energy fall by 2 ((√κ - 1)/(√κ + 1))^k; residuals lag by √κ at most."""
+    whole = chain(n)
+    root = np.sqrt(condition_numbers(whole)[1])
+    assert gradient_iterations(whole) <= np.log(2.0 * root / 1e-8) / np.log((root + 1) / (root - 1))
+    with pytest.raises(InputError, match="no density"):
+        gradient_iterations(System(whole.stiffness, None, whole.fixed))
+
+
+@pytest.mark.parametrize("family", ["plane_edges", "space_faces"])
+def test_a_mesh_whose_cut_cells_are_split_takes_more_iterations_as_its_slivers_shrink(family):
+    """Where cut cells stay whole it is that without slivers, less than half more."""
+
+    def counts(name):
+        scenes = [load_scene(f"slivers/{family}[epsilon={e}]") for e in ("0.1", "0.0001", "0.0")]
+        return [gradient_iterations(find_solver(name).system(scene, 0)) for scene in scenes]
+
+    far, near, none = counts("subdivision")
+    assert near > 2 * far > 3 * none
+    far, near, none = counts("xfem")
+    assert max(far, near) <= 1.5 * none
+    assert none == counts("subdivision")[2]  # one mesh, one mass
 
 
 def test_what_cannot_be_known_is_said():
@@ -246,3 +288,25 @@ def test_errors_are_held_against_the_row_at_zero_and_the_conforming_mesh(near, f
     assert [f.verdict for f in found] == verdicts
     off = f"{100 * abs(near - 1.0):.2f} % {'above' if near > 1.0 else 'below'} the one at ε = 0."
     assert found[0].sentence.endswith(off)
+
+
+@pytest.mark.parametrize(
+    ("near", "middle", "far", "verdicts"),
+    [
+        (1.04, 1.5, 4.9, [Verdict.PASS, Verdict.PASS]),  # 1.25/0.9² = 1.54, 1.25/0.5² = 5
+        (1.16, 1.6, 1.0, [Verdict.FAIL, Verdict.FAIL]),
+        (1.04, 1.0, 5.1, [Verdict.PASS, Verdict.FAIL]),
+    ],
+)
+def test_the_jump_is_held_against_a_mesh_whose_nodes_on_the_cut_are_closer(
+    near, middle, far, verdicts
+):
+    def row(solver, size, value):
+        return Measurement("family", size, solver, "jump_l2", "", value)
+
+    own = {0.5: far, 0.1: middle, 1e-6: near, 0.0: 1.0}
+    measured = [row("own", size, value) for size, value in own.items()]
+    measured += [row("conforming", size, 1.0) for size in own]
+    found = [f for f in findings(measured, []) if f.topic == "family, own"]
+    assert [f.verdict for f in found] == verdicts
+    assert "1.25/(1 - ε)²" in found[1].expected
