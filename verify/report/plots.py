@@ -332,12 +332,12 @@ class Bar:
 
 def loglog(
     title: str, x_title: str, series: Sequence[Series], palette: Palette, falling: bool = False,
-    grey: Sequence[Series] = (),
+    grey: Sequence[Series] = (), ticks: Sequence[float] = (),
 ) -> Drawing | None:  # fmt: skip
     """Return curves on logarithmic axes, or None if there is nothing positive.
 
     Up to six are named at their ends, more in a legend; those in `grey` have no names. The abscissa
-    falls to the right if asked.
+    falls to the right if asked, and has its `ticks` where they are given.
     """
     drawn = [(s, [place for place in s.places if _can_be_drawn(place)]) for s in series]
     drawn = [(s, places) for s, places in drawn if places]
@@ -349,6 +349,8 @@ def loglog(
         _logarithmic(axes, x_title, [place for places in every for place in places])
         if falling:
             axes.invert_xaxis()
+        if ticks:
+            axes.xaxis.set_major_locator(FixedLocator(list(ticks)))
         for places in filter(None, nameless):
             axes.plot(*zip(*places, strict=True), color="#c2c2c2", linewidth=0.8, marker=".",
                       markersize=3)  # fmt: skip

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from verify.errors import InputError
 from verify.files import read_json, write_whole
 from verify.printable import shown
+from verify.report.iterations_page import iterations_lead, iterations_panels, substeps_panels
 from verify.report.notation import (
     NORMS,
     ROUND_OFF,
@@ -37,7 +38,8 @@ from verify.report.plots import (
     strips,
 )
 from verify.report.rendering import as_html, as_markdown, print_page
-from verify.report.sliver_page import listed, sliver_families, sliver_lead
+from verify.report.sliver_page import sliver_families, sliver_lead
+from verify.report.sliver_values import listed
 
 _ALL = "all"  # scenes together
 _FEWEST = (6, 16)  # scenes and meshes of the protocol
@@ -408,116 +410,6 @@ def _kept(limit: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
     if least <= found["low"] and found["high"] <= most:
         return True
     return False if found["high"] < least or most < found["low"] else None
-
-
-Settings = Sequence[Mapping[str, Any]]
-
-_NEARER = 0.8  # of the other error: less than a fifth apart is no difference that one would pay for
-
-
-def iterations_lead(record: Mapping[str, Any]) -> Lead:
-    """Return what the study answers, its work counted in iterations in a step of a case."""
-    settings = record["settings"]
-    cases = list(dict.fromkeys(one["case"] for one in settings))
-    return Lead(
-        f"How many iterations does {record['solver']} need on a cut body, and do substeps help?",
-        [_said_of_iterations(record, cases), _said_of_substeps(settings, cases)],
-        iterations_panels(settings, "whole_error"),
-        "Distance (RMS over nodes) from the answer with the smallest steps, solved to convergence, "
-        "over the largest displacement. Iterations in a step of the case: in all of its substeps.",
-    )
-
-
-def iterations_panels(settings: Settings, error: str) -> list[Drawing | None]:
-    """Return a panel per case: an error over the work, a line for each number of substeps."""
-    palette, panels = Palette(), []
-    for case, own in _by_case(settings):
-        places: dict[int, list[tuple[Any, Any]]] = {}
-        for one in own:
-            if one["iterations"]:
-                place = one["iterations"] * one["substeps"], one[error]
-                places.setdefault(one["substeps"], []).append(place)
-        series = [
-            Series(f"{count} substep{'s' if count > 1 else ''}", curve)
-            for count, curve in places.items()
-        ]
-        title = f"{case}: {error.replace('_', ' ')}, relative"
-        panels.append(loglog(title, "iterations in a step of the case", series, palette))
-    return panels
-
-
-def substeps_panels(settings: Settings) -> list[Drawing | None]:
-    """Return a panel per case: the whole error over substeps, at equal work or equal counts."""
-    palette, panels = Palette(), []
-    for case, own in _by_case(settings):
-        curves: dict[str, list[tuple[Any, Any]]] = {}
-        for one in sorted(own, key=lambda one: one["substeps"]):
-            if count := one["iterations"]:
-                for name in (f"{count * one['substeps']} in a step", f"{count} in each"):
-                    curves.setdefault(name, []).append((one["substeps"], one["whole_error"]))
-        series = [Series(name, curve) for name, curve in curves.items() if len(curve) > 1]
-        panels.append(loglog(f"{case}: whole error, relative", "substeps", series, palette))
-    return panels
-
-
-def _by_case(settings: Settings) -> Iterator[tuple[str, Settings]]:
-    for case in dict.fromkeys(one["case"] for one in settings):
-        yield case, listed(settings, case=case)
-
-
-def _said_of_iterations(record: Mapping[str, Any], cases: Sequence[str]) -> str:
-    """Say the least work with which the same steps are met, for each case."""
-    tolerance, met, missed = record["tolerance"], [], []
-    for case, own in _by_case(record["settings"]):
-        tried = [(one["iterations"] * one["substeps"], one) for one in own if one["iterations"]]
-        good = [
-            (work, one["iterations"], one["substeps"])
-            for work, one in tried
-            if one["iteration_error"] is not None and one["iteration_error"] <= tolerance
-        ]
-        if good:
-            work, count, parts = min(good)
-            each = f", {count} in each of {parts} substeps" if parts > 1 else ""
-            most = "at most " if work == min(work for work, _ in tried) else ""
-            met.append(f"{most}{work} ({case}{each})")
-        elif tried:
-            missed.append(f"{max(work for work, _ in tried)} are not enough on {case}")
-    within = f"within {100 * tolerance:.2g} % of the same steps, solved to convergence"
-    if not met:
-        return f"No number comes {within}, on any of {len(cases)} cut cases: {'; '.join(missed)}."
-    said = f"So many iterations in a step of the case come {within}: {', '.join(met)}"
-    return f"{said}; {'; '.join(missed)}." if missed else f"{said}."
-
-
-def _said_of_substeps(settings: Settings, cases: Sequence[str]) -> str:
-    """Compare the fewest and the most substeps at the largest work that both had."""
-    told: dict[int, list[str]] = {1: [], -1: [], 0: []}  # better, worse, neither
-    for case, own in _by_case(settings):
-        errors = {
-            (one["substeps"], one["iterations"] * one["substeps"]): one["whole_error"]
-            for one in own
-            if one["iterations"] and one["whole_error"] is not None
-        }
-        few, many = min((s for s, _ in errors), default=1), max((s for s, _ in errors), default=1)
-        common = {w for s, w in errors if s == few} & {w for s, w in errors if s == many}
-        if few == many or not common:
-            continue
-        work = max(common)
-        one, other = errors[few, work], errors[many, work]
-        text = (
-            f"{case}, {work} iterations: {number(other, 2)} with {many} substeps, "
-            f"{number(one, 2)} with {few}"
-        )
-        told[(other < _NEARER * one) - (one < _NEARER * other)].append(text)
-    compared, better = sum(map(len, told.values())), len(told[1])
-    if not compared:
-        return "No two settings have the same work with different substeps: nothing is compared."
-    where = f", on all {compared}" if better == compared else f" on {better} of {compared}"
-    said = (
-        f"pay at equal work{where}" if better else f"do not pay at equal work on any of {compared}"
-    )
-    shown = "; ".join(text for own in told.values() for text in own)
-    return f"Substeps {said} cases. Error beside the smallest steps: {shown}."
 
 
 _VIEWS: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
