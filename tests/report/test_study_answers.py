@@ -59,6 +59,10 @@ def test_a_step_that_falls_like_its_slivers_is_told_from_one_that_stays_and_one_
     assert (
         "A smaller share is left, however near, by XFEM mass=evs (0.10) and other (0.10)." in said
     )
+    at_nodes = [measured("xfem", *row) for row in ((0.1, STEP, 2.0), (0.0, STEP, 1.0),
+                                                   (0.1, UNCUT, 2.0))]  # fmt: skip
+    of_nodes = sliver_lead({"measurements": at_nodes, "growths": []}).sentences[0]
+    assert "A smaller share is left, however near, by XFEM (0.50)." in of_nodes
     far = "Far from nodes alone less is left by snapping"
     assert f"{far} (0.40 at ε = 0.1, at least 0.95 nearer)" in said
 

@@ -42,7 +42,7 @@ _ERRORS = {
     "displacement_l2": "displacement, L²", "energy_norm": "energy norm", "jump_l2": "jump, L²",
     "opening_l2": "opening, L²", "opening_max": "largest error of the opening",
 }  # fmt: skip
-_TOGETHER = {  # errors that are said together
+_TOGETHER = {  # errors that share a clause
     "displacement and energy norm": ("displacement_l2", "energy_norm"),
     "jump": ("jump_l2",), "opening": ("opening_l2", "opening_max"),
 }  # fmt: skip
@@ -96,7 +96,7 @@ def _said_of_steps(measured: Records, families: Sequence[str]) -> str:
             kept.append(f"{said})")
         elif not beyond and steps and min(steps) >= _KEPT:
             far.append(f"{said} at ε = {size:g}, at least {number(min(steps), 2)} nearer)")
-        elif beyond and log(own[min(beyond)] / least) > _FALLS * log(min(beyond) / size):
+        elif beyond and size and log(own[min(beyond)] / least) > _FALLS * log(min(beyond) / size):
             falls.append(f"{said} at ε = {size:g})")
         else:
             stays.append(f"{said})")
@@ -173,7 +173,7 @@ def _said_of_errors(measured: Records, families: Sequence[str]) -> str:
 
 
 def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return name, tables and curves of each family, what is in none, and who has no solution."""
+    """Return name, tables and curves of each family, errors without a table, failed solutions."""
     palette = Palette.of(solver_title(m["solver"]) for m in record["measurements"])
     families = []
     for family in dict.fromkeys(m["family"] for m in record["measurements"]):
@@ -241,7 +241,7 @@ def _over_sizes(title: str, values: Mapping[str, Mapping[float, float]], digits:
 
 
 def _grouped(rows: Sequence[tuple[str, list[str]]]) -> list[list[str]]:
-    """Return rows with their heads, those of equal cells as one."""
+    """Return rows with their heads, equal cells under one."""
     found: dict[tuple[str, ...], str] = {}
     for name, cells in rows:
         found[*cells] = _beside(found.get((*cells,), ""), name)
@@ -297,7 +297,7 @@ def _worst_systems(measured: Records, family: str, solvers: Sequence[str]) -> Ta
 def _curves(
     measured: Records, growths: Records, drawn: Sequence[str], palette: Palette
 ) -> list[Drawing | None]:
-    """Return the panels of some quantities, without those of one curve among several solvers."""
+    """Return the panels of some quantities; none for a single curve among several solvers."""
     solvers = list(dict.fromkeys(m["solver"] for m in measured))
     panels = []
     for quantity in drawn:

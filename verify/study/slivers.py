@@ -403,8 +403,8 @@ def _far(topic: str, error: str, values: Values, others: Values) -> Iterator[Fin
     both = {e: values[e] / others[e] for e in values if e > NEAR and others.get(e, 0.0) > 0.0}
     if not both or max(values[e] for e in both) <= _ROUND_OFF:
         return
-    # a conforming mesh has nodes on the cut, up to 1 - ε of an element apart, and what is
-    # interpolated between nodes is off by the square of their distance
+    # a conforming mesh has nodes on the cut, up to 1 - ε of an element apart, and a field that
+    # is interpolated between nodes is off by the square of their distance
     closer = {e: max(e, 1.0 - e) ** 2 if error == "jump_l2" else 1.0 for e in both}
     worst = max(both, key=lambda e: both[e] * closer[e])
     limit = _FAR_LIMIT / closer[worst]
