@@ -1,5 +1,6 @@
 """The page of a study of iterations: how many a solver needs, and whether substeps help."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ Settings = Sequence[Mapping[str, Any]]
 
 _NEARER = 0.8  # of the other error: less than a fifth apart is no difference that one would pay for
 _SINGLE = 1e-6  # ten of its units, of the largest displacement
+_CAUSE = re.compile(r"^.*Error: | \(\S+:\d+ in \w+\)$")  # around the words of an error
 _MORE = 4  # times the iterations, which an error of theirs would show
 
 
@@ -26,7 +28,7 @@ def iterations_lead(record: Mapping[str, Any]) -> Lead:
     said = [_said_of_iterations(record), *_said_of_the_rest(record), *_said_of_time(record)]
     return Lead(
         f"How many iterations does {record['solver']} need on a cut body, and do substeps help?",
-        [" ".join(said), _said_of_substeps(settings, record["left_out"])],
+        [" ".join(said), _said_of_substeps(settings, record.get("left_out", {}))],
         iterations_panels(settings, "whole_error"), caption,
     )  # fmt: skip
 
@@ -54,17 +56,23 @@ def iterations_panels(settings: Settings, error: str) -> list[Drawing | None]:
 
 
 def substeps_panels(settings: Settings) -> list[Drawing | None]:
-    """Return a panel per case: the whole error over substeps, at equal work or equal counts."""
+    """Return a panel per case in motion: the whole error over substeps, by work and by counts."""
     palette, panels = Palette(), []
     for case, own in _by_case(settings):
-        if _is_round_off(own, "whole_error"):
+        if _is_round_off(own, "whole_error") or own[0]["time_step"] is None:
             continue
         curves: dict[str, list[tuple[Any, Any]]] = {}
         for one in sorted(own, key=lambda one: one["substeps"]):
             if count := one["iterations"]:
                 for name in (f"{_work(one)} in a step", f"{count} in each"):
                     curves.setdefault(name, []).append((one["substeps"], one["whole_error"]))
-        series = [Series(name, curve) for name, curve in curves.items() if len(curve) > 1]
+        joined: dict[tuple[tuple[int, str], ...], str] = {}  # equal as they would be written
+        for name, curve in curves.items():
+            if len(curve) > 1:
+                key = tuple((parts, number(error, 2)) for parts, error in curve)
+                joined[key] = f"{joined[key]}, {name}" if key in joined else name
+        first = {name: curves[name.split(", ")[0]] for name in joined.values()}
+        series = [Series(name, curve) for name, curve in first.items()]
         ticks = sorted({count for one in series for count, _ in one.places})
         title = f"{case}: whole error, relative"
         panels.append(loglog(title, "substeps", series, palette, ticks=ticks))
@@ -128,22 +136,22 @@ def _said_of_the_rest(record: Mapping[str, Any]) -> Iterator[str]:
             f"within {100 * tolerance:.2g} % of these {needed}."
         )
     for case, own in _by_case(record["settings"]):
+        left = []
         for parts in dict.fromkeys(one["substeps"] for one in own):
             series = [one for one in listed(own, substeps=parts) if one["iterations"]]
-            series = [one for one in series if (one["iteration_error"] or 0.0) > _SINGLE]
-            if not series:
-                continue
-            last = series[-1]
+            last = series[-1] if series else {}
             few = [one for one in series if _MORE * one["iterations"] <= last["iterations"]
-                   and _NEARER * one["iteration_error"] <= last["iteration_error"]]  # fmt: skip
+                   and _NEARER * (one["iteration_error"] or 0.0) <= (last["iteration_error"] or 0.0)
+                   and (one["iteration_error"] or 0.0) > _SINGLE]  # fmt: skip
             if few:
-                first, some = few[0], f"{parts} substeps" if parts > 1 else "1 substep"
-                yield (
-                    f"More than {first['iterations']} in each of {some} do not help on {case} "
-                    f"(from the same steps, solved: {number(first['iteration_error'], 3)}, with "
-                    f"{last['iterations']} {number(last['iteration_error'], 3)}): that is no error "
-                    "of iterations."
-                )
+                left.append(f"{number(few[0]['iteration_error'], 3)} with {few[0]['iterations']}, "
+                            f"{number(last['iteration_error'], 3)} with {last['iterations']} in "
+                            f"each of {parts}")  # fmt: skip
+        if left:
+            yield (
+                f"On {case} more iterations do not help from some number on (distance from the "
+                f"same steps, solved: {'; '.join(left)}): that is no error of iterations."
+            )
 
 
 def _said_of_time(record: Mapping[str, Any]) -> Iterator[str]:
@@ -186,16 +194,17 @@ def _said_of_substeps(settings: Settings, left_out: Mapping[str, str]) -> str:
     if not compared:
         said = "No case in motion has the same work with different substeps: nothing is compared."
     else:
-        moving = f"{compared} case{'s' * (compared > 1)} in motion"
-        verb = (
-            f"pay at equal work on {better} of" if better else "do not pay at equal work on any of"
-        )
+        some = "all" if better == compared else f"{better} of" if better else "any of"
+        where = f"{some} {compared} cases" if compared > 1 else "the one case"
+        verb = "pay" if better else "do not pay"
         shown = "; ".join(text for own in told.values() for text in own)
-        said = f"Substeps {verb} {moving}. Error beside the smallest steps: {shown}."
+        said = f"Substeps {verb} at equal work on {where} in motion. Error beside the smallest "
+        said += f"steps: {shown}."
     if resting:
         said += f" {len(resting)} at rest say nothing, where steps have no error of their own: "
         said += f"{', '.join(resting)}."
     if left_out:
         said += f" {len(left_out)} left out: "
-        said += "; ".join(f"{case} ({why})" for case, why in left_out.items()) + "."
+        said += "; ".join(f"{case} ({_CAUSE.sub('', why)})" for case, why in left_out.items())
+        said += "."
     return said
