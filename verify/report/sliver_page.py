@@ -30,6 +30,7 @@ from verify.report.sliver_values import (
     UNCUT,
     UNKNOWNS,
     Records,
+    counts_of,
     listed,
     mass_of,
     ratios_of,
@@ -49,6 +50,7 @@ _TOGETHER = {  # errors that share a clause
 _DRAWN = ("condition number", SCALED, ITERATIONS)
 _KEPT = 0.9  # of the step, as in the findings: a tenth is what its safety factor takes
 _FALLS = 0.5  # exponent of ε: between a share that stays, 0, and one that falls like ε, 1
+_BENDS = 0.25  # change of an exponent that ends a law, as in the study's fits
 _FAR, _NEAR = 1.25, 1e-2  # as in the study's findings: error over a conforming mesh's, and ε
 _SAME = 0.02  # by which curves differ that are drawn as one: less than the width of a line,
 _LINE = 0.005  # which is at most twice this part of a logarithmic axis
@@ -198,7 +200,7 @@ def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
              {s: values_of(measured, family, s, SCALED) for s in solvers}, 2),
             ("Iterations of conjugate gradients, preconditioned by the diagonal, to 1e-8 of a "
              "uniform body force",
-             {s: values_of(measured, family, s, ITERATIONS) for s in solvers}, 3),
+             {s: counts_of(measured, family, s) for s in solvers}, 3),
         ):  # fmt: skip
             tables.append(_over_sizes(title, own, digits))
         failed = [m for m in measured if m["quantity"] == "solution" and m["value"] is None]
@@ -232,7 +234,9 @@ def _title(error: str) -> str:
     return title.removeprefix("relative error of ").replace("_", " ")
 
 
-def _over_sizes(title: str, values: Mapping[str, Mapping[float, float]], digits: int = 2) -> Table:
+def _over_sizes(
+    title: str, values: Mapping[str, Mapping[float, float | int]], digits: int = 2
+) -> Table:
     """Return a row for each solver that has a value, or for equal ones, a column for each size."""
     sizes = sorted({size for own in values.values() for size in own}, reverse=True)
     rows = [(solver_title(solver), [number(own.get(size), digits) for size in sizes])
@@ -281,12 +285,12 @@ def _worst_systems(measured: Records, family: str, solvers: Sequence[str]) -> Ta
                  for whole in (UNCUT, LUMPED)]  # fmt: skip
         pitch = ratios_of(measured, family, solver, FREQUENCY).values()
         off = max((ratio - 1.0 for ratio in pitch), key=abs, default=None)
-        most = [max(values_of(measured, family, solver, name).values(), default=None)
-                for name in (SCALED, ITERATIONS)]  # fmt: skip
+        scaled = max(values_of(measured, family, solver, SCALED).values(), default=None)
+        count = max(counts_of(measured, family, solver).values(), default=None)
         rows.append([
             solver_title(solver), mass_of(measured, solver) or "–", number(uncut, 3),
             *(number(share, 3) for share in least),
-            "–" if off is None else f"{signed(100 * off)} %", *(number(one, 3) for one in most),
+            "–" if off is None else f"{signed(100 * off)} %", number(scaled, 3), number(count),
         ])  # fmt: skip
     heads = ["method", "mass of the uncut body", "uncut step, s", "least step over it",
              "least step over the uncut one with a lumped mass", "lowest frequency off conforming",
@@ -342,7 +346,7 @@ def _places(measured: Records, solver: str, quantity: str) -> list[tuple[Any, An
     for size in sorted(found, reverse=True):
         value = found[size]
         risen = log(value / before) / log(size / last) if value and before and last else nan
-        goes_on = _alike(value, before) or abs(risen - power) < _FALLS
+        goes_on = _alike(value, before) or abs(risen - power) < _BENDS
         if last and unknowns.get(size) != unknowns.get(last) and not goes_on:
             curve.append((None, None))
         curve.append((size, value))

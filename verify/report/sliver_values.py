@@ -24,6 +24,12 @@ def values_of(measured: Records, family: str, solver: str, quantity: str) -> dic
     return {m["size"]: m["value"] for m in own if m["value"] is not None}
 
 
+def counts_of(measured: Records, family: str, solver: str) -> dict[float, int]:
+    """Return the iterations of conjugate gradients, by ε."""
+    found = values_of(measured, family, solver, ITERATIONS)
+    return {size: round(value) for size, value in found.items()}
+
+
 def shares_of(
     measured: Records, family: str, solver: str, whole: str = UNCUT
 ) -> dict[float, float]:
