@@ -34,7 +34,7 @@ from verify.compare.locate import (
     difference_squares,
     evaluate_linear,
     evaluate_quadratic,
-    squares,
+    value_squares,
 )
 from verify.compare.mass import kinetic
 from verify.compare.overlap import OverlapSearch
@@ -167,7 +167,7 @@ def _comparison() -> None:
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
         bends = np.empty((len(corners), mesh.space, mesh.space, 1 + mesh.space))
         evaluate_quadratic(points, cells, origin, origin, bends, shape.gradients[:, 1:])
-        squares(points)
+        value_squares(points, points)
         still, gradients = np.zeros((1, *mesh.points.shape)), np.zeros((1, mesh.space, mesh.space))
         difference_squares(gradients, gradients)
         solution = Solution(mesh.points, mesh.cells, still, velocity=still)

@@ -1,6 +1,6 @@
 """The body and its cuts as asked, as the comparison sees them in the plane."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from verify.compare.sides import distance_to_cut, distance_to_segments
 from verify.compare.simplex_bodies import MembraneBody, SolidBody, membrane_of, solid_of
+from verify.compare.simplices import kept_with
 from verify.errors import UnsupportedSceneError
 from verify.geometry.curves import Piece, closed_pieces, meeting_parameters
 from verify.geometry.planar import inside_polygon, polygon_area
@@ -122,6 +123,15 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
         If the scene is neither a rectangle, a polygon, a box nor a mesh of triangles or of
         tetrahedra, or a cut is no curve or surface of a known kind.
     """
+    body = _body_of(scene)
+    if singular is None or not isinstance(body, Body):
+        return body
+    found = np.vstack([body.singular, np.asarray(singular, float).reshape(-1, 2)])
+    return replace(body, singular=_distinct(found, body.size))
+
+
+@kept_with
+def _body_of(scene: Scene) -> AnyBody:
     if scene.cell_dimension < scene.dimension:
         return membrane_of(scene)
     if scene.dimension == 3:
@@ -133,15 +143,17 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = cut.pieces()
     parts = [part for name in cuts for part in _inner_parts(name, cuts, loops)]
-    extra = np.zeros((0, 2)) if singular is None else np.asarray(singular, float).reshape(-1, 2)
     size = float(np.linalg.norm(np.ptp(np.concatenate(loops), axis=0)))
     tips, special = _ends(parts, size)
     tips, special = tips[~_on(tips, loops, size)], special[~_on(special, loops, size)]
     # an exact field is smooth up to the outline
     corners = [] if scene.judged_by_exact else [_kinks(loop) for loop in loops]
-    found = np.vstack([special, extra, *corners])
-    distinct = np.unique(places_of(found, 1e-12 * size), return_index=True)[1]
-    return Body(loops, cuts, parts, found[distinct], tips)
+    return Body(loops, cuts, parts, _distinct(np.vstack([special, *corners]), size), tips)
+
+
+def _distinct(points: Array, size: float) -> Array:
+    """Leave out points (k, 2) that are others but for round-off of a body of this size, m."""
+    return points[np.unique(places_of(points, 1e-12 * size), return_index=True)[1]]
 
 
 def _loops(scene: Scene) -> tuple[Array, ...]:

@@ -18,6 +18,7 @@ from verify.compiled import COMPILED, njit
 from verify.geometry.simplices import bounds_of
 
 LEAF = 4  # cells per leaf
+_UP = 3  # levels of the tree: so far above the last leaf a search begins
 _AT_ONCE, _WORTH = 1 << 15, 0.125  # in numpy: points at once; points per cell that are worth a walk
 # Shifts and masks that put one or two zeros between the bits of a number (2D: 31, 3D: 20 bits)
 _SPREAD = {
@@ -228,13 +229,16 @@ def allowed(wish, side):
 
 
 @njit(inline="always")
-def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack):
-    """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
+def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack, root):
+    """Find the cell below a node that holds `x`, on the side of `direction` if several do, or -1.
+
+    Also returned are its depth and the leaf where the search ended.
+    """
     lower, upper, cells, corners, normals, centres = searched
     d = len(axes)
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack[0], top = 1, 1
+    stack[0], top, node = root, 1, root
     best, best_depth, best_side = -1, -np.inf, False
     while top > 0:
         top -= 1
@@ -258,7 +262,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, sta
             if depth < -tolerance or not allowed(wish, sides[cell]):
                 continue
             if depth > tolerance:
-                return cell
+                return cell, depth, node
             on_side = not sided
             if sided:
                 towards = 0.0
@@ -267,7 +271,7 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, sta
                 on_side = towards > 0.0
             if (on_side and not best_side) or (on_side == best_side and depth > best_depth):
                 best, best_depth, best_side = cell, depth, on_side
-    return best
+    return best, best_depth, node
 
 
 @njit(cache=True)
@@ -452,7 +456,7 @@ def _find_cells(
 ):
     _, _, _, corners, normals, _ = searched
     stack, either = np.empty(64, dtype=np.int64), np.zeros(wanted.shape[1], dtype=wanted.dtype)
-    cell = -1
+    cell, leaf = -1, 1
     for i in range(len(points)):
         wish = wanted[i]
         # points follow each other closely: one well inside the cell of the last belongs to it
@@ -463,9 +467,13 @@ def _find_cells(
                 found[i] = cell
                 continue
         for _ in range(2):
-            cell = _containing(
-                points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack
-            )
+            for root in (max(leaf >> _UP, 1), 1):  # first near the cell of the last point
+                cell, depth, leaf = _containing(
+                    points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack,
+                    root,
+                )  # fmt: skip
+                if depth > tolerance:
+                    break
             if cell < 0 and nearest:
                 cell = _nearest(points[i], wish, searched, sides, axes, stack)
             if cell >= 0 or not nearest:

@@ -21,11 +21,11 @@ from verify.compare.body_rule import Rule, rule_of
 from verify.compare.cut_deviation import continued_where
 from verify.compare.cut_rule import CutRule, cut_rule_of, surface_rule
 from verify.compare.hooke import Law
-from verify.compare.locate import Field, SolutionField, squares
+from verify.compare.locate import Field, SolutionField, value_squares
 from verify.compare.motion import ExactMotion, Motion
 from verify.compare.realised import cut_deviation, field_of
 from verify.compare.simplex_bodies import MembraneBody
-from verify.compare.simplices import simplices
+from verify.compare.simplices import cells_of
 from verify.errors import InputError
 from verify.files import whole_file
 from verify.result import CutRecord
@@ -179,7 +179,7 @@ def _of_jumps(found: Array, expected: Array, reference: Field, rule: CutRule) ->
 
 
 def _squares(found: Array, expected: Array) -> Squares:
-    return Squares(squares(found - expected), squares(expected))
+    return Squares(*value_squares(found, expected))
 
 
 # What the largest difference of two or three rules is multiplied with. In space the rules are
@@ -358,11 +358,12 @@ class Rules:
 
         Errors near a tip and far from it are relative to the norm of the reference over the whole
         body: their squares add up to the square of the whole error. All three have the same
-        integrands, which are evaluated once.
+        integrands, which are evaluated once. It goes rule by rule: an exact solution keeps what it
+        found at the points that it was asked last.
         """
         found: dict[str, list[ErrorNorm]] = {name: [] for name in names}
         measures = dict.fromkeys((ERRORS[n].measure, ERRORS[n].place) for n in found)
-        for (measure, place), k in product(measures, which):
+        for k, (measure, place) in product(which, measures):
             rule = self.one(place, k)
             squares = measure(field, reference, rule, law)
             for name in found:
@@ -536,7 +537,7 @@ def nodal_differences(
         0 at nodes that no cell uses.
     """
     points, cells = solution.points, solution.cells
-    shape = simplices(points, cells)
+    shape = cells_of(solution)
     owner = np.full(len(points), -1)
     order = np.argsort(shape.volume, kind="stable")  # of two assignments the last stays
     owner[cells[order].ravel()] = np.repeat(order, cells.shape[1])

@@ -194,6 +194,25 @@ def squares(values: Floats) -> Floats:
     return np.asarray(np.einsum("nk,nk->n", flat, flat))
 
 
+def value_squares(found: Floats, expected: Floats) -> Floats:
+    """Square the difference of values (n, d), and `expected`: (2, n)."""
+    if not COMPILED:
+        return np.stack([squares(found - expected), squares(expected)])
+    rows = np.empty((2, len(found)))
+    _value_squares(np.ascontiguousarray(found), np.ascontiguousarray(expected), rows)
+    return rows
+
+
+@njit(cache=True)
+def _value_squares(found, expected, rows):
+    for i in range(len(found)):
+        off = own = 0.0
+        for a in range(found.shape[1]):
+            off += (found[i, a] - expected[i, a]) ** 2
+            own += expected[i, a] ** 2
+        rows[0, i], rows[1, i] = off, own
+
+
 def difference_squares(found: Floats, expected: Floats) -> Floats:
     """Square the strains of the difference of gradients (n, d, d), and of `expected`: (5, n).
 
@@ -363,9 +382,10 @@ class SolutionField:
 
     def _asked(self, points: Array, near: Array | None) -> tuple[Array, Array, NDArray[np.int8]]:
         """Return points, the ways (n, d) or (0, d) to `near`, and the wanted sides of cuts."""
-        points = np.ascontiguousarray(points, dtype=float)
-        directions = np.zeros((0, points.shape[1])) if near is None else near - points
-        return points, np.ascontiguousarray(directions), self._wanted(points, near)
+        wanted, nowhere = self._wanted(points, near), np.zeros((0, points.shape[1]))
+        directions = nowhere if near is None or near is points else near - points
+        points, directions = (np.ascontiguousarray(a, dtype=float) for a in (points, directions))
+        return points, directions, wanted
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
         """Return the wanted sides (n, 0) of cuts: no cut is known here."""

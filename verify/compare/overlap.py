@@ -22,6 +22,7 @@ from verify.compare.cell_tree import (
     pairs_met,
 )
 from verify.compare.locate import ROUND_OFF, SolutionField
+from verify.compare.mass import shape_functions
 from verify.compare.simplices import Simplices, heights, nodes_of_facets, simplices
 from verify.errors import UnsupportedSceneError
 from verify.geometry.simplices import (
@@ -151,22 +152,6 @@ def _meet(corners: Array, low: Array, high: Array) -> NDArray[np.bool_]:
     return np.asarray((lower <= high).all(axis=1) & (upper >= low).all(axis=1))
 
 
-def is_glued(faces: Faces, solution: Solution, field: SolutionField) -> NDArray[np.bool_]:
-    """Tell whether both sides of facets (f,) move as one: a cut that has not opened yet, or none.
-
-    Parameters
-    ----------
-    field : SolutionField
-        With the nodal displacements that are asked about.
-    """
-    glued = faces.on_cut
-    cut = faces.take(glued)
-    middle = solution.points[cut.nodes].mean(axis=1)
-    here, there = (field.in_cells(middle, cells)[0] for cells in (cut.behind, cut.across))
-    glued[glued] = np.linalg.norm(there - here, axis=1) <= ROUND_OFF * field.scale
-    return glued
-
-
 def _turn(corners: Array) -> Array:
     """Compute the signed volume (m,), up to a factor."""
     return determinants(corners[:, 1:] - corners[:, :1])
@@ -238,14 +223,31 @@ class OverlapSearch:
         self._faces = faces_of(solution, self._field)
         self._size = self._field.scale
         self._volume = _turn(self._field.shape.corners)
+        cut = self._faces.take(self._faces.on_cut)
+        middle = solution.points[cut.nodes].mean(axis=1)
+        self._both = [(solution.cells[c], self._hats(middle, c)) for c in (cut.behind, cut.across)]
+
+    def _hats(self, points: Array, cells: Ints) -> Array:
+        """Compute shape functions (n, k) of the nodes of given cells (n,) at points (n, d)."""
+        shape, solution = self._field.shape, self.solution
+        off = points - shape.corners[cells, 0]
+        place = np.einsum("nka,na->nk", shape.gradients[cells], off)
+        place[:, 0] += 1.0
+        return shape_functions(place, solution.dimension, solution.order)
+
+    def _is_glued(self, u: Array) -> NDArray[np.bool_]:
+        """Tell whether both sides of facets (f,) move as one: a cut not yet open, or none."""
+        glued = self._faces.on_cut
+        here, there = (np.einsum("nk,nkd->nd", hats, u[nodes]) for nodes, hats in self._both)
+        glued[glued] = np.linalg.norm(there - here, axis=1) <= ROUND_OFF * self._size
+        return glued
 
     def at(self, step: int = -1) -> Overlap:
         """Measure the overlap at an output time, by its number."""
         u = self.solution.displacement[step]
         if not np.isfinite(u).all():
             return Overlap()
-        places, faces = self.solution.points + u, self._faces
-        faces = faces.take(~is_glued(faces, self.solution, self._field.with_nodal(u)))
+        places, faces = self.solution.points + u, self._faces.take(~self._is_glued(u))
         corners = self.solution.cells[faces.behind, : self.solution.dimension + 1]
         lost = self._volume[faces.behind] * _turn(places[corners]) <= 0.0
         turned = int(np.sum(lost & faces.on_cut))

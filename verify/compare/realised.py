@@ -20,6 +20,7 @@ the cuts count, or ahead of a tip on both.
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,10 @@ from scipy.spatial import cKDTree
 from verify.compare.body import AnyBody
 from verify.compare.cell_tree import holding_cells
 from verify.compare.cut_deviation import RealisedCut
-from verify.compare.locate import ROUND_OFF, SolutionField
+from verify.compare.locate import ROUND_OFF, SolutionField, squares
 from verify.compare.sides import AskedCut, asked_sides, distance_to_cut
 from verify.compare.simplex_bodies import MembraneBody
-from verify.compare.simplices import Simplices
+from verify.compare.simplices import Simplices, kept_with
 from verify.geometry.simplices import unit_normals
 from verify.solution import Solution
 
@@ -282,6 +283,12 @@ def cut_deviation(solution: Solution, body: AnyBody) -> float:
     return float(beside.max(initial=0.0))
 
 
+@kept_with
+def _known_sides(solution: Solution) -> dict[tuple[int, float], tuple[Any, float, Sides]]:
+    """Keep the reach and the sides of cells, with the cuts that they belong to, by deviation."""
+    return {}
+
+
 class SidedField(SolutionField):
     """A solution's field, asked on the sides of the cuts as asked.
 
@@ -310,9 +317,12 @@ class SidedField(SolutionField):
         super().__init__(solution, step)
         self._cut = cut
         self._cuts, self._size = list(body.cuts.values()), body.size
-        same = ROUND_OFF * body.size
-        self._reach = 2.0 * max(cut_deviation(solution, body), deviation, same)
-        self._sides = sides_of_cells(solution, self.shape, self._cuts, self._reach, same)
+        same, known = ROUND_OFF * body.size, _known_sides(solution)
+        if (key := (id(body.cuts), deviation)) not in known:
+            reach = 2.0 * max(cut_deviation(solution, body), deviation, same)
+            sides = sides_of_cells(solution, self.shape, self._cuts, reach, same)
+            known[key] = body.cuts, reach, sides
+        _, self._reach, self._sides = known[key]
 
     def inner_points(self, cells: NDArray[np.int64]) -> Array:
         """Find points (n, d) on the sides of the cuts as asked on which given cells (n,) lie.
@@ -338,9 +348,9 @@ class SidedField(SolutionField):
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
         """Find sides (n, c) of the cuts as asked on which `near` lies, of points close to these."""
         side = points if near is None else np.asarray(near, dtype=float)
-        reach = np.full(len(points), self._reach)
+        reach = np.broadcast_to(self._reach, len(points))
         if side is not points:
-            reach += np.linalg.norm(side - points, axis=1)
+            reach = reach + np.sqrt(squares(side - points))
         wanted = asked_sides(self._cuts, side, reach, self._size)
         if self._cut is not None:
             rows = np.flatnonzero(wanted.any(axis=1))

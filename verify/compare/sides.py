@@ -18,6 +18,7 @@ AskedCut = Sequence[Piece | Patch]
 
 
 _Floats = NDArray[np.float64]
+_FEW = 32  # segments: each point is sooner held against all of them than asked whether it is near
 
 
 def distance_to_segments(points: _Floats, segments: _Floats, within: float) -> _Floats:
@@ -25,6 +26,8 @@ def distance_to_segments(points: _Floats, segments: _Floats, within: float) -> _
 
     Of points farther than `within` m it may be infinite: most are far from all, and left out.
     """
+    if 0 < len(segments) <= _FEW:
+        return nearest_segments(points, segments)[0]
     distance = np.full(len(points), np.inf)
     if len(segments):
         longest = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max()
@@ -105,12 +108,14 @@ def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, Array, NDAr
 
 
 def _sides_of(pieces: AskedCut, points: Array, reach: Array, size: float) -> Sides:
-    levels = np.array([piece.level(points) for piece in pieces])
-    # no foot is nearer than its level
-    rows = np.flatnonzero((np.abs(levels) <= reach).any(axis=0))
-    points, reach, sides = points[rows], reach[rows], np.zeros(len(points), dtype=np.int8)
+    near = np.zeros(len(points), dtype=bool)  # no foot is nearer than its level
+    for piece in pieces:
+        near |= np.abs(piece.level(points)) <= reach
+    rows, sides = np.flatnonzero(near), np.zeros(len(points), dtype=np.int8)
+    points, reach = points[rows], reach[rows]
     found, nearest = [], np.full(len(rows), np.inf)
-    for piece, level in zip(pieces, levels[:, rows], strict=True):
+    for piece in pieces:
+        level = piece.level(points)
         at = np.flatnonzero(np.abs(level) <= reach)
         away = np.linalg.norm(points[at] - piece.foot(points[at]), axis=1)
         found.append((at, level[at], away))

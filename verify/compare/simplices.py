@@ -92,16 +92,16 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
     return Simplices(corners, volume, gradients, normals, degenerate)
 
 
-def kept_with[T](make: Callable[[Solution], T]) -> Callable[[Solution], T]:
-    """Let a function remember what it made of a solution as long as that lives."""
+def kept_with[Given, T](make: Callable[[Given], T]) -> Callable[[Given], T]:
+    """Let a function remember what it made of a solution or scene as long as that lives."""
     made: dict[int, T] = {}
 
     @wraps(make)
-    def remembered(solution: Solution) -> T:
-        key = id(solution)
+    def remembered(given: Given) -> T:
+        key = id(given)
         if key not in made:
-            made[key] = make(solution)
-            finalize(solution, made.pop, key)
+            made[key] = make(given)
+            finalize(given, made.pop, key)
         return made[key]
 
     return remembered

@@ -55,8 +55,7 @@ class Segment:
     def level(self, points: Array) -> Array:
         """Distance (n,) from the whole line, m, positive on the left."""
         x, y = (self.end - self.start) / self.length
-        off = points - self.start
-        return np.asarray(x * off[:, 1] - y * off[:, 0])
+        return np.asarray(x * (points[:, 1] - self.start[1]) - y * (points[:, 0] - self.start[0]))
 
     def rotated(self, turn: Array) -> "Segment":
         """Rotate by the matrix `turn` (2, 2)."""

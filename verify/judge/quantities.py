@@ -19,7 +19,7 @@ from verify.compare.locate import Field
 from verify.compare.motion import SolutionMotion, step_at
 from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplex_bodies import MembraneBody
-from verify.compare.simplices import cells_of, points_in, simplices
+from verify.compare.simplices import cells_of, points_in
 from verify.judge.resultants import WeakForm, mean_stress, reaction, section
 from verify.judge.stress_intensity import Found, solution_intensity
 from verify.scene import Scene
@@ -93,10 +93,10 @@ class Measured:
         """
         if isinstance(self.body, MembraneBody):  # how far it is off its surface is known otherwise
             return 0.0
-        cells = self.solution.cells
-        shape = simplices(self.solution.points, cells[:: 1 + len(cells) // _LOOKED_AT])
-        inside = self.body.inside(shape.corners.mean(axis=1))
-        return float(shape.volume[~inside].sum() / shape.volume.sum())
+        shape = cells_of(self.solution)
+        some = slice(None, None, 1 + len(shape.volume) // _LOOKED_AT)
+        inside, volume = self.body.inside(shape.corners[some].mean(axis=1)), shape.volume[some]
+        return float(volume[~inside].sum() / volume.sum())
 
     def quantity(self, asked: Quantity) -> float:
         """Value of a quantity of interest, in the unit that `unit_of` gives.

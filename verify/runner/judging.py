@@ -117,7 +117,7 @@ class _Measurements:
         """Keep a solve that was measured."""
         self._folder.mkdir(exist_ok=True)
         kept = plain({"key": self._key, "record": asdict(record)})
-        write_plain(kept, self._file(record), indent=None)
+        write_plain(kept, self._file(record))
 
     def _file(self, record: SolveRecord) -> Path:
         return self._folder / f"{folder_name(record.solver)}-{record.level}.json"
