@@ -119,6 +119,7 @@ def _is_of(error: OSError, partial: Path) -> bool:
 _DEEPEST = 60  # levels of nesting; none of our files has more than a dozen
 _TOO_DEEP = f"not a JSON file of ours (nested too deep; expected at most {_DEEPEST} levels)"
 _LONGEST = 40  # digits of a whole number
+_ENCODER = json.JSONEncoder(allow_nan=False)
 
 
 def write_json(content: Any, path: Path) -> None:
@@ -141,10 +142,10 @@ def _lines(content: Any, margin: str = "") -> str:
     """Write JSON; json's own indentation takes ten times as long."""
     entries = content.values() if isinstance(content, dict) else content
     if not isinstance(content, dict | list) or not any(isinstance(e, dict | list) for e in entries):
-        return json.dumps(content, allow_nan=False)
+        return _ENCODER.encode(content)
     inner = margin + " "
     if isinstance(content, dict):
-        rows = [f"{json.dumps(key)}: {_lines(entry, inner)}" for key, entry in content.items()]
+        rows = [f"{_ENCODER.encode(key)}: {_lines(entry, inner)}" for key, entry in content.items()]
     else:
         rows = [_lines(entry, inner) for entry in content]
     first, last = "{}" if isinstance(content, dict) else "[]"

@@ -18,6 +18,7 @@ PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 FORKED = multiprocessing.get_context("forkserver")
 _LAUNCHER = "launcher"  # instead of a number: started by something that the runner started
 _PR_SET_PDEATHSIG = 1
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 
 
 def start_server() -> None:
@@ -47,6 +48,17 @@ def die_with_parent(by: signal.Signals = signal.SIGKILL) -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, by, 0, 0, 0)
     if parent != _LAUNCHER and os.getppid() != int(parent):  # it died before we asked
         os.kill(os.getpid(), by)
+
+
+def keep_memory() -> None:
+    """Have the allocator keep what is freed: taking pages anew costs more than to hold them.
+
+    Arrays of megabytes come and go; each would be given back to the system (glibc, `mallopt`).
+    """
+    with contextlib.suppress(AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_M_TRIM_THRESHOLD, 2**31 - 1)
+        mallopt(_M_MMAP_THRESHOLD, 2**25)
 
 
 def under_a_launcher() -> None:

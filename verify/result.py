@@ -873,7 +873,7 @@ def checked[Kind](kind: type[Kind], content: Any, what: str, where: str) -> Kind
 
     make: Any = kind
     try:
-        made: Kind = _adapter(make).validate_python(content)
+        made: Kind = adapter_of(make).validate_python(content)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -883,7 +883,8 @@ def checked[Kind](kind: type[Kind], content: Any, what: str, where: str) -> Kind
 
 
 @cache
-def _adapter(kind: Any) -> Any:
+def adapter_of(kind: Any) -> Any:
+    """Make what checks records of a kind, once: that takes longer than checking many."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)

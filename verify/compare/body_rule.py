@@ -26,7 +26,15 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.cell_tree import morton_order
 from verify.compare.locate import Field, squares
 from verify.compare.simplex_bodies import SimplexBody
-from verify.compare.simplices import KUHN, bisect, heights, in_frames, points_in, split_at_level
+from verify.compare.simplices import (
+    KUHN,
+    bisect,
+    heights,
+    in_frames,
+    kept_with,
+    points_in,
+    split_at_level,
+)
 from verify.compiled import njit
 from verify.geometry.curves import Arc, Piece, Segment
 from verify.geometry.patches import Patch
@@ -121,6 +129,7 @@ def area_rule(
     return Rule(points @ turn, weights)
 
 
+@kept_with
 def slab_angles(body: Body) -> tuple[float, float, float]:
     """Choose three slab directions, rad in [0, π), the best first.
 

@@ -120,13 +120,14 @@ def _morton(centres: NDArray[np.float64], in_cubes: bool = False) -> NDArray[np.
     bits = 31 if d == 2 else 20
     if not len(centres):
         return np.zeros(0, dtype=np.int64)
-    extent = np.maximum(np.ptp(centres, axis=0), 1e-300)
+    columns = np.ascontiguousarray(centres.T)
+    low = columns.min(axis=1)
+    extent = np.maximum(columns.max(axis=1) - low, 1e-300)
     if in_cubes:
         extent[:] = extent.max()
-    whole = ((centres - centres.min(axis=0)) / extent * (2**bits - 1)).astype(np.int64)
     code = np.zeros(len(centres), dtype=np.int64)
-    for axis in range(d):
-        spread = np.ascontiguousarray(whole[:, axis])
+    for axis, column in enumerate(columns):
+        spread = ((column - low[axis]) / extent[axis] * (2**bits - 1)).astype(np.int64)
         for shift, mask in _SPREAD[d]:
             spread = (spread | (spread << shift)) & mask
         code |= spread << axis

@@ -351,7 +351,7 @@ def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]
     In linear cells they are uniform. A cell without volume has none: zero.
     """
     centres = field.shape.corners.mean(axis=1)
-    gradient = field.in_cells(centres, np.arange(len(centres)))[1]
+    gradient = field.cell_gradients(centres)
     membrane = scene.cell_dimension < scene.dimension
     frames = triangle_frames(field.shape.corners) if membrane else None
     if frames is not None:
@@ -446,13 +446,13 @@ def _integrated(
     """Integrate over each cell a density of points and of gradients of fields there."""
     solution, shape = field.solution, field.shape
     order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
-    every, found = np.arange(len(solution.cells)), np.zeros(len(solution.cells))
+    found = np.zeros(len(solution.cells))
     membrane = solution.cell_dimension < solution.dimension
     frames = triangle_frames(shape.corners) if membrane else None
     for points, measure in _points_of_cells(field, order):
 
         def gradient(of: SolutionField, points: Array = points) -> Array:
-            value = of.in_cells(points, every)[1]
+            value = of.cell_gradients(points)
             return value if frames is None else in_frames(value, frames)
 
         found += measure * density(points, gradient)

@@ -404,6 +404,12 @@ class SolutionField:
         slopes = self.shape.gradients[:, 1:]
         return evaluate_quadratic(points, cells, self._origin, self._first, self._slope, slopes)
 
+    def cell_gradients(self, points: Array) -> Array:
+        """Evaluate the gradient (m, d, d) in each cell, at a point (m, d) in it."""
+        if self.solution.order == 1:
+            return self._slope
+        return self.in_cells(points, np.arange(len(points)))[1]
+
     def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
         """Compute the displacement (n, d) and gradient (n, d, d) at `points` (n, d)."""
         return self.in_cells(points, self.cells_at(points, near))

@@ -345,10 +345,15 @@ def first_exits(
     bases = np.concatenate([facets[:, 1:] - facets[:, :1], normals[:, None]], axis=1)
 
     def on_ray(row: Ints, low: Array, high: Array, box: Ints) -> NDArray[np.bool_]:
+        first, last = np.zeros(len(row)), np.full(len(row), np.inf)
         with np.errstate(over="ignore"):
-            ends = [(end[box] - points[row]) / slopes[row] for end in (low, high)]
-            first = np.minimum(*ends).max(axis=1, initial=0.0)
-            last = np.maximum(*ends).min(axis=1)
+            for a in range(points.shape[1]):
+                x, slope = points[row, a], slopes[row, a]
+                ends = (low[box, a] - x) / slope, (high[box, a] - x) / slope
+                first, last = (
+                    np.maximum(first, np.minimum(*ends)),
+                    np.minimum(last, np.maximum(*ends)),
+                )
             return np.asarray(first <= last + 1e-9 * (first + np.abs(last)))
 
     for row, facet in pairs_met(tree, facets, np.arange(len(points)), on_ray):

@@ -93,7 +93,7 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
 
 
 def kept_with[Given, T](make: Callable[[Given], T]) -> Callable[[Given], T]:
-    """Let a function remember what it made of a solution or scene as long as that lives."""
+    """Let a function remember what it made of a solution, scene or body as long as that lives."""
     made: dict[int, T] = {}
 
     @wraps(make)

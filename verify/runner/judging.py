@@ -24,7 +24,7 @@ from verify.judge.models import adequacy_notice
 from verify.judge.openings import with_openings
 from verify.judge.verdict import with_verdicts
 from verify.printable import words_of
-from verify.processes import die_with_parent
+from verify.processes import die_with_parent, keep_memory
 from verify.result import (
     REFERENCE,
     CaseResult,
@@ -58,6 +58,7 @@ def main(question_file: Path) -> None:
     from reference.exact import exact_of
 
     die_with_parent()
+    keep_memory()
     question, folder = read_json(question_file), question_file.parent
     root = Path(question["root"])
     scene = restore_scene(read_json(folder / "scene.json"))

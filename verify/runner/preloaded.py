@@ -57,6 +57,9 @@ def _load() -> None:
     for name in _IF_THERE:
         with contextlib.suppress(ImportError):
             import_module(name)
+    from verify.result import SolveRecord, adapter_of
+
+    adapter_of(SolveRecord)
     if find_spec("numba") is not None:
         _load_kernels()
     gc.freeze()  # what all share is not touched by their collections
