@@ -178,6 +178,8 @@ def _comparison() -> None:
         distance_to_segments(points, np.stack([points, points], axis=1), 1.0)
     nowhere = np.zeros((0, 2))
     area_rule(Body((np.eye(3, 2),), {}, [], nowhere, nowhere), 1.0)
+    across = np.zeros((1, 3, 2))
+    Corotated(1.0, 1.0).error_density(across, across)
     sheet = _flat_membrane()
     still = np.zeros((1, *sheet.points.shape))
     SolutionField(Solution(sheet.points, sheet.cells, still)).cells_at(sheet.points)

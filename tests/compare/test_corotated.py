@@ -103,8 +103,10 @@ def test_the_norm_of_an_error_does_not_change_when_both_fields_are_turned(d):
     assert turned == pytest.approx(still, rel=1e-12)
 
 
-def test_a_reference_that_is_kept_is_measured_by_the_law_that_is_asked_for():
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_reference_that_is_kept_is_measured_by_the_law_that_is_asked_for(compiled, monkeypatch):
     """What one law finds of gradients that several solvers are held against is not another's."""
+    monkeypatch.setattr(laws, "COMPILED", compiled)
     found, expected = 0.3 * np.random.default_rng(3).standard_normal((2, 50, 3, 3))
     for law in (Corotated(2.0, 1.0), NeoHookean(2.0, 1.0), NeoHookean(2.0, 1.0, stable=True)):
         for _ in range(2):

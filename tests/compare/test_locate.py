@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
-from verify.compare import cell_tree, locate, sides
+from verify.compare import cell_tree, locate, sides, simplices
 from verify.compare.locate import SolutionField
 
 RNG = np.random.default_rng(1)
@@ -11,7 +11,7 @@ RNG = np.random.default_rng(1)
 @pytest.fixture(autouse=True, params=[True, False], ids=["kernels", "numpy"])
 def compiled(request, monkeypatch):
     """Try both forms of the search: the compiled one, and that of an environment without numba."""
-    for module in (cell_tree, locate, sides):
+    for module in (cell_tree, locate, sides, simplices):
         monkeypatch.setattr(module, "COMPILED", request.param)
 
 

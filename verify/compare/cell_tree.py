@@ -469,11 +469,13 @@ def _find_cells(
                 continue
         for _ in range(2):
             for root in (max(leaf >> _UP, 1), 1):  # first near the cell of the last point
-                cell, depth, leaf = _containing(
+                cell, depth, node = _containing(
                     points[i], directions[i], sided, wish, searched, sides, tolerance, axes, stack,
                     root,
                 )  # fmt: skip
                 if depth > tolerance:
+                    leaf = node
+                if depth > tolerance or root == 1:
                     break
             if cell < 0 and nearest:
                 cell = _nearest(points[i], wish, searched, sides, axes, stack)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body_rule import Rule
+from verify.compare.cell_tree import axes_of
 from verify.compare.locate import Field, SolutionField, difference_squares, squares
 from verify.compare.mass import separated_parts
 from verify.compare.simplices import in_frames, simplex_rule, triangle_frames
@@ -126,7 +127,12 @@ class Corotated(Hooke):
         return self._turned_back(difference, _rotations(expected))
 
     def _turned_back(self, difference: Array, turn: Array) -> Array:
-        return Hooke.energy_density(self, np.swapaxes(turn, 1, 2) @ difference)
+        if not COMPILED:
+            return Hooke.energy_density(self, np.swapaxes(turn, 1, 2) @ difference)
+        rows, (d, k) = np.empty((2, len(turn))), turn.shape[1:]
+        turn, difference = np.ascontiguousarray(turn), np.ascontiguousarray(difference)
+        _turned_squares(turn, difference, axes_of(d), axes_of(k), rows)
+        return np.asarray(0.5 * self.lame * rows[0] + self.shear * rows[1])
 
 
 @dataclass(frozen=True)
@@ -343,6 +349,22 @@ def _polar(F, turned, rest):
             if largest <= _SETTLED:
                 rest[n] = False
                 break
+
+
+@njit(cache=True)
+def _turned_squares(turn, difference, axes, along, rows):
+    """Find tr² ε and ε : ε of ε = sym RᵀG of rotations R and gradients G (n, d, k)."""
+    for n in range(len(turn)):
+        trace = square = 0.0
+        for i in along:
+            for j in range(i + 1):
+                one = other = 0.0
+                for a in axes:
+                    one += turn[n, a, i] * difference[n, a, j]
+                    other += turn[n, a, j] * difference[n, a, i]
+                square += one**2 if i == j else 0.5 * (one + other) ** 2
+                trace += one if i == j else 0.0
+        rows[0, n], rows[1, n] = trace**2, square
 
 
 def strain_and_stress(field: SolutionField, scene: Scene) -> tuple[Array, Array]:

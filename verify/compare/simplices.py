@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
+from verify.compiled import COMPILED, njit
 from verify.errors import InputError
 from verify.geometry.simplices import bounds_of, determinants, halves, measures, split_at_zeros
 from verify.solution import Solution
@@ -24,6 +25,7 @@ from verify.solution import Solution
 Array = NDArray[np.float64]
 
 
+_ROUND_OFF = 4 * float(np.finfo(float).eps)
 _CORNERS = {3: 3, 6: 3, 4: 4, 10: 4}  # by the nodes of a cell
 # corners at the ends of each mid-edge node, in VTK's order; by the dimension of the cells
 EDGES = {
@@ -66,6 +68,11 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
     """Compute the geometry of the simplices with corners ``points[cells[:, :k + 1]]``."""
     count = _CORNERS[cells.shape[1]]
     corners = points[cells[:, :count]]
+    if COMPILED and count > points.shape[1]:
+        empty = np.empty(len(corners)), np.empty(corners.shape), np.empty(corners.shape)
+        geometry = *empty, np.empty(len(corners), dtype=bool)
+        _simplices(corners, tuple(range(count - 1)), _ROUND_OFF, *geometry)
+        return Simplices(corners, *geometry)
     across = triangle_frames(corners)[:, 2] if count == points.shape[1] == 3 else None
     areas = np.empty_like(corners)  # facet normals times k! volume, all over one determinant
     for i in range(count):
@@ -83,13 +90,49 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
     with np.errstate(divide="ignore", invalid="ignore"):
         height = determinant / sizes[rows, largest]
         low, high = bounds_of(corners)
-        resolved = 4 * np.finfo(float).eps * reduce(np.maximum, np.maximum(-low, high).T)
+        resolved = _ROUND_OFF * reduce(np.maximum, np.maximum(-low, high).T)
         degenerate = ~(height > resolved)
         gradients = areas / determinant[:, None, None]
         normals = areas / sizes[..., None]
     gradients[degenerate], normals[degenerate] = 0.0, 0.0
     volume = np.maximum(determinant, 0.0) / factorial(count - 1)
     return Simplices(corners, volume, gradients, normals, degenerate)
+
+
+@njit(cache=True, error_model="numpy")
+def _simplices(corners, axes, round_off, volume, gradients, normals, degenerate):
+    d, parts = len(axes), 2.0 if len(axes) == 2 else 6.0
+    areas, sizes = np.empty((d + 1, d)), np.empty(d + 1)
+    for m in range(len(corners)):
+        x, largest, reach = corners[m], 0, 0.0
+        for i in range(d + 1):
+            p, q, r = 1 if i == 0 else 0, 2 if i < 2 else 1, 3 if i < 3 else 2
+            inward = size = 0.0
+            for a in axes:
+                b, c = (a + 1) % d, (a + 2) % d
+                if d == 2:
+                    areas[i, a] = (x[q, b] - x[p, b]) * (2.0 * a - 1.0)
+                else:
+                    areas[i, a] = (x[q, b] - x[p, b]) * (x[r, c] - x[q, c])
+                    areas[i, a] -= (x[q, c] - x[p, c]) * (x[r, b] - x[q, b])
+                inward += areas[i, a] * (x[i, a] - x[p, a])
+                size += areas[i, a] ** 2
+                reach = max(reach, abs(x[i, a]))
+            sizes[i] = np.sqrt(size)
+            if inward < 0.0:
+                areas[i] *= -1.0
+            if sizes[i] > sizes[largest]:
+                largest = i
+        determinant = 0.0
+        for a in axes:
+            height = x[largest, a] - x[(largest + 1) % (d + 1), a]
+            determinant += areas[largest, a] * height
+        degenerate[m] = not determinant / sizes[largest] > round_off * reach
+        volume[m] = max(determinant, 0.0) / parts
+        for i in range(d + 1):
+            for a in axes:
+                gradients[m, i, a] = 0.0 if degenerate[m] else areas[i, a] / determinant
+                normals[m, i, a] = 0.0 if degenerate[m] else areas[i, a] / sizes[i]
 
 
 def kept_with[Given, T](make: Callable[[Given], T]) -> Callable[[Given], T]:
