@@ -12,7 +12,7 @@ import pytest
 import verify
 from verify import provenance as module
 from verify.errors import InputError
-from verify.files import asked_place, whole_file, write_whole
+from verify.files import asked_place, whole_file, write_json, write_plain, write_whole
 from verify.provenance import provenance, versions
 from verify.result import (
     CaseResult,
@@ -43,6 +43,16 @@ def judged(*verdicts):
     rates = [Rate("xfem", "energy_norm", None, 0.0, "too few levels: 1", [])]
     return CaseResult("statics/a", "A", "It shall hold.", "00", {"title": "A"},
                       ReferenceRecord("exact"), solves, rates, records)  # fmt: skip
+
+
+def test_files_are_json_with_each_row_of_numbers_on_a_line(tmp_path):
+    content = {"a": [[0.1, -2e-300], [], {}], "ε": {"b": True, "c": None}, "d": "\n", "e": [1, "x"]}
+    write_json(content, tmp_path / "some.json")
+    lines = (tmp_path / "some.json").read_text().splitlines()
+    assert json.loads("\n".join(lines)) == content
+    assert lines[2:5] == ["  [0.1, -2e-300],", "  [],", "  {}"]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_plain([[float("nan")]], tmp_path / "nan.json")
 
 
 def test_a_result_is_read_as_it_was_written(tmp_path):

@@ -51,9 +51,10 @@ def die_with_parent(by: signal.Signals = signal.SIGKILL) -> None:
 
 
 def keep_memory() -> None:
-    """Have the allocator keep what is freed: taking pages anew costs more than to hold them.
+    """Have the allocator of glibc keep what is freed for the arrays that come next.
 
-    Arrays of megabytes come and go; each would be given back to the system (glibc, `mallopt`).
+    Arrays of megabytes come and go. To give their pages back and take them anew is some 5 % of the
+    time of a comparison.
     """
     with contextlib.suppress(AttributeError):
         mallopt = ctypes.CDLL(None).mallopt

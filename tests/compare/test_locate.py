@@ -41,11 +41,13 @@ def test_a_quadratic_field_on_quadratic_cells_is_reproduced_everywhere(mesh):
     assert np.abs(np.einsum("nci,ni->nc", gradient - expected, along)).max() < 1e-11
 
 
-@pytest.mark.parametrize("mesh", [grid(7, 5), cube()], ids=["2D", "3D"])
+@pytest.mark.parametrize("mesh", [grid(7, 5), grid(29, 22), cube()], ids=["2D", "finer", "3D"])
 def test_the_cell_found_is_the_one_that_brute_force_finds(mesh):
+    """Of points here and there, and of points that follow each other from cell to cell."""
     points, cells = mesh
     field = SolutionField(solution(points, cells, np.zeros_like(points)))
     x = RNG.random((300, points.shape[1]))
+    x = np.concatenate([x, np.linspace(x[-2], x[-1], 300)[1:-1]])
     corners = points[cells]
     edges = corners[:, 1:] - corners[:, :1]
     weights = np.einsum("nmi,mij->nmj", x[:, None] - corners[None, :, 0], np.linalg.inv(edges))

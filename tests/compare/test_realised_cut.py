@@ -55,6 +55,22 @@ def test_a_faceted_arc_is_read_on_the_sides_of_the_arc_as_asked():
     assert np.array_equal(jump, np.tile([1.0, 0.0], (len(jump), 1)))
 
 
+def test_one_solution_is_read_on_the_sides_of_each_cut_that_it_is_asked_on():
+    result = faceted_disc(16)
+    for radius in (0.3, 0.29, 0.3):
+        body = body_of(scene([{**CIRCLE, "radius": radius}]))
+        points = area_rule(body, 0.03).points
+        inside = np.linalg.norm(points - 0.5, axis=1) < radius
+        assert np.array_equal(field_of(result, body).displacement(points)[:, 0], inside)
+
+
+def test_singular_points_that_are_added_belong_to_one_body_alone():
+    asked, point = scene([CIRCLE]), np.array([[0.21, 0.87]])
+    known = body_of(asked).singular
+    assert len(body_of(asked, np.vstack([point, point + 1e-14])).singular) == len(known) + 1
+    assert np.array_equal(body_of(asked).singular, known)
+
+
 def test_no_cut_is_made_where_the_solver_made_none():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     cells = np.array([[0, 1, 2], [0, 2, 3]])

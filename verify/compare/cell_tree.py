@@ -233,7 +233,7 @@ def allowed(wish, side):
 def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack, root):
     """Find the cell below a node that holds `x`, on the side of `direction` if several do, or -1.
 
-    Also returned are its depth and the leaf where the search ended.
+    Also returned are its depth and the node where the search ended.
     """
     lower, upper, cells, corners, normals, centres = searched
     d = len(axes)

@@ -18,7 +18,7 @@ AskedCut = Sequence[Piece | Patch]
 
 
 _Floats = NDArray[np.float64]
-_FEW = 32  # segments: each point is sooner held against all of them than asked whether it is near
+_FEW = 8  # segments: each point is sooner held against all of them than asked whether it is near
 
 
 def distance_to_segments(points: _Floats, segments: _Floats, within: float) -> _Floats:
