@@ -263,6 +263,24 @@ def test_a_motion_that_is_pressed_and_turned_begins_in_its_equilibrium(name):
     assert np.abs(force / (0.8 * pressure) - 1.0).max() < (0.1 if name == "xfem" else 1e-6)
 
 
+def test_the_pressure_of_tissue_in_two_principal_directions_is_that_of_each_cut():
+    """Two cuts that cross along the principal axes, each under a pressure of its own."""
+    turn = turn_of(27.0)
+    stress = -P * turn @ np.diag([1.0, 2.5]) @ turn.T
+    shear, lame = 1.0 / 2.6, 0.3 / (1.3 * 0.4)
+    matrix = (stress - lame * np.trace(stress) / (2 * lame + 2 * shear) * np.eye(2)) / (2 * shear)
+    ends = np.array([[-1.0, 1.0]]).T
+    lines = [(0.47, 0.52) + ends * axis for axis in turn.T]
+    cuts = [{"kind": "polyline", "name": f"cut {k}", "points": line.tolist()}
+            for k, line in enumerate(lines)]  # fmt: skip
+    exact = {"solution": "linear", "parameters": {"matrix": matrix.tolist()}}
+    found = find_solver("xfem").solve(body(2, cuts, exact), 0).contact
+    on_first = np.abs((found.points - (0.47, 0.52)) @ turn[:, 1]) < 1e-9
+    assert 0.3 < np.mean(on_first) < 0.7
+    truth = P * np.where(on_first, 2.5, 1.0)
+    assert np.abs(found.pressure[0] / truth - 1.0).max() < 1e-9
+
+
 @pytest.mark.parametrize("name", ["conforming", "xfem"])
 def test_a_motion_that_is_damped_ends_in_the_equilibrium(name):
     """A block turned by 70° and pressed aslant: its cut is shut over a part of its length."""

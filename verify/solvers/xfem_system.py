@@ -122,7 +122,8 @@ def faces_of(
 def contact_of(faces: ClosingFaces, pressures: Iterable[_Floats]) -> ContactPressure:
     """Return the pressure between faces from pressures (f, q), one per output time."""
     points = faces.points.reshape(-1, faces.points.shape[2])
-    return ContactPressure(points, faces.weights.ravel(), np.array([p.ravel() for p in pressures]))
+    averaged = np.array([faces.averaged(one).ravel() for one in pressures])
+    return ContactPressure(points, faces.weights.ravel(), averaged)
 
 
 def system_of(
