@@ -363,7 +363,7 @@ class MovingBody:
             material, self.space, self.held, prescribed, load, energy, closed=closed
         )
         if found.contact is not None:
-            self.pressure_before = self.pressure = found.contact.pressure[0]
+            self.pressures = 3 * [found.contact.pressure[0]]
         return found.displacement.ravel()
 
     @property

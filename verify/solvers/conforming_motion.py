@@ -33,6 +33,7 @@ from verify.solvers.runs import (
     Record,
     march,
     notes_of_steps,
+    pressure_at_end,
     timeline_of,
     work_of_blades,
 )
@@ -396,18 +397,9 @@ class TiedMotion:
 
     @property
     def _pressure(self) -> Array:
-        """Pressure of contact (m,) at the time of the state, Pa.
-
-        The one of a step is of the time at which it balances forces, α_f before its end. Undamped,
-        pressures alternate from step to step about their mean. From three of them.
-        """
-        known = np.array(self.body.pressures)
-        last, second, third = known
-        late = 0.25 + 0.5 * (0.5 if self.averaged else self.scheme.alpha_f)
-        whole = 0.5 * (last + second) + late * (last - third)
-        count = np.isfinite(known).sum(axis=0)  # of steps, on faces just freed fewer: their mean
-        mean = np.nansum(known, axis=0) / np.maximum(count, 1)
-        return np.maximum(np.where(count == 3, whole, mean), 0.0)
+        """Pressure of contact (m,) at the time of the state, Pa."""
+        lag = 0.5 if self.averaged else self.scheme.alpha_f
+        return pressure_at_end(self.body.pressures, lag)
 
     def _over_time(self, name: str) -> Array:
         """Return a field (t, n, d) at the outputs."""

@@ -20,6 +20,7 @@ from verify.solvers.runs import (
     Record,
     march,
     notes_of_steps,
+    pressure_at_end,
     timeline_of,
     work_of_blades,
 )
@@ -209,6 +210,7 @@ class _Output(NamedTuple):
     phantom: PhantomMesh
     state: MotionState
     acceleration: _Floats | None
+    ends: list[_Floats]  # displacements at the ends of the last three steps, where faces may touch
 
 
 @dataclass(eq=False)
@@ -255,6 +257,7 @@ class CutMotion:
         with record.timed("initial state"):
             state = initial_state(scene, body, self.exact)
         self._take(body, state)
+        self._ends = [] if body.contact is None else 3 * [state.displacement.copy()]
 
     def run(self, trial: bool) -> tuple[PhantomMesh, dict[str, Any]]:
         """March, and carry the fields of all outputs to the finally cut mesh.
@@ -314,6 +317,8 @@ class CutMotion:
                 self._spread = max(self._spread, *(one.spread for one in tie.releases))
         self._leave()
         self._ledger.open(self.body, self.state, further, state)
+        source = self.opening.source(old, new)
+        self._ends = [old.extend(one)[source] for one in self._ends]
         self._take(further, state)
         return True
 
@@ -331,7 +336,8 @@ class CutMotion:
         body = self.body
         linear = self.scene.analysis.kinematics == "linear"
         acceleration = acceleration_of(body, self.state) if linear else None
-        self._outputs.append(_Output(body.force.phantom, self.state.copy(), acceleration))
+        output = _Output(body.force.phantom, self.state.copy(), acceleration, self._ends)
+        self._outputs.append(output)
         taken = work_of_blades(self.opening.openings.asked, self._by_cut)
         self._instants.append((self._taken, taken))
 
@@ -343,6 +349,8 @@ class CutMotion:
         before = self.state.displacement.copy() if tie is not None else self.state.displacement
         with self.record.timed("steps"):
             forces = self._integrators[size].step(self.state)
+            if self.body.contact is not None:
+                self._ends = [self.state.displacement.copy(), *self._ends[:2]]
         with self.record.timed("accounting"):
             self._recorder.record(self.state, forces)
             if isinstance(tie, TieForces):
@@ -417,12 +425,17 @@ class CutMotion:
 
         displacement = carried("displacement")
         assert displacement is not None  # every state has one
-        faces = faces_of(self.scene, phantom.corners, moving=True)
+        faces, contact = faces_of(self.scene, phantom.corners, moving=True), None
+        if faces is not None:
+            lag = 0.0 if self.integration.scheme == "implicit_euler" else 0.5
+            ends = ([o.phantom.extend(u)[sources[id(o.phantom)]] for u in o.ends] for o in outputs)
+            contact = contact_of(
+                faces,
+                (pressure_at_end([faces.freed_pressure(u) for u in three], lag) for three in ends),
+            )
         return {
             "times": self.timeline.outputs[: len(outputs)],
-            "contact": None
-            if faces is None
-            else contact_of(faces, [*map(faces.pressure, displacement)]),
+            "contact": contact,
             "displacement": displacement,
             "velocity": carried("velocity"),
             "acceleration": carried("acceleration"),

@@ -287,6 +287,26 @@ _OF_SOME = ("cut_work", "projection", "cut_angular_impulse")
 _TAKEN = ("damping", "algorithmic", "cut_work", "projection", "removed_energy")
 
 
+def pressure_at_end(steps: Sequence[_Floats], lag: float) -> _Floats:
+    """Compute a pressure of contact at the end of a step from the last steps, Pa.
+
+    The pressure of a step belongs to the time at which it balances forces. Undamped, pressures
+    alternate from step to step about their mean.
+
+    Parameters
+    ----------
+    steps : three arrays
+        The last first; nan before faces were free.
+    lag : float
+        Share of the step between that time and its end.
+    """
+    known = np.array(steps)
+    whole = 0.5 * (known[0] + known[1]) + (0.25 + 0.5 * lag) * (known[0] - known[2])
+    count = np.isfinite(known).sum(axis=0)
+    mean = np.nansum(known, axis=0) / np.maximum(count, 1)
+    return np.maximum(np.where(count == 3, whole, mean), 0.0)
+
+
 def work_of_blades(cuts: Sequence[Any], by_cut: _Floats | float) -> dict[str, float]:
     """Name the energy that each of several blades has taken, J, from all cuts' (cuts,)."""
     blades = [cut.on_the_way for cut in cuts]

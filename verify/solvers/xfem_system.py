@@ -114,7 +114,7 @@ def faces_of(
         )
     mesh = phantom.mesh
     if scene.analysis.kinematics != "linear":
-        return TurningFaces(phantom, material_of(scene, mesh))
+        return TurningFaces(phantom, material_of(scene, mesh), moving)
     cuts = cuts_of(scene, _FINE * float(mesh.measures.mean()) ** (1.0 / mesh.dim))
     return ClosingFaces(phantom, material_of(scene, mesh), cuts, moving)
 
@@ -320,7 +320,7 @@ def _equilibrium(scene: Scene, body: DynamicBody, exact: Any) -> _Floats:
     def prescribed(share: float) -> _Floats:
         return path(share).values
 
-    if (faces := faces_of(scene, phantom)) is not None:
+    if isinstance(faces := body.contact, ClosingFaces):  # by the law of the motion
         return solve_closed(body.force, faces, path(1.0), load, prescribed).displacement
     check_bodies(phantom, path(1.0))
     return static_equilibrium(body.force, body.fixed, prescribed, load).displacement

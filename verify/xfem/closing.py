@@ -227,6 +227,13 @@ class ClosingFaces:
         """Compute the pressure (f, q) between the faces in pascal; zero where they are apart."""
         return np.maximum(0.0, -self.trial_stress(displacement, slide))
 
+    def freed_pressure(self, displacement: Floats) -> Floats:
+        """Compute the pressure (f, q) in motion; nan where nothing parts the faces yet."""
+        trial = self.trial_stress(displacement)
+        least = ROUND_OFF * np.abs(self.phantom.node_points + displacement).max()
+        found = np.where(np.abs(trial) > least * self.stiffness[:, None], -trial, np.nan)
+        return np.maximum(0.0, found)
+
     def averaged(self, pressure: Floats) -> Floats:
         """Average a pressure (f, q) over the hat functions of the nodes, where faces touch.
 

@@ -63,6 +63,8 @@ class TurningFaces(ClosingFaces):
     ----------
     phantom : PhantomMesh
     material : Material
+    moving : bool
+        Whether σ is left out at rest too.
 
     Raises
     ------
@@ -72,8 +74,9 @@ class TurningFaces(ClosingFaces):
 
     kinematics: Kinematics = "corotational"
 
-    def __init__(self, phantom: PhantomMesh, material: Material) -> None:
+    def __init__(self, phantom: PhantomMesh, material: Material, moving: bool = False) -> None:
         super().__init__(phantom, material, moving=True)
+        self.moving = moving
         self._places: tuple[BlockPattern, Ints] | None = None
 
     def gaps(self, displacement: Floats) -> Floats:
@@ -87,6 +90,8 @@ class TurningFaces(ClosingFaces):
 
     def slid(self, displacement: Floats, force: InternalForce) -> Floats:
         """Compute the gap (f, q) that stands for the mean normal stress at rest: σ/γ."""
+        if self.moving:
+            return np.zeros(self.weights.shape)
         at, stress = self._at(displacement), force.stress(force.configuration(displacement))
         drawn = np.einsum("fs,fsab,fb->fa", self.share, stress[self.pieces], self.normal)
         drawn = np.einsum("fa,fab,fb->f", drawn, at.F, at.m) / self.stiffness
