@@ -138,7 +138,7 @@ class NewtonIntegrator(ABC):
         self._factorised: tuple[float, RayleighDamping, bytes] | None = None
         self._left: list[float] = []  # of the residual by each correction of the last step
         self._end: Resistance | None = None  # of the last step
-        self._change = np.zeros(body.shape)  # of the displacement in it
+        self._mean_velocity = np.zeros(body.shape)  # in it
         self._speed = np.zeros(body.shape)  # of the supports at the end of the step
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
@@ -204,18 +204,19 @@ class NewtonIntegrator(ABC):
         check_state(state, self.body.shape)
         self._start = state.copy()
         self._prepare()
-        change = self.step_size * state.velocity
+        velocity = state.velocity
         # velocities of slivers, which have hardly any mass to keep them, ring from step to step:
         # they would throw them off. A step like the last one is as near where the motion is smooth
         if self._end is not None and np.array_equal(self._end.displacement, state.displacement):
-            change = self._change
+            velocity = self._mean_velocity
         with np.errstate(over="ignore", invalid="ignore"):
             try:
-                end = self._newton(state.displacement + change)
+                end = self._newton(state.displacement + self.step_size * velocity)
             except StepFailedError:
                 # where the predictor has turned cells inside out, start from where they are
                 end = self._newton(state.displacement.copy())
-        self._change = end.displacement - self._start.displacement
+        change = end.displacement - self._start.displacement
+        self._mean_velocity = change / self.step_size
         state.displacement[:], state.velocity[:] = end.displacement, end.velocity
         state.time = self._start.time + self.step_size
         self._end = end.resistance._replace(blocks=None)
