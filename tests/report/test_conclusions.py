@@ -206,7 +206,7 @@ def test_all_runs_of_the_hand_are_told_and_the_slowest_decides():
                    if s.name == "real time")  # fmt: skip
     found = sentence.of(made(hand={**made().hand, "slowest": 0.016, "runs": runs}))
     assert "does not cut" in found.text
-    assert "slowest step 12 to 36 ms of processor time in 3 runs" in found.text
+    assert "slowest step 12 to 36 ms of processor time (3 runs)." in found.text
 
 
 def test_times_beside_other_programs_are_not_drawn(tmp_path):
@@ -290,7 +290,7 @@ def test_the_error_in_space_is_absolute_and_bounded_where_the_reference_is_no_be
     (frames,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
                  if s.name == "frames")  # fmt: skip
     assert (
-        frames.of(made()).text == "There the engine's step, 60 a second, is wrong by 3.3 to 13 %."
+        frames.of(made()).text == "There the engine's step of 1/60 s is wrong by 3.3 to 13 %."
     )
 
 

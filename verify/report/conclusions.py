@@ -198,7 +198,7 @@ def _by_frames(evidence: Evidence) -> Found | None:
     """Say how wrong the step of the real-time engine is at 60 steps a second."""
     return _in_solids(
         evidence.frames, lambda name: "scheme=real_time" in name,
-        "There the engine's step, 60 a second, is wrong by {1}", "frames",
+        "There the engine's step of 1/60 s is wrong by {1}", "frames",
     )  # fmt: skip
 
 
@@ -210,12 +210,12 @@ def _real_time(evidence: Evidence) -> Found | None:
     cells, worst = int(hand["tetrahedra"]), slowest[-1]
     cuts = "cuts" if worst <= FRAME else "does not cut"
     busy = hand.get("contended") and worst > FRAME
+    how = [f"{len(slowest)} runs"] * (len(slowest) > 1) + ["busy machine"] * bool(busy)
     took = " to ".join(dict.fromkeys(number(1e3 * one, 2) for one in (slowest[0], worst)))
     text = (
         f"XFEM's engine {'may cut' if busy else cuts} a hand of {number(cells)} tetrahedra at 60 "
         f"frames a second: slowest step {took} ms of processor time"
-        f"{f' in {len(slowest)} runs' if len(slowest) > 1 else ''}"
-        f"{' on a busy machine' if busy else ''}."
+        f"{f' ({told})' if (told := ', '.join(how)) else ''}."
     )
     numbers = (
         f"{hand['steps']} steps, {hand['cuts']} elements cut, slowest "
@@ -231,7 +231,7 @@ def _sofa(evidence: Evidence) -> Found | None:
         return None
     ratios = [float(row["ratio"]) for row in rows]
     text = (
-        f"On uncut bodies its step takes {number(min(ratios), 2)} to {number(max(ratios), 2)} of "
+        f"Uncut, its step takes {number(min(ratios), 2)} to {number(max(ratios), 2)} of "
         "SOFA's recorded time."
     )
     numbers = "scaled by memory bandwidth: " + ", ".join(
