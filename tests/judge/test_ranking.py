@@ -1,5 +1,7 @@
 """Claims about rankings beside pairs: robustness, energy, and the omissions."""
 
+from dataclasses import replace
+
 import pytest
 
 from verify.judge.notices import INSIDE_OUT
@@ -74,11 +76,14 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
         solve("a", "y", 1, 0.1, regularisations=[Regularisation("node moved", 3, 0.1, "m")]),
         solve("a", "z", 0, status=Status.TIMEOUT, reason="60 s"),
         solve("a", "z", 1, 0.1, notes={INSIDE_OUT: "0.1 of the volume"}),
+        solve("a", "w", 0, 0.1, metrics=[replace(worst, uncertainty=4.0)]),  # nobody knows
     ]
     by = {s["solver"]: s for s in rank_solvers([case_of("a", solves)])["stability"]}
-    assert (by["x"]["rank"], by["x"]["tied"], by["x"]["lost"]) == (1, False, 0.0)
-    assert by["y"]["rank"] == by["z"]["rank"] == 2
-    assert by["y"]["blown_up"] == 1
+    assert (by["x"]["rank"], by["x"]["tied"], by["x"]["lost"]) == (1, True, 0.0)
+    assert by["y"]["rank"] == by["z"]["rank"] == 3  # two have lost nothing
+    assert by["y"]["tied"]
+    assert by["z"]["tied"]
+    assert (by["y"]["blown_up"], by["w"]["blown_up"]) == (1, 0)
     assert by["y"]["regularisations"] == {"node moved": 3}
     assert (by["z"]["timeout"], by["z"]["inside_out"]) == (1, 1)
     assert by["x"]["refused"] == 1
