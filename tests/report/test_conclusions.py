@@ -289,9 +289,7 @@ def test_the_error_in_space_is_absolute_and_bounded_where_the_reference_is_no_be
     assert sentence.of(made(others())) is None  # in the plane
     (frames,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
                  if s.name == "frames")  # fmt: skip
-    assert (
-        frames.of(made()).text == "There the engine's step of 1/60 s is wrong by 3.3 to 13 %."
-    )
+    assert frames.of(made()).text == "There the engine's step of 1/60 s is wrong by 3.3 to 13 %."
 
 
 def test_every_sentence_has_numbers_that_refute_it():
