@@ -305,6 +305,7 @@ def _step_lost(evidence: Evidence) -> Found | None:
         f"{name}: least {min(own.values()):.2e} at ε = {min(own, key=lambda s: own[s]):g}"
         for name, own in (("xfem mass=consistent", mass), (MEASURE, split))
     )
+    numbers += "; drawn up to the ε from which on the cut moves onto nodes"
     most = max(mass[at], split[at])
     return Found(text, numbers, f"both at most {LOST:g}", most <= LOST, "slivers")
 

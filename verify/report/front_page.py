@@ -84,9 +84,10 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
     verdicts = [v for result in evidence.results for v in result.verdicts]
     failed = [v.solver for v in verdicts if v.verdict is Verdict.FAIL]
     counts = Counter(str(v.verdict) for v in verdicts if v.solver == "xfem")
+    long = ", C7's among them" if evidence.long_run else ""
     others = Counter(name for name in failed if name not in _CONTROLS).most_common()
     lines.append(
-        f"- **Verdicts of XFEM**: of {counts.total()} checks, C7's among them, {counts['FAIL']} "
+        f"- **Verdicts of XFEM**: of {counts.total()} checks{long}, {counts['FAIL']} "
         f"[failed](verdicts.md) and {counts['UNDECIDED']} are undecided. Of all {len(failed)} "
         f"failures {sum(name in _CONTROLS for name in failed)} are of the controls "
         f"{' and '.join(_CONTROLS)}; of the others "
