@@ -1,6 +1,7 @@
 """Errors of a stated pressure of contact, on pressures whose errors are known in closed form."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,13 @@ from verify.compare.cut_rule import CutRule
 from verify.compare.errors import Rules
 from verify.compare.hooke import law_of
 from verify.compare.motion import SolutionMotion
-from verify.judge.contact import contact_metrics, exact_contact, known_contact, stated_pressure
+from verify.judge.contact import (
+    contact_metrics,
+    exact_contact,
+    exact_pressure,
+    known_contact,
+    stated_pressure,
+)
 from verify.solution import ContactPressure, Solution
 
 LINE = {"kind": "polyline", "points": [[-0.1, 0.3], [1.1, 0.7]]}
@@ -147,3 +154,21 @@ def test_without_a_stated_pressure_nothing_is_measured_and_why():
     found, notes = contact_metrics(replace(solution, contact=None), None, None, None, 0.1)
     assert not found
     assert notes == {"contact_pressure": "the solver states no pressure of contact"}
+
+
+def test_an_exact_pressure_is_of_the_positive_face():
+    """A body that is pressed above its cut, y = −0.3, and not below it: 3 times 0.01."""
+    points = np.array([[0.1, -0.3], [0.7, -0.3]])
+    rule = SimpleNamespace(
+        points=points, positive=points + np.array([0.0, 1e-3]), normals=np.array([[0.0, 1.0]] * 2)
+    )
+
+    class Pressed:
+        def gradient(self, places, beside):
+            found = np.zeros((len(places), 2, 2))
+            found[:, 1, 1] = np.where(beside[:, 1] > places[:, 1], -0.01, 0.0)
+            return found
+
+    law = SimpleNamespace(at=lambda places: law, piola=lambda g: 3.0 * g)
+    pressure = exact_pressure(Pressed(), law, rule)
+    assert pressure(points + np.array([0.05, 0.0]), None) == pytest.approx([0.03, 0.03])
