@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -522,6 +522,16 @@ def test_the_front_page_is_short_and_has_four_to_six_figures(tmp_path):
 def test_the_published_front_page_is_short():
     page = (Path(__file__).parents[2] / "docs/results/index.md").read_text("utf-8")
     assert len(words_of_page(page)) <= 500
+
+
+def test_cases_that_were_run_later_are_named(tmp_path, monkeypatch):
+    """Those that the first run has stay its own, whatever the later one found."""
+    runs = {"arena": made().results, "late": [*made().results[:2], case("contact/new", "through")]}
+    monkeypatch.setattr(PUBLISHER, "RUNS", tmp_path)
+    monkeypatch.setattr(PUBLISHER, "load_run", lambda p: SimpleNamespace(results=runs[p.name]))
+    assert PUBLISHER.later() == ""  # there is no later run
+    (tmp_path / "late").mkdir()
+    assert PUBLISHER.later() == " Run [later](late/index.md): contact/new."
 
 
 def test_figures_name_at_most_six_curves_at_their_ends():
