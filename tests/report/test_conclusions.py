@@ -26,7 +26,7 @@ from verify.report.benchmark_page import (
 from verify.report.conclusions import answer
 from verify.report.evidence import Evidence, benchmark_scenes, beside
 from verify.report.front_page import answered, arena_head, combined, figures, write_front
-from verify.report.notation import solver_title
+from verify.report.notation import number, solver_title
 from verify.report.plots import Palette
 from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Status
 
@@ -549,6 +549,10 @@ def test_pages_are_written_with_their_pictures(tmp_path):
     write_benchmark(evidence, tmp_path / "benchmark")
     page = (tmp_path / "benchmark/index.md").read_text("utf-8")
     assert page.count("](benchmark-pictures/") == 6
+    first = next(iter(benchmark_scenes(evidence.results).values()))[0]
+    own = [s for s in first.solves if s.solver == "xfem"]
+    errors = ", ".join(number(s.metric(METRIC).value, 3) for s in own)
+    assert f"\n| XFEM | {errors} | " in page.split(f"**C1**, {first.case}")[1].split("**C2**")[0]
     head = "\n".join(arena_head(evidence, answer(evidence), tmp_path))
     assert head.startswith("- **Accuracy at rest**: Where cuts go through")
     assert "answered of asked. " in head

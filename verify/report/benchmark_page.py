@@ -57,6 +57,8 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     drawn = [plot for label, own in scenes.items()
              if label not in busy and (plot := time_plot(label, own))]  # fmt: skip
     figures = [f"![{plot.alt}]({beside.drawing(plot)})" for plot in drawn]
+    tables = [line for label, own in scenes.items()
+              for line in _every_level(label, own, label not in busy)]  # fmt: skip
     lines = [
         "# Benchmark: the table of the whole", "",
         "[Scenes, to set up from one page each](../../benchmark/index.md)", "",
@@ -66,6 +68,8 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
         "is better. C5 and C8 show the middle of their members. Grey: the other discretisations."
         + (f" Not drawn, timed beside other programs: {', '.join(busy)}." if busy else ""),
         "", "\n".join(figures), "",
+        "<details><summary>Errors and seconds of all, level by level</summary>", *tables, "",
+        "</details>", "",
         "<details><summary>Commands</summary>", "",
         *(f"- `{evidence.commands[name]}`" for name in JUDGED
           if name in evidence.commands), "", "</details>",
@@ -191,14 +195,40 @@ def _scatter(
     return [float(value) for value in np.quantile(ratios, [0.5, 0.05, 0.95])]
 
 
-def time_plot(label: str, members: Sequence[CaseResult]) -> Drawing | None:
-    """Draw time against error of the middle member: six discretisations by name, others grey."""
-    result = members[len(members) // 2]
-    curves: dict[str, list[tuple[float, float]]] = {}
+def _middle(members: Sequence[CaseResult]) -> CaseResult:
+    """Return the member of a scene that stands for it."""
+    return members[len(members) // 2]
+
+
+def _levels(result: CaseResult) -> dict[str, list[tuple[float | None, float]]]:
+    """Return seconds, None if they were not measured, and error by solver, coarse to fine."""
+    found: dict[str, list[tuple[float | None, float]]] = {}
     for solve in sorted(result.solves, key=lambda one: one.level):
         error, times = _error(solve), repeated_totals(solve.paid)
-        if solve.solver != REFERENCE and error and times:
-            curves.setdefault(solve.solver, []).append((median(times), error))
+        if solve.solver != REFERENCE and error:
+            found.setdefault(solve.solver, []).append((median(times) if times else None, error))
+    return found
+
+
+def _every_level(label: str, members: Sequence[CaseResult], timed: bool) -> list[str]:
+    """Return the lines of a table: errors, and seconds if `timed`, from coarse to fine."""
+    result = _middle(members)
+    lines = ["", f"**{label}**, {result.case}", "",
+             "| solver | relative L² error | seconds |", "| --- | --- | --- |"]  # fmt: skip
+    for name, points in _levels(result).items():
+        errors = ", ".join(number(error, 3) for _, error in points)
+        seconds = ", ".join("–" if t is None or not timed else number(t, 2) for t, _ in points)
+        lines.append(f"| {solver_title(name)} | {errors} | {seconds} |")
+    return lines
+
+
+def time_plot(label: str, members: Sequence[CaseResult]) -> Drawing | None:
+    """Draw time against error of the middle member: six discretisations by name, others grey."""
+    curves = {
+        name: [(seconds, error) for seconds, error in points if seconds is not None]
+        for name, points in _levels(_middle(members)).items()
+    }
+    curves = {name: points for name, points in curves.items() if points}
     least = {name: places[-1][1] for name, places in curves.items()}
     ordered = [name for name in _FIRST if name in curves]
     ordered += sorted((n for n in curves if n not in ordered), key=lambda name: least[name])
