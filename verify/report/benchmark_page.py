@@ -218,7 +218,8 @@ def _every_level(label: str, members: Sequence[CaseResult], timed: bool) -> list
     for name, points in _levels(result).items():
         errors = ", ".join(number(error, 3) for _, error in points)
         seconds = ", ".join("–" if t is None or not timed else number(t, 2) for t, _ in points)
-        lines.append(f"| {solver_title(name)} | {errors} | {seconds} |")
+        title = solver_title(name) + MISSING * misses_material([result], name)
+        lines.append(f"| {title} | {errors} | {seconds} |")
     return lines
 
 
