@@ -125,18 +125,33 @@ def test_an_error_of_the_opening_is_no_overlap_unless_it_is_another_answer(off, 
     assert bool(result.warnings) == warns
 
 
-def test_the_deepest_overlap_of_a_motion_is_found_at_its_time():
-    asked = scene(analysis={"kind": "dynamic", "duration": 1.0})
-    shifts = [0.0, 0.04, -0.03, 0.01]
+def in_motion(*shifts):
+    """Openings of a motion over a second, evenly in time."""
     frames = [moved(s * normal(2)) for s in shifts]
     motion = replace(
         frames[0], displacement=np.concatenate([f.displacement for f in frames]),
-        times=np.linspace(0.0, 1.0, 4),
+        times=np.linspace(0.0, 1.0, len(shifts)),
     )  # fmt: skip
-    result = examined(asked, {"xfem": {0: motion}})
+    asked = scene(analysis={"kind": "dynamic", "duration": 1.0})
+    return examined(asked, {"xfem": {0: motion}})
+
+
+def shown_openings(result):
+    return {profile.why: profile.curves[0].normal[5] for profile in result.openings}
+
+
+def test_the_deepest_overlap_of_a_motion_is_found_at_its_time():
+    result = in_motion(0.0, 0.04, -0.03, 0.01)
     assert result.solves[0].metric("overlap_depth").value == pytest.approx(0.03, rel=1e-6)
     assert "at 0.6667 s" in result.warnings[0].text
-    shown = {profile.why: profile.curves[0].normal[5] for profile in result.openings}
-    assert shown == pytest.approx(
+    assert shown_openings(result) == pytest.approx(
         {"last output time": 0.01, "largest opening": 0.04, "deepest overlap of xfem": -0.03}
+    )
+
+
+def test_a_motion_without_overlap_is_shown_where_it_is_most_open_and_last():
+    result = in_motion(0.01, 0.02, 0.04, 0.03)
+    assert not result.warnings
+    assert shown_openings(result) == pytest.approx(
+        {"last output time": 0.03, "largest opening": 0.04}
     )

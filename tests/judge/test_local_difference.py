@@ -44,6 +44,24 @@ def test_only_the_side_of_the_point_counts():
     assert local_difference(U, coarse, fine) == pytest.approx(1e-3, rel=1e-12)
 
 
+def test_of_a_linear_difference_it_is_the_root_mean_square_over_the_cells_beside():
+    """Of a linear f over a triangle the mean square is (Σ f² + (Σ f)²)/12."""
+    coarse = measured(7)
+    found = local_difference(U, coarse, measured(14, field=lambda x, y: 0.3 * x - 0.7 * y + 0.4))
+    points, cells = coarse.solution.points, coarse.solution.cells
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    share = np.linalg.solve(
+        edges.swapaxes(1, 2), (np.array([0.31, 0.83]) - points[cells[:, 0]])[..., None]
+    )
+    (own,) = np.flatnonzero((share.min(axis=(1, 2)) > 0.0) & (share.sum(axis=(1, 2)) < 1.0))
+    beside = cells[[bool(set(cell) & set(cells[own])) for cell in cells.tolist()]]
+    f = points[beside] @ [0.3, -0.7] + 0.4
+    area = np.abs(np.linalg.det(points[beside[:, 1:]] - points[beside[:, :1]]))
+    squares = (np.sum(f**2, axis=1) + np.sum(f, axis=1) ** 2) / 12
+    assert 9 < len(beside) < 20
+    assert found == pytest.approx(np.sqrt(area @ squares / area.sum()), rel=1e-12)
+
+
 def test_what_both_faces_do_alike_is_no_opening_and_what_they_do_apart_adds():
     coarse = measured(7)
     alike, apart = ((0.02, 0.01), (0.02, 0.01)), ((0.03, 0.01), (-0.01, -0.02))

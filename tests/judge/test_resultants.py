@@ -236,6 +236,26 @@ def test_a_reaction_in_motion_has_the_inertia_in_it(solver):
     assert len(over_time["quantity_sx"]) == 5
 
 
+def test_supports_have_the_acceleration_after_a_kink_and_at_the_end_that_before_it():
+    """0.1 t² φ: of φ = 5 t it is 3 t, of φ = 7.5 t − 0.5 it is 4.5 t − 0.1, and 0.5 of φ = 2.5."""
+    moves = {"displacement": ["0.1 * t * t", 0.0],
+             "history": [[0.0, 0.0], [0.2, 1.0], [0.4, 2.5]]}  # fmt: skip
+    scene = scenes.scene(
+        supports=[{"where": "left", **moves}], material=scenes.soft(2, density=3.0),
+        analysis={"kind": "dynamic", "duration": 0.4, "outputs": 5},
+    )  # fmt: skip
+    mesh, times = rectangle_mesh((3, 4)), np.linspace(0.0, 0.4, 5)
+    u = np.zeros((5, *mesh.points.shape))
+    u[:, :, 0] = (0.1 * times**2 * np.interp(times, *np.transpose(moves["history"])))[:, None]
+    still = np.zeros_like(u)
+    swung = Solution(mesh.points, mesh.cells, u, times, velocity=still, acceleration=still)
+    form = measured(scene, solution=swung).weak_form
+    left = mesh.points[:, 0] == 0.0
+    found = [form.rates(step)[left] for step in range(5)]
+    for rates, wanted in zip(found, [0.0, 0.3, 0.8, 1.25, 1.7], strict=True):
+        assert rates == pytest.approx(np.tile([wanted, 0.0], (5, 1)), abs=1e-5)
+
+
 @pytest.mark.parametrize("kind", ["body_force", "traction"])
 def test_a_reaction_has_no_value_where_a_load_jumps(kind):
     """By accelerations of before it and the load of after it was off by a tenth."""

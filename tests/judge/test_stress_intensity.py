@@ -149,6 +149,71 @@ def test_missing_quantities_are_noticed_with_their_levels_and_reason():
     assert unavailable_quantities(case, [solved("a", 0, 1.0)]) == []
 
 
+def griffith_in_motion(duration, outputs, *shares):
+    """A crack at rest, its solution, and a scene in motion: K at shares of its duration."""
+    still = griffith(mesh={"cells": [[24, 24]]})
+    content = still.model_dump(mode="json", by_alias=True)
+    content["material"]["density"] = 1.0
+    content |= {
+        "analysis": {"kind": "dynamic", "duration": duration, "outputs": outputs}, "exact": None,
+        "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}], "reference": {},
+        "quantities": [{**ASKED[2], "name": f"{one}", "time": one * duration} for one in shares],
+    }  # fmt: skip
+    solution = find_solver("xfem").solve(still, 0, 0, tip="inside")
+    at_rest = solution_intensity(still, solution, still.quantities[2])
+    return Scene.model_validate(content), solution, at_rest
+
+
+def in_motion(solution, times, u, **more):
+    """Without accelerations a factor is as linear in the displacement as at rest."""
+    return replace(solution, displacement=u, velocity=0.0 * u, acceleration=0.0 * u, times=times,
+                   ledger={}, **more)  # fmt: skip
+
+
+def test_a_factor_in_motion_is_that_of_the_output_at_its_time():
+    duration, outputs = 2e-3, np.array([0.0, 0.5, 0.75, 1.0])  # none at a quarter
+    scene, solution, at_rest = griffith_in_motion(duration, 5, 0.25, 0.5, 0.75, 1.0)
+    u = np.array([0.0, 0.8, -0.3, 1.7])[:, None, None] * solution.displacement
+    early, *others = scene.quantities
+    for late in (0.0, 1e-10):  # round-off of times
+        own = in_motion(solution, duration * (outputs + late * (outputs == 0.5)), u)
+        found = [solution_intensity(scene, own, asked) for asked in others]
+        assert found == pytest.approx(at_rest * np.array([0.8, -0.3, 1.7]), rel=1e-12)
+        with pytest.raises(UnsupportedSceneError, match=r"no field at 0\.0005 s"):
+            solution_intensity(scene, own, early)
+    other = in_motion(solution, duration * (outputs + 1e-5 * (outputs == 0.5)), u)
+    with pytest.raises(UnsupportedSceneError, match=r"no field at 0\.001 s"):
+        solution_intensity(scene, other, others[0])
+
+
+def test_the_order_of_a_factor_in_motion_is_that_of_its_tip_at_its_time():
+    """Levels u (1 + hᵖ): 1.6 times the error hᵖ K. Far from tips the order is ½ at any time."""
+    scene, solution, at_rest = griffith_in_motion(1.0, 3, 0.5, 1.0)
+    powers, sizes = np.array([2.0, 1.0, 1.5]), (0.4, 0.2, 0.1)
+    x, y = solution.points.T
+    wave = np.where(np.abs(y) > 1.3, np.sin(5 * x), 0.0)[:, None]
+    levels = {}
+    for level, h in enumerate(sizes):
+        u = solution.displacement * (1.0 + h**powers)[:, None, None] + np.sqrt(h) * wave
+        levels[level] = in_motion(solution, np.linspace(0.0, 1.0, 3), u, size=h)
+    body = body_of(scene)
+    found = conforming_reference(scene, levels, body, law_of(scene), Rules(body, 0.2)).quantities
+    for name, power in (("0.5", 1.0), ("1.0", 1.5)):
+        value, width = found[name]
+        assert value == pytest.approx(at_rest * (1 + sizes[-1] ** power), rel=1e-9)
+        assert width == pytest.approx(1.6 * (value - at_rest), rel=1e-6)
+
+
+def test_an_exact_field_states_the_factors_of_the_end_that_is_asked_for():
+    """A field whose tips differ; a cut with kinks has more corners than ends."""
+    kinked = [[-0.9, -0.3], [-0.4, 0.1], [0.3, 0.2], [0.8, 0.55]]
+    scene = griffith(cuts=[line(*kinked)])
+    field = SimpleNamespace(intensity_at=lambda point: tuple(point))
+    assert [exact_intensity(scene, field, asked) for asked in scene.quantities] == [
+        *kinked[0], *kinked[-1]
+    ]  # fmt: skip
+
+
 def penny(*asked, **changes):
     """Give the inclined penny under tension and pressure, with factors asked for."""
     content = load_scene("benchmark/c4_disc").model_dump(mode="json", by_alias=True)

@@ -55,6 +55,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 _REACH = 0.25  # of the body's diagonal
+_ON = 10 * ROUND_OFF  # of it: nodes so near a cut or the plane of a section are on it
 _MOMENT = 1e-6  # of the duration: over which accelerations of supports are taken
 
 
@@ -95,7 +96,7 @@ class WeakForm:
         if not facets.size:
             return np.zeros(len(points), dtype=bool)
         away = cKDTree(facets.reshape(-1, points.shape[1])).query(points)[0]
-        return np.asarray(away <= 10 * ROUND_OFF * self.field.scale)
+        return np.asarray(away <= _ON * self.field.scale)
 
     @cached_property
     def owners(self) -> NDArray[np.int64]:
@@ -185,7 +186,8 @@ class WeakForm:
         rates = self._in_motion("acceleration")[step]
         if any(one.timed or one.history for one in self.scene.supports):
             nodes, times = self._prescribed, self.solution.times
-            near = _MOMENT * float(np.ptp(times)) * (-1.0 if step == len(times) - 1 else 1.0)
+            near = _MOMENT * float(np.ptp(times))
+            near = -near if step == len(times) - 1 else near
             first, second = (nodes.velocities(times[step] + k * near) for k in (1, 2))
             rates = taken_up(self.mass, nodes.held, rates, (second - first) / near)
         if drag := self.scene.analysis.damping[0]:
@@ -348,7 +350,7 @@ def section(form: WeakForm, asked: SectionQuantity) -> float:
     """
     solution, step = form.solution, step_at(form.solution, asked.time)
     normal = np.asarray(asked.normal) / np.linalg.norm(asked.normal)
-    side = _Side(np.asarray(asked.point, dtype=float), normal, 10 * ROUND_OFF * form.field.scale)
+    side = _Side(np.asarray(asked.point, dtype=float), normal, _ON * form.field.scale)
     beyond = side.level(solution.points) > 0.0
     rigid = form.rigid(asked, step)
     _check_section(form, beyond, rigid)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.motion import step_at
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import (
     ArcCut,
@@ -118,9 +119,7 @@ def solution_intensity(
     ------
     UnsupportedSceneError
         If `intensity_defect` gives a reason, the mesh is too coarse for a domain around the end,
-        or the solution is in motion and carries no accelerations.
-    InputError
-        If the solution has no field at that time.
+        or the solution is in motion and carries no accelerations or no field at that time.
     """
     found = {} if found is None else found
     time, column = _time(scene, asked), asked.column
@@ -129,10 +128,8 @@ def solution_intensity(
         return found[place][column]
     if reason := intensity_defect(scene, asked):
         raise UnsupportedSceneError(reason)
-    step = int(np.argmin(np.abs(solution.times - time)))
     moving = scene.analysis.kind == "dynamic"
-    if abs(solution.times[step] - time) > _SAME_TIME * (scene.analysis.duration or np.inf):
-        raise InputError(f"the solution has no field at {time:.6g} s, an output time of the scene")
+    step = step_at(solution, time if moving else None)
     if moving and solution.acceleration is None:
         raise UnsupportedSceneError("the solution carries no accelerations: its inertia is unknown")
     drag = scene.analysis.damping[0]
