@@ -85,25 +85,27 @@ def ring(
             f"a domain of radius {radius} m; expected a plane field, a positive radius"
         )
     corners = solution.cells[:, :3]
-    away = np.linalg.norm(solution.points[corners] - tip, axis=2)
+    away = np.linalg.norm(solution.points - tip, axis=1)
     inside = away < radius
-    at_tip = away.min(axis=1) <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
-    mixed = inside.any(axis=1) & ~inside.all(axis=1)
-    if not mixed.any() or (mixed & at_tip).any() or inside.all():
+    first, second, third = inside[corners.T]
+    every = first & second & third
+    mixed = (first | second | third) & ~every
+    at_tip = away[corners[mixed]] <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
+    if not mixed.any() or at_tip.any() or every.all():
         raise DomainError(
             f"a domain of radius {radius:.4g} m around ({tip[0]:.4g}, {tip[1]:.4g}) does not fit "
             "between the cells at the tip and what is next to it"
         )
-    cells = np.flatnonzero(mixed | inside.all(axis=1)) if whole else np.flatnonzero(mixed)
+    cells = np.flatnonzero(mixed | every if whole else mixed)
     at = cell_gradients(solution, cells, step)
-    hat = inside[cells].astype(float)
+    hat = inside[corners[cells]].astype(float)
     grad_q = np.einsum("mk,mqkj->mqj", hat, at.hats)
     near = np.broadcast_to(
         solution.points[corners[cells]].mean(axis=1)[:, None, :], at.points.shape
     )
     # the value of a linear q, from its gradient and a corner
-    first = solution.points[corners[cells, 0]][:, None, :]
-    q = hat[:, :1] + np.sum((at.points - first) * grad_q, axis=2)
+    corner = solution.points[corners[cells, 0]][:, None, :]
+    q = hat[:, :1] + np.sum((at.points - corner) * grad_q, axis=2)
     return Ring(cells, at, q, grad_q, near)
 
 
