@@ -348,6 +348,41 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field_and_found_at
     )
 
 
+@pytest.mark.parametrize("degrees", [20.0, 131.0])
+def test_the_energy_at_a_straight_front_is_that_of_sihs_densities_within_its_half_width(degrees):
+    """The density is S(θ)/r, so that ∫ S R dθ is that of a slice that ends at R(θ); to 1e-4.
+
+    G. C. Sih, Int. J. Fract. 10 (1974), eq. 5, with 16 πμ S in place of k = K/√π.
+    """
+    turn, point, poisson, shear = np.deg2rad(degrees), np.array([0.04, -0.03, 0.0]), 0.3, 1 / 2.6
+    ahead, normal = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0]])
+    k_1, k_2, k_3 = intensity = [1.0, 0.6, -0.8]
+    exact = {"point": point.tolist(), "normal": normal.tolist(), "axis": ahead.tolist(),
+             "intensity": intensity}  # fmt: skip
+    steps = ((-2, 0), (2, 0), (2, 3), (-2, 3))
+    corners = [(point - b * ahead + np.array([0, 0, a])).tolist() for a, b in steps]
+    scene = straight(
+        4, exact={"solution": "straight_front", "parameters": exact},
+        cuts=[{"kind": "polygon", "points": corners}], quantities=[{"kind": "strain_energy"}],
+    )  # fmt: skip
+    # Gauss between the corners of the square, where R has kinks
+    square = np.array([[x, y, 0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) - point
+    kinks = np.sort([-np.pi, *np.arctan2(square @ normal, square @ ahead), np.pi])
+    at, weights = np.polynomial.legendre.leggauss(40)
+    half = 0.5 * np.diff(kinks)[:, None]
+    theta = (kinks[:-1, None] + half * (1 + at)).ravel()
+    c, s = np.cos(theta), np.sin(theta)
+    density = k_1**2 * (3 - 4 * poisson - c) * (1 + c) + 4 * k_1 * k_2 * s * (c - 1 + 2 * poisson)
+    density += k_2**2 * (4 * (1 - poisson) * (1 - c) + (1 + c) * (3 * c - 1)) + 4 * k_3**2
+    way = np.outer(c, ahead[:2]) + np.outer(s, normal[:2])
+    reach = ((0.5 * np.sign(way) - point[:2]) / way).min(axis=1)
+    energy = (half * weights).ravel() @ (density * reach) / (16 * np.pi * shear)
+    found = exact_reference(scene, exact_of(scene), body_of(scene), law_of(scene)).quantities
+    value, width = found["strain_energy"]
+    assert value == pytest.approx(energy, rel=1e-4)
+    assert abs(value - energy) < width < 1e-3 * energy
+
+
 def test_means_with_hats_become_the_factor_at_the_middle_of_a_quadratic(monkeypatch):
     """The mean of a + b s + c s² with a hat of half-width w is that at its middle and c w²/6."""
     scene = straight(4, {"mode": "I"})
