@@ -126,6 +126,13 @@ JUDGED = {
     "or the other": (WITHIN, beside([0.12, 0.0505], [0.1, 0.05]), FAIL, ""),
     "within is on both sides": (WITHIN, beside([0.094, 0.047], [0.1, 0.05]), FAIL, ""),
     "at most on one": ({"check": "ratio", "at_most": 1.05}, beside([0.01], [0.1]), PASS, ""),
+    "of at most the largest is the worst": (
+        {"check": "ratio", "at_most": 2.0}, beside([0.01, 0.075, 0.01], [0.1, 0.05, 0.02]), PASS,
+        "worst at level 1; by level 0.1, 1.5, 0.5"),
+    "and the farthest from 1 of within": (
+        WITHIN, beside([0.101, 0.048, 0.0204], [0.1, 0.05, 0.02]), PASS, "worst at level 1"),
+    "be it above or below": (
+        WITHIN, beside([0.097, 0.052, 0.02], [0.1, 0.05, 0.02]), PASS, "worst at level 1"),
     "a much smaller error is not within": (WITHIN, beside([0.01], [0.1]), FAIL, ""),
     "intervals leave a ratio open": (
         WITHIN, beside([0.101, 0.0505], [0.1, 0.05], 0.005), UNDECIDED, ""),
@@ -180,6 +187,21 @@ def test_a_rate_is_judged_on_its_interval(order, width, reason, limits, expected
     found = verdict({"check": "rate", **limits}, [solve(0, 0.1), solve(1, 0.09)], [rate])
     assert found.verdict is expected
     assert reason in found.reason
+
+
+@pytest.mark.parametrize(
+    ("reason", "slopes", "shown"),
+    [
+        ("diverging: slopes", [-1.0, -1.3, -1.2], (-1.2, -1.3, -1.0)),
+        ("slowing: slopes", [0.3, 0.2, 0.15], (0.15, 0.1, 0.2)),
+    ],
+)
+def test_a_rate_that_fails_without_an_order_is_shown_from_its_last_slope(reason, slopes, shown):
+    """Between its slopes where it diverges; by what the slope may still change if it falls."""
+    rate = Rate("xfem", "energy_norm", None, 0.05, reason, slopes)
+    found = verdict({"check": "rate", "at_least": 1.0}, [solve(0, 0.1), solve(1, 0.09)], [rate])
+    assert found.verdict is FAIL
+    assert (found.observed, found.low, found.high) == pytest.approx(shown)
 
 
 @pytest.mark.parametrize("status", [Status.FAILED, Status.TIMEOUT, Status.REFUSED, Status.MEMORY])

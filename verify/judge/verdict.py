@@ -226,9 +226,9 @@ def _judge_ratio(
     ours, theirs = _levels(records, check.solver), _levels(others, to)
     if [r.level for r in ours] != [r.level for r in theirs]:
         raise NotMeasuredError(f"{check.solver} and {to} were not solved on the same levels")
-    low, high = 0.0, check.at_most or 0.0
+    low, high, best = 0.0, check.at_most or 0.0, 0.0
     if check.within is not None:
-        low, high = 1 - check.within, 1 + check.within
+        low, high, best = 1 - check.within, 1 + check.within, 1.0
     found = []
     for one, other in zip(ours, theirs, strict=True):
         a = _error(one, check.metric)
@@ -252,8 +252,7 @@ def _judge_ratio(
         for level, ratio in found
     ]
     order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL]
-    centre = 0.5 * (low + high) if check.within is not None else 0.0
-    return max(decided, key=lambda v: (order.index(v.verdict), abs((v.observed or 0.0) - centre)))
+    return max(decided, key=lambda v: (order.index(v.verdict), abs((v.observed or 0.0) - best)))
 
 
 def _judge_rate(
@@ -280,9 +279,8 @@ def _judge_rate(
     if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
         worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
         return verdict_record(check, Verdict.FAIL, rate.reason, worst)
-    if rate.reason.startswith("slowing") and rate.pairwise[-1] + rate.uncertainty < low:
-        least = min(rate.pairwise[-1] - rate.uncertainty, *rate.pairwise)
-        at_most = Interval(rate.pairwise[-1], least, rate.pairwise[-1] + rate.uncertainty)
+    if rate.reason.startswith("slowing") and (last := rate.pairwise[-1]) + rate.uncertainty < low:
+        at_most = Interval(last, last - rate.uncertainty, last + rate.uncertainty)
         return verdict_record(check, Verdict.FAIL, rate.reason, at_most)
     return verdict_record(check, Verdict.UNDECIDED, rate.reason)
 
