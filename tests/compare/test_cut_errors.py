@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scenes
 from cut_meshes import scene
 
 from verify.compare.body import body_of
@@ -16,10 +17,45 @@ from verify.judge.cut_errors import are_mixed, measured_cut, with_cut, with_othe
 from verify.judge.quantities import Measured
 from verify.report.tables import cuts_table
 from verify.result import CUT, CaseResult, ReferenceRecord, SolveRecord, Status
+from verify.solution import Solution
 from verify.solvers.interface import find_solver
+from verify.xfem import box_mesh, rectangle_mesh
 
 LIFT = 0.1
 TOOTH = [[-0.1, 0.53], [0.55, 0.53], [0.72, 0.73], [0.74, 0.53], [1.1, 0.53]]
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize(("share", "what"), [(0.8, "missing"), (1.25, "too much"), (1.0, "")])
+def test_how_much_of_a_cut_is_missing_or_too_much_is_a_length_or_an_area(d, share, what):
+    """A straight cut that begins as asked and ends at a share of its length; in space a strip."""
+    start, way = np.array([0.21, 0.33, 0.2][:d]), np.array([0.4, 0.21, 0.05][:d])
+    across, n = np.array([0.0, 0.1, 0.55]), 40
+    ends = [start, start + way]
+    corners = ends if d == 2 else [*ends, start + way + across, start + across]
+    cut = {"kind": "polyline" if d == 2 else "polygon", "points": np.array(corners).tolist()}
+    case = scenes.scene([cut], d)
+    at = start + share * np.linspace(0.0, 1.0, n + 1)[:, None] * way
+    facets = np.stack([at[:-1], at[1:]], axis=1)
+    if d == 3:
+        aside = facets + across
+        both = np.concatenate([facets, aside], axis=1)
+        facets = np.concatenate([both[:, [0, 1, 2]], both[:, [2, 3, 1]]])
+    mesh = rectangle_mesh((6, 6)) if d == 2 else box_mesh((6, 6, 6))
+    still = np.zeros((1, *mesh.points.shape))
+    solution = Solution(mesh.points, mesh.cells, still, cut_facets=facets)
+    body, rules = body_of(case), Rules(body_of(case), 1 / 6)
+    one = Measured(solution, body, law_of(case), case, measured_cut(solution, body, rules))
+    record, _ = with_cut(SolveRecord("case", "any", 0, Status.SOLVED), one, rules)
+    whole = np.linalg.norm(way) if d == 2 else np.linalg.norm(np.cross(way, across))
+    entries = [(x.kind, x.unit, x.size) for x in record.regularisations]
+    if not what:
+        assert (entries, record.notes) == ([], {})
+        return
+    ((kind, unit, size),) = entries
+    assert (kind, unit) == (f"cut {what} at ends", "m" if d == 2 else "m²")
+    assert size == pytest.approx(abs(share - 1.0) * whole, rel=0.05)
+    assert f"{size:.3g} {unit} of it {what}" in record.notes[CUT]
 
 
 class Lifted:

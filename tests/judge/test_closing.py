@@ -67,11 +67,11 @@ def test_an_overlap_stands_in_every_record_warns_for_each_solver_and_is_drawn():
 @pytest.mark.parametrize("fall", [4.0, 8.0])
 def test_the_band_of_a_jump_believes_no_order_above_two(fall):
     """Two, for a normal distribution around the place, times what order two leaves of it: d/3."""
-    off = [4e-3 / fall**k for k in range(3)]
-    own = {k: moved((0.02 + off[k]) * normal(2), 4 + k, k, size=0.25 / 2**k) for k in range(3)}
+    off = [4e-3 / fall**k for k in range(4)]
+    own = {k: moved((0.02 + off[k]) * normal(2), 4 + k, k, size=0.25 / 2**k) for k in range(4)}
     (profile,) = examined(scene(), {"xfem": {0: own[0]}, "reference": own}).openings
     band = np.array(profile.curves[0].normal_band)
-    assert band == pytest.approx(2.0 * (off[1] - off[2]) / 3.0, rel=1e-6)
+    assert band == pytest.approx(2.0 * (off[2] - off[3]) / 3.0, rel=1e-6)
 
 
 def test_profiles_of_faces_that_touch_hold_their_pressures_with_the_band():
@@ -84,7 +84,7 @@ def test_profiles_of_faces_that_touch_hold_their_pressures_with_the_band():
         stated = ContactPressure(places, weights, np.broadcast_to(pressure, (1, 301)))
         return moved(0.0 * ALONG, 4 + level, level, size=0.25 / 2**level, contact=stated)
 
-    reference = {k: own(1.0 + 4e-3 / 2**k, k) for k in range(3)}
+    reference = {k: own(1.0 + 8e-3 / 2**k, k) for k in range(4)}  # the last three count
     solutions = {"xfem": {0: own(1.0 + along, 0)}, "reference": reference}
     (profile,) = examined(touching, solutions).openings
     known, xfem = profile.curves

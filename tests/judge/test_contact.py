@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scenes
+from judged_fields import judged
 
 from reference.exact import exact_of
 from verify.compare.body import body_of
@@ -27,17 +28,22 @@ STRAIN = [[-1e-3, 0.0], [0.0, -1e-3]]
 UNIFORM = 1e-3 / (1.3 * 0.4)  # E ε / ((1+ν)(1−2ν))
 
 
+def pressed_scene(cut=LINE):
+    """A square of hydrostatic strain with an inclined cut."""
+    return scenes.scene(
+        [cut], contact={"expected": "closed"},
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        exact={"solution": "linear", "parameters": {"matrix": STRAIN, "shift": [0.0, 0.0]}},
+    )  # fmt: skip
+
+
 def measured(pressure, known=None, slide=0.0, cut=LINE, turn=None, back=False):
     """Metrics of a stated pressure on an inclined cut through a square of hydrostatic strain.
 
     Against the exact one, or another that is `known`. Its facets are the straight line. A second
     output time has the faces `back`, as they are without a slide.
     """
-    scene = scenes.scene(
-        [cut], contact={"expected": "closed"},
-        supports=[{"where": "boundary", "displacement": "exact"}],
-        exact={"solution": "linear", "parameters": {"matrix": STRAIN, "shift": [0.0, 0.0]}},
-    )  # fmt: skip
+    scene = pressed_scene(cut)
     x = np.linspace(0.0, 1.0, 401)[:-1] + 1 / 800
     places = np.column_stack([x, 1 / 3 + x / 3])
     contact = ContactPressure(
@@ -83,6 +89,29 @@ def test_a_wave_shorter_than_elements_is_oscillation_and_an_offset_is_none():
     assert wave["contact_oscillation"].value == pytest.approx(0.2 / np.sqrt(2), rel=0.05)
     assert offset["contact_pressure"].value == pytest.approx(0.1, rel=1e-9)
     assert offset["contact_oscillation"].value < 1e-12
+
+
+def test_of_a_wave_longer_than_elements_what_its_mean_over_four_leaves_is_oscillation():
+    """The mean over two elements on either side, as far as the cut goes, in closed form."""
+    k = 2 * np.pi
+    found, _, _ = measured(lambda x: UNIFORM * (1.0 + 0.1 * np.sin(k * x)))
+    x, reach = np.linspace(0.0, 1.0, 2001), 0.2 / np.hypot(1.0, 1 / 3)
+    low, high = np.maximum(x - reach, 0.0), np.minimum(x + reach, 1.0)
+    left = np.sin(k * x) - (np.cos(k * low) - np.cos(k * high)) / k / (high - low)
+    assert found["contact_pressure"].value == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
+    oscillation = 0.1 * np.sqrt(np.mean(left**2))
+    assert found["contact_oscillation"].value == pytest.approx(oscillation, rel=0.02)
+    assert oscillation < 0.3 * found["contact_pressure"].value
+
+
+def test_a_solve_is_judged_by_the_pressure_of_the_exact_field():
+    _, _, solution = measured(lambda x: np.full_like(x, 1.01 * UNIFORM))
+    scene = pressed_scene()
+    record = judged(scene, {"xfem": {0: solution}}, exact_of(scene)).solves[0]
+    assert record.metric("contact_pressure").value == pytest.approx(0.01, rel=1e-9)
+    force = record.metric("contact_force")
+    assert force.value == pytest.approx(1.01 * force.reference, rel=1e-9)
+    assert force.reference == pytest.approx(UNIFORM * np.hypot(1.0, 1 / 3), rel=1e-9)
 
 
 def test_faces_that_slide_by_more_than_half_an_element_are_not_judged():

@@ -140,12 +140,14 @@ def test_who_is_handed_a_mesh_that_conforms_to_the_cut_pays_for_its_making():
 
 
 def test_the_pareto_front_has_only_what_nothing_beats():
+    """A later solve with an equal error is not beaten: errors decide that can be told apart."""
     points = work_points(
-        [*ladder("good", 0.4, 0.01), *ladder("bad", 0.8, 0.02), solve("best", 0, 0.01, 1.0)],
+        [*ladder("good", 0.4, 0.01), *ladder("bad", 0.8, 0.02), solve("best", 0, 0.01, 1.0),
+         solve("late", 0, 0.01, 2.0)],
         "energy_norm",
-    )
+    )  # fmt: skip
     front = [(p.solver, p.level) for p in pareto_front(points)]
-    assert front == [("good", 0), ("good", 1), ("good", 2), ("best", 0)]
+    assert front == [("good", 0), ("good", 1), ("good", 2), ("best", 0), ("late", 0)]
 
 
 def test_the_cut_grows_by_equal_lengths_to_the_whole():
