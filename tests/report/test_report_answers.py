@@ -137,6 +137,33 @@ def test_slivers_are_held_against_the_largest_epsilon_and_rows_without_slivers_a
     assert [curve.measure for curve in sliver_curves(unknown)] == ["error"]
 
 
+def test_a_sentence_hides_no_worse_solver():
+    """Of more than three solvers those that are not named are told by their worst number."""
+    names = ("xfem", "conforming", "snapping", "subdivision", "removal")
+    off = dict(zip(names, (4e-3, 1e-3, 2e-3, 5e-2, 3e-3), strict=True))
+    account = {"time": [0.0, 1.0], "total": [1.0, 1.0]}
+    drifts = [
+        solve(name, 0, None, metrics=[Metric("energy_drift", off[name], "1")], account=account)
+        for name in names
+    ]
+    said = answers([case("moving", *drifts)])[1].sentence
+    assert said.endswith("XFEM 0.0040; snapping 0.0020; subdivision 0.050; 2 more at most 0.0030.")
+    alone = [solve(f"my_{name}", 0, off[name]) for name in names]  # nothing to hold them against
+    said = answers([case("rest", *alone)])[0].sentence
+    assert said.endswith("; 2 more at most 0.050."), said
+    rows = [
+        case(f"s[{epsilon}]",
+             *(solve(name, 0, 0.01 * (1 + off[name] * (epsilon < 0.1) * 100),
+                     notes={CRITICAL_STEP: f"{1 - (epsilon < 0.1) * off[name]} s"})
+               for name in names),
+             row={"family": "s", "parameter": "epsilon", "value": epsilon})
+        for epsilon in (0.5, 1e-6)
+    ]  # fmt: skip
+    said = answers(rows)[2].sentence
+    assert "subdivision: error at most 6.00 times, critical step at least 0.950 times" in said
+    assert said.endswith("; 2 more: error at most 1.30 times, critical step at least 0.997 times.")
+
+
 def test_what_a_run_has_not_is_said_and_which_case_would_fill_it():
     found = answers([])
     assert [one.question for one in found] == ["Accuracy", "Energy", "Slivers", "Cost"]

@@ -79,6 +79,9 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
         missing = "No displacement error above round-off and above its uncertainty: a case whose "
         return Answer(question, missing + "reference is finer would tell.")
     parts = [_spread(name, own) for name, own in list(errors.items())[:_NAMED]]
+    if rest := list(errors.values())[_NAMED:]:
+        worst = max(max(_values(own)) for own in rest)
+        parts.append(f"{len(rest)} more at most {number(worst, 2)}")
     first = next(iter(errors.values()))
     example = sorted(first.items(), key=lambda one: one[1].value)[(len(first) - 1) // 2][0]
     return Answer(question, f"Error of the displacement: {'; '.join(parts)}.", example)
@@ -110,12 +113,15 @@ def energy(results: Sequence[CaseResult]) -> Answer:
     if not worst:
         return Answer("Energy", f"No energy was followed: a case in motion would tell.{left}")
     parts = []
-    for name in sorted(worst, key=lambda name: (name == BASELINE, worst[name][0].value))[:_NAMED]:
+    order = sorted(worst, key=lambda name: name == BASELINE)
+    for name in order[:_NAMED]:
         drift, where = worst[name]
         value, most = (number(drift.value + width, 2) for width in (0.0, drift.uncertainty))
         bounds = [f"at most {most}"] * (most != value) + [where] * (len(cases) > 1)
         inside = f" ({', '.join(bounds)})" if bounds else ""
         parts.append(f"{solver_title(name)} {value}{inside}")
+    if rest := [worst[name][0].value for name in order[_NAMED:]]:
+        parts.append(f"{len(rest)} more at most {number(max(rest), 2)}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
     said_of = f"Largest relative change of the total energy in {where}"
     return Answer("Energy", f"{said_of}: {'; '.join(parts)}.{left}")
@@ -129,13 +135,15 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
         return Answer("Slivers", missing)
     parts = []
     order = sorted(dict.fromkeys(c.solver for c in curves), key=lambda name: name == BASELINE)
-    for name in order[:_NAMED]:
-        own = [c for c in curves if c.solver == name]
+    rest = order[_NAMED:]
+    shown = {solver_title(name): [name] for name in order[:_NAMED]}
+    for title, names in {**shown, **({f"{len(rest)} more": rest} if rest else {})}.items():
+        own = [c for c in curves if c.solver in names]
         errors = [y for c in own if c.measure == "error" for _, y in c.places[1:]]
         steps = [y for c in own if c.measure != "error" for _, y in c.places[1:]]
         said = [f"error at most {number(max(errors), 3)} times"] if errors else []
         said += [f"critical step at least {number(min(steps), 3)} times"] if steps else []
-        parts.append(f"{solver_title(name)}: {', '.join(said)}")
+        parts.append(f"{title}: {', '.join(said)}")
     least = min(x for c in curves for x, _ in c.places)
     families = len({c.family for c in curves})
     where = f"{families} famil{'y' if families == 1 else 'ies'}"
