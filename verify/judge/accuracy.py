@@ -354,6 +354,8 @@ def _defect(scene: Scene, one: Measured) -> str:
         return f"the solution lies up to {one.motion.off_surface:.3g} m off the surface of the body"
     if (outside := one.outside) > _COVERED:
         return f"{outside:.4g} of the volume of the solution lies outside the body"
+    if (twice := one.twice) > _COVERED:
+        return f"{twice:.4g} of the volume of the solution is there twice, and so much is missing"
     duration = scene.analysis.duration
     if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
         return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"
