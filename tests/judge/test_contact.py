@@ -144,6 +144,25 @@ def test_faces_of_a_curved_cut_slide_as_far_though_its_facets_are_off_it():
     assert slid["contact_slip"].value == pytest.approx(0.7, rel=1e-2)
 
 
+def test_a_pressure_of_a_part_of_the_cut_or_beside_it_is_not_judged():
+    """Left out are the places where it is wrong, so that those stated have no error."""
+    _, _, solution = measured(lambda x: np.full_like(x, UNIFORM))
+    body = body_of(scenes.scene([LINE]))
+    rule = Rules(body, 0.1).on_cuts()
+    known = SimpleNamespace(pressures=[lambda at, _: np.full(len(at), UNIFORM)], resultants=[])
+    some, beside = (replace(solution.contact, **change) for change in (
+        {"points": solution.contact.points[:100], "weights": solution.contact.weights[:100],
+         "pressure": solution.contact.pressure[:, :100]},
+        {"points": solution.contact.points + np.array([0.0, 0.3])},
+    ))  # fmt: skip
+    for stated, said in ((some, "of 0.2635 m of cuts; expected 1.054"), (beside, "m off the cuts")):
+        lying = replace(solution, contact=stated)
+        found, notes = contact_metrics(lying, SolutionMotion(lying, body), rule, known, 0.1)
+        assert found == []
+        assert set(notes) > {"contact_pressure", "contact_force"}
+        assert said in notes["contact_pressure"]
+
+
 def test_half_of_the_faces_together_is_half_the_extent_and_a_stated_pressure_is_a_truth():
     half, _, solution = measured(lambda x: np.where(x < 0.5, UNIFORM, 0.0))
     length = np.hypot(1.0, 1 / 3)

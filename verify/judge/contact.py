@@ -30,6 +30,7 @@ Pressure = Callable[[Array, float], Array]  # at points (n, d) and a time, Pa
 _PRESSED = 1e-3  # of the mean pressure (the largest may be at a tip): where more, faces touch
 _AROUND = 2.0  # elements over which the oscillation is told from the error
 _ORDER_OF_EXTENT = 1.0  # faces touch or not: the end of a zone is known to a facet
+_ENDS = 2.0  # elements: so much longer or shorter, or so far off, may a realised cut be
 _MOST_SLIP = 0.5  # of an element: a face meets the face that it was cut from
 
 
@@ -158,13 +159,15 @@ def contact_metrics(
     contact = solution.contact
     if contact is None or not len(contact.weights):
         return [], {CONTACT_ERRORS[0]: "the solver states no pressure of contact"}
+    names = ("contact_extent", "contact_force")
+    if defect := _elsewhere(contact, rule, size):
+        return [], dict.fromkeys((*CONTACT_ERRORS, *names), defect)
     slip = _slip(solution, motion, rule, turns) / size
     metrics = [Metric("contact_slip", slip, "1")]
     if slip >= _MOST_SLIP:
         why = f"faces slide by {slip:.2g} elements; contact is of less than {_MOST_SLIP:g}"
-        return metrics, dict.fromkeys((*CONTACT_ERRORS, "contact_extent", "contact_force"), why)
+        return metrics, dict.fromkeys((*CONTACT_ERRORS, *names), why)
     own = _resultants(contact.pressure[-1], contact.weights)
-    names = ("contact_extent", "contact_force")
     units = ("m", "N/m") if solution.dimension == 2 else ("m²", "N")
     if truth is None:
         return [*metrics, *map(Metric, names, own, units)], {}
@@ -176,6 +179,20 @@ def contact_metrics(
         metrics.append(Metric(name, value, unit, values[-1], width, truth.source))
     errors, notes = _errors(solution, contact, truth, size)
     return metrics + errors, notes
+
+
+def _elsewhere(contact: ContactPressure, rule: CutRule, size: float) -> str:
+    """Say if a solver states its pressure not on the cuts, or not on all of them; else nothing.
+
+    An end may be an element off. What is left out would have no error.
+    """
+    stated, asked = float(contact.weights.sum()), float(rule.weights.sum())
+    space = rule.points.shape[1] == 3
+    if abs(stated - asked) > _ENDS * size * (asked**0.5 if space else 1.0):
+        unit = "m²" if space else "m"
+        return f"pressures are stated of {stated:.4g} {unit} of cuts; expected {asked:.4g}"
+    away = float(cKDTree(rule.points).query(contact.points)[0].max())
+    return f"pressures are stated up to {away:.4g} m off the cuts" if away > _ENDS * size else ""
 
 
 def _errors(
