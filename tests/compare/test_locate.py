@@ -115,9 +115,11 @@ def turned(points):
 SLIVER = layered(9, [lambda x: np.full_like(x, 0.5), lambda x: np.full_like(x, 0.5 + 3e-11)])[:2]
 
 
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("mesh", [grid(7, 5), cube(), SLIVER], ids=["2D", "3D", "thin"])
-def test_on_facets_and_edges_the_cell_is_one_that_lies_towards_near(mesh):
+def test_on_facets_and_edges_the_cell_is_one_that_lies_towards_near(mesh, seed, monkeypatch):
     """A layer thinner than round-off of the search lies between two others as well."""
+    monkeypatch.setitem(globals(), "RNG", np.random.default_rng(seed))
     points, cells = turned(mesh[0]), mesh[1]
     d = points.shape[1]
     field = SolutionField(solution(points, cells, np.zeros_like(points)))

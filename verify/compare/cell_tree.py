@@ -230,6 +230,18 @@ def allowed(wish, side):
 
 
 @njit(inline="always")
+def _is_beside(x, corners, axes, tolerance):
+    """Tell whether `x` is out of the box of a simplex: planes of a thin one are near far points."""
+    for a in axes:
+        low = up = corners[0, a]
+        for corner in range(1, corners.shape[0]):
+            low, up = min(low, corners[corner, a]), max(up, corners[corner, a])
+        if x[a] < low - tolerance or x[a] > up + tolerance:
+            return True
+    return False
+
+
+@njit(inline="always")
 def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, stack, root):
     """Find the cell below a node that holds `x`, on the side of `direction` if several do, or -1.
 
@@ -264,6 +276,8 @@ def _containing(x, direction, sided, wish, searched, sides, tolerance, axes, sta
                 continue
             if depth > tolerance:
                 return cell, depth, node
+            if _is_beside(x, corners[cell], axes, tolerance):
+                continue
             on_side = not sided
             if sided:
                 towards = 0.0
