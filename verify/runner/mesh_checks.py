@@ -43,6 +43,8 @@ _SHORTEST = 1e-4  # of the body: the reference puts one facet on a shorter cut, 
 _ALONG = 40  # samples of a line inside the bounding box of the body
 _NEAR = 1e-6  # of the body: on its boundary, not inside it
 _JUMP = 1e-6  # of the largest displacement of a support: an initial field in seven digits is none
+# of a formula in time: steps that are looked at, how many of them closely, and how closely
+_LOOKS, _FASTEST, _HALVINGS = 257, 4, 40
 _METRES = 100.0  # times the body: a cut as large is not in metres, or the body is not
 
 
@@ -115,6 +117,8 @@ def check_supports_do_not_jump(scene: Scene, mesh: SimplexMesh, exact: Any) -> N
             for (last, _), (time, _) in pairwise(support.history or ())
             if time - last <= CLOSE * end  # for every solver these are one time
         }
+        if support.timed:
+            before |= _leaps(motion, end)
         before[0.0] = motion.at(0.0, before=True) if start is None else start[:, held]
         times = [*scene.analysis.output_times, *before]
         largest = max(np.abs(motion.at(time)).max(initial=0.0) for time in times)
@@ -127,6 +131,25 @@ def check_supports_do_not_jump(scene: Scene, mesh: SimplexMesh, exact: Any) -> N
                     "leads there in some time, from the initial state on",
                     str(scene.file or scene.name),
                 )
+
+
+def _leaps(motion: PrescribedMotion, end: float) -> dict[float, Array]:
+    """Places before and times after the fastest changes of a formula, each looked at closely.
+
+    Of a jump all is left between times that are halved so often, of what is steep next to nothing.
+    """
+    times = np.linspace(0.0, end, _LOOKS)
+
+    def change(one: tuple[float, float]) -> float:
+        return float(np.abs(motion.at(one[1]) - motion.at(one[0])).max(initial=0.0))
+
+    found = {}
+    for pair in sorted(pairwise(times.tolist()), key=change)[-_FASTEST:]:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (pair[0] + pair[1])
+            pair = max((pair[0], middle), (middle, pair[1]), key=change)
+        found[pair[1]] = motion.at(pair[0])
+    return found
 
 
 def _initial(scene: Scene, points: Array, exact: Any) -> Array | None:
