@@ -206,11 +206,11 @@ class PrescribedNodes:
             found[np.ix_(nodes, components)] = one.values(factor, time)
         return found
 
-    def velocities(self, time: float) -> Array:
-        """Compute velocities (n, d), m/s, after a kink; zero where nothing is held."""
+    def velocities(self, time: float, before: bool = False) -> Array:
+        """Compute velocities (n, d), m/s, after a kink or before; zero where nothing is held."""
         found = np.zeros(self.held.shape)
         for nodes, components, one in self.supports:
-            found[np.ix_(nodes, components)] = one.velocities(time)
+            found[np.ix_(nodes, components)] = one.velocities(time, before)
         return found
 
 
@@ -510,7 +510,8 @@ class _Work:
         Three times Richardson's (Roache's factor of safety), from steps of twice and four times the
         length. The order is observed on all of them together: at most the 4 of Hermite's cubic, and
         near zero for a motion that output times do not resolve. A step without a neighbour to
-        double it has the largest width of all.
+        double it has the largest width of all. With a kink inside a step its change is counted as
+        of the first order, and as all its own.
         """
         first, second, fourth = (self._picks(stride) for stride in (1, 2, 4))
         done, twice = _since(steps), _since(self.steps(2))
@@ -527,6 +528,10 @@ class _Work:
         width = np.full(len(first) - 1, each.max())
         for start, one in zip(second[pairs], each, strict=True):
             width[start : start + 2] = one
+        kinked = [bool(self._inner(a, b)) for a, b in pairwise(self.solution.times)]
+        for start, one in zip(second[pairs], change[pairs], strict=True):
+            own = start + np.flatnonzero(kinked[start : start + 2])
+            width[own] = np.maximum(width[own], _SAFETY * one)
         return width
 
     @property
@@ -554,14 +559,25 @@ class _Work:
 
     def _between(self, first: int, last: int) -> float:
         """Sum the work between two output times, J, including jumps at their ends."""
-        times = self.solution.times
-        same = _SAME_TIME * float(np.ptp(times))
-        a, b = float(times[first]), float(times[last])
-        inner = sorted(t for t in set(self._knots) if a + same < t < b - same)
+        a, b = (float(self.solution.times[i]) for i in (first, last))
         done = 0.0
-        for start, end in pairwise([a, *inner, b]):
+        for start, end in pairwise([a, *self._inner(a, b), b]):
             done += self._smooth(first, last, start, end)
         return done
+
+    def _inner(self, start: float, end: float) -> list[float]:
+        """Find the times of kinks between two times, s."""
+        same = _SAME_TIME * float(np.ptp(self.solution.times))
+        return sorted(t for t in set(self._knots.tolist()) if start + same < t < end - same)
+
+    @cached_property
+    def _leaps(self) -> dict[float, Array]:
+        """Velocities (n, d) that the body takes up at once, by kinks of its supports, m/s."""
+        nodes, found = self.nodes, {}
+        for t in set(nodes.knots):
+            given = nodes.velocities(t) - nodes.velocities(t, before=True)
+            found[t] = taken_up(self.mass, nodes.follows, np.zeros_like(given), given)
+        return found
 
     def _smooth(self, first: int, last: int, start: float, end: float) -> float:
         """Integrate the work in a part of an interval without kinks, with jumps at its ends, J.
@@ -604,17 +620,26 @@ class _Work:
         return bool(np.abs(np.array(kinks) - time).min() <= near)
 
     def _state(self, first: int, last: int, time: float) -> tuple[Array, Array]:
-        """Interpolate displacements and velocities (n, d) at a time by Hermite's cubic."""
+        """Interpolate displacements and velocities (n, d) at a time by Hermite's cubic.
+
+        At kinks between the output times velocities leap; what is left of them is smooth.
+        """
         solution, held = self.solution, self.nodes.follows
         assert solution.velocity is not None
         ends = [first, last]
         for one in ends:
             if abs(time - solution.times[one]) <= 1e-12 * np.ptp(solution.times[ends]):
                 return solution.displacement[one], solution.velocity[one]
-        cubic = CubicHermiteSpline(
-            solution.times[ends], solution.displacement[ends], solution.velocity[ends]
-        )
+        at, us, vs = solution.times[ends], solution.displacement[ends], solution.velocity[ends]
+        leaps = [(t, self._leaps[t]) for t in self._inner(*at) if t in self._leaps]
+        for t, leap in leaps:
+            us[1] -= (at[1] - t) * leap
+            vs[1] -= leap
+        cubic = CubicHermiteSpline(at, us, vs)
         u, v = cubic(time), cubic(time, 1)
+        for t, leap in leaps:
+            if time >= t:
+                u, v = u + (time - t) * leap, v + leap
         u[held] = self.nodes.values(time)[held]
         v[held] = self.nodes.velocities(time)[held]
         return u, v
