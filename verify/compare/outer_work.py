@@ -622,7 +622,7 @@ class _Work:
     def _state(self, first: int, last: int, time: float) -> tuple[Array, Array]:
         """Interpolate displacements and velocities (n, d) at a time by Hermite's cubic.
 
-        At kinks between the output times velocities leap; what is left of them is smooth.
+        At kinks between the output times velocities leap; without these leaps they are smooth.
         """
         solution, held = self.solution, self.nodes.follows
         assert solution.velocity is not None

@@ -136,7 +136,7 @@ def check_supports_do_not_jump(scene: Scene, mesh: SimplexMesh, exact: Any) -> N
 def _leaps(motion: PrescribedMotion, end: float) -> dict[float, Array]:
     """Places before and times after the fastest changes of a formula, each looked at closely.
 
-    Of a jump all is left between times that are halved so often, of what is steep next to nothing.
+    Between times that are halved so often a jump is all left, a steep slope next to nothing.
     """
     times = np.linspace(0.0, end, _LOOKS)
 
