@@ -51,6 +51,23 @@ def test_at_every_moment_the_growing_cut_is_the_cut_made_at_once(mesh, paths) ->
         assert one == pytest.approx(other, rel=1e-12)
 
 
+def test_random_strokes_are_at_every_moment_the_cuts_made_at_once():
+    rng, split = np.random.default_rng(32), 0
+    meshes = rectangle_mesh((9, 8), diagonal="alternating"), box_mesh((3, 4, 3))
+    for mesh in [*meshes] * 4:
+        cutter, space = SemiProgressiveCutter(mesh), mesh.space
+        for begin in (0.0, 2.0, 4.0):
+            tips = rng.uniform(-0.2, 1.2, (3, space))
+            tips[:, 2:] = 1.1  # above the block, its other end at any depth
+            blade = np.append(rng.uniform(-0.2, 0.2, 2), -rng.uniform(0.4, 1.4))
+            times = begin + np.arange(3.0)
+            cutter.begin(ToolPath.of_tip(tips, times, None if space == 2 else blade))
+            for time in np.linspace(times[0], times[-1], 5):
+                split += cutter.advance(time) is not None
+                assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts))
+    assert split > 60
+
+
 def test_delay_is_element_size_over_tool_speed() -> None:
     # crossing elements of size h at speed v takes a time in proportion to h / v (Table 4.6): a
     # horizontal cut through the middle of a row of right triangles passes h / 2 in each
