@@ -206,6 +206,15 @@ def _has_a_region(scene: Scene, solve: SolveRecord) -> bool:
     return any(set(str(part.get("where") or "")) & set("<>") for part in parts)
 
 
+def _support_may_jolt(scene: Scene, solve: SolveRecord) -> bool:
+    """Whether a support is drawn by a history or a formula in time, which may have a kink."""
+    drawn = (
+        one.get("history") or re.search(r"\bt\b", str(one.get("displacement")))
+        for one in scene.get("supports") or []
+    )
+    return _moves(scene, solve) and any(drawn)
+
+
 def _left_a_piece(scene: Scene, solve: SolveRecord) -> bool:
     """Whether a piece within round-off went to the other half; virtual nodes do not state it."""
     stated = any("left to its neighbour" in one.kind for one in solve.regularisations)
@@ -263,6 +272,13 @@ CHANGES = (
         "a piece that the solver left to the other half is read on that half; it was read on the "
         "side of the cut where it lies",
         _left_a_piece,
+    ),
+    Change(
+        5,
+        ("energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch"),
+        "what material takes up at once where the speed of a support jumps between outputs is "
+        "apart from the integral of its work; it was in it",
+        _support_may_jolt,
     ),
 )  # fmt: skip
 REVISION = max(change.revision for change in CHANGES)

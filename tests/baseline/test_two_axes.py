@@ -239,3 +239,15 @@ def test_a_change_of_meaning_concerns_only_what_it_names(scene, metric, lateral,
     solve = replace(runs.solve(), cut=cut or None)
     assert len(list(changes_of(metric, scene, solve, 1, 2))) == count
     assert not list(changes_of(metric, scene, solve, 2, 2))
+
+
+@pytest.mark.parametrize(("support", "count"), [
+    ({"displacement": [0.0, 0.1], "history": [[0.0, 0.0], [0.3, 1.0]]}, 1),
+    ({"displacement": ["abs(t - 0.3)", 0.0]}, 1),
+    ({"displacement": [0.0, "0.1*cos(x)"]}, 0),  # at rest: no work
+])  # fmt: skip
+def test_the_account_of_a_body_that_supports_draw_has_another_meaning(support, count):
+    moving = {"analysis": {"kind": "dynamic"}, "supports": [support]}
+    assert len(list(changes_of("energy_drift", moving, runs.solve(), 4, 5))) == count
+    assert not list(changes_of("displacement_l2", moving, runs.solve(), 4, 5))
+    assert not list(changes_of("energy_drift", {"supports": [support]}, runs.solve(), 4, 5))
