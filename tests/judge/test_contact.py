@@ -81,6 +81,15 @@ def test_a_true_pressure_has_no_error_and_its_extent_and_force_are_those_of_the_
     assert found["contact_slip"].value < 1e-12
 
 
+def test_a_pressure_that_is_off_alike_at_two_outputs_is_off_as_much_as_at_one():
+    once, twice = (
+        measured(lambda x: np.full_like(x, 1.07 * UNIFORM), back=back)[0]["contact_pressure"]
+        for back in (False, True)
+    )
+    assert once.value == pytest.approx(0.07, rel=1e-9)
+    assert twice.value == pytest.approx(0.07, rel=1e-9)
+
+
 def test_a_wave_shorter_than_elements_is_oscillation_and_an_offset_is_none():
     """A sine of half an element is all oscillation: its mean over two elements is small."""
     wave, _, _ = measured(lambda x: UNIFORM * (1 + 0.2 * np.sin(2 * np.pi * x / 0.05)))

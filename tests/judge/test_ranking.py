@@ -87,6 +87,8 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
     assert by["y"]["regularisations"] == {"node moved": 3}
     assert (by["z"]["timeout"], by["z"]["inside_out"]) == (1, 1)
     assert by["x"]["refused"] == 1
+    (alone,) = rank_solvers([case_of("a", solves[:2])])["stability"]
+    assert (alone["rank"], alone["tied"]) == (1, False)
 
 
 def moved(case, solver, drift):

@@ -9,6 +9,7 @@ import pytest
 
 from verify.compare.body import body_of
 from verify.judge.convergence import (
+    counted_order,
     error_fall,
     extrapolate,
     field_uncertainty,
@@ -24,6 +25,14 @@ H = [0.4, 0.2, 0.1, 0.05]
 
 def rate(errors, widths=(0.0,) * 4, sizes=H):
     return observed_rate("xfem", "energy_norm", sizes, errors, widths[: len(errors)])
+
+
+def test_on_a_way_of_a_blade_the_root_of_h_is_counted_on_whatever_the_elements():
+    """The stress at its tip grows as 1/√r, wherever that is in the mesh: energy norm ∝ √h."""
+    for order in (1, 2):
+        solution = SimpleNamespace(order=order)
+        assert counted_order(load_scene("benchmark/c5_blade_03"), solution) == 0.5
+        assert counted_order(load_scene("statics/f3_inclined"), solution) == order
 
 
 def test_a_power_law_has_its_order_without_uncertainty():

@@ -14,7 +14,7 @@ from verify.compare.body import body_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import hooke, law_of
 from verify.errors import InputError, UnsupportedSceneError
-from verify.judge.notices import unavailable_quantities
+from verify.judge.notices import ringing_factors, unavailable_quantities
 from verify.judge.quantities import Measured, unit_of
 from verify.judge.reference import conforming_reference, exact_reference
 from verify.judge.stress_intensity import exact_intensity, solution_intensity
@@ -48,6 +48,27 @@ JUMP = [{"kind": "body_force", "force": [0, 1], "history": [[1, 0], [1, 1]]}]
 # before a wave comes, K is as it was: 0.0024, read as 0.0040 and 0.0093 by two solvers
 PRESSED_LATER = [{"kind": "cut_faces", "pressure": 1.0, "history": [[0.5, 0.2], [0.5, 1.0]]}]
 MOTION = {"kind": "dynamic", "duration": 1.0, "outputs": 5}
+
+
+def test_factors_ring_where_steps_are_short_beside_a_wave_across_an_element():
+    """Pressure waves run at √((λ + 2μ)/ρ), in plane strain with ν = 0.3 at 1.16 √(E/ρ)."""
+    content = load_scene("statics/griffith_inside").model_dump(by_alias=True)
+    content["material"] |= {"young": 4.0, "poisson": 0.3, "density": 1.0, "plane": "strain"}
+    content |= {"acceptance": [], "exact": None, "reference": {}, "analysis": MOTION}
+    content |= {"quantities": ASKED[:1], "supports": [{"where": "bottom", "displacement": [0, 0]}]}
+    moving = Scene.model_validate(content)
+    across = 0.1 / (2.0 * np.sqrt(0.7 / (1.3 * 0.4)))
+
+    def said(step, scene=moving):
+        steps = SimpleNamespace(size=0.1, iterations={"steps": 1.0 / step})
+        return ringing_factors(scene, {1: steps})
+
+    (warned,) = said(0.24 * across)
+    assert f"is 0.24 of the time in which a pressure wave crosses its elements, {across:.3g} s" in (
+        warned.text
+    )
+    assert not said(0.26 * across)
+    assert not said(0.24 * across, griffith())  # at rest
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from cut_meshes import STRAIGHT, scene
 
+from verify.judge.checks import result_of
 from verify.judge.intervals import error_interval
 from verify.judge.verdict import judge
-from verify.result import Metric, Rate, SolveRecord, Status, Verdict
+from verify.result import Metric, Rate, ReferenceRecord, SolveRecord, Status, Verdict
+from verify.scene import Scene
 
 
 def solve(level, value, width=0.0, solver="xfem", metric="energy_norm", reference=None, size=None):
@@ -384,6 +386,14 @@ def test_an_exact_energy_release_rate_is_the_most_that_is_taken(levels, expected
     (found,) = judge(scene([STRAIGHT]), records, ())
     assert found.verdict is expected
     assert judge(scene([STRAIGHT]), records, (), judge_only=("conforming",)) == []
+
+
+def test_a_result_holds_its_scene_as_a_file_states_it():
+    """Names as in case files: whoever reads the result later can make the scene again."""
+    own = scene([STRAIGHT])
+    found = result_of(own, ReferenceRecord(), [])
+    assert found.scene["schema"] == 1
+    assert Scene.model_validate(found.scene) == own
 
 
 def test_an_excess_can_be_listed_as_known():

@@ -82,7 +82,7 @@ def _defect_in_time(scene: Scene, asked: FractureQuantity) -> str | None:
     if duration is None:
         return None
     slack, time = _SAME_TIME * duration, _time(scene, asked)
-    opens = float(getattr(_asked_cut(scene, asked), "opens_at", 0.0))
+    opens = _asked_cut(scene, asked).opens_at
     still_closed = "closed" if opens > 0.0 or time == 0.0 else ""
     if scene.analysis.damping[1]:
         return (
