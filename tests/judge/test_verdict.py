@@ -389,7 +389,7 @@ def test_an_exact_energy_release_rate_is_the_most_that_is_taken(levels, expected
 
 
 def test_a_result_holds_its_scene_as_a_file_states_it():
-    """Names as in case files: whoever reads the result later can make the scene again."""
+    """Names as in case files: the scene can be made from the result again."""
     own = scene([STRAIGHT])
     found = result_of(own, ReferenceRecord(), [])
     assert found.scene["schema"] == 1
