@@ -101,7 +101,7 @@ def test_a_wave_shorter_than_elements_is_oscillation_and_an_offset_is_none():
 
 
 def test_of_a_wave_longer_than_elements_what_its_mean_over_four_leaves_is_oscillation():
-    """The mean over two elements on either side, as far as the cut goes, in closed form."""
+    """The mean over two elements on either side, up to the ends of the cut, in closed form."""
     k = 2 * np.pi
     found, _, _ = measured(lambda x: UNIFORM * (1.0 + 0.1 * np.sin(k * x)))
     x, reach = np.linspace(0.0, 1.0, 2001), 0.2 / np.hypot(1.0, 1 / 3)

@@ -59,16 +59,16 @@ def test_factors_ring_where_steps_are_short_beside_a_wave_across_an_element():
     moving = Scene.model_validate(content)
     across = 0.1 / (2.0 * np.sqrt(0.7 / (1.3 * 0.4)))
 
-    def said(step, scene=moving):
+    def warnings(step, scene=moving):
         steps = SimpleNamespace(size=0.1, iterations={"steps": 1.0 / step})
         return ringing_factors(scene, {1: steps})
 
-    (warned,) = said(0.24 * across)
+    (warned,) = warnings(0.24 * across)
     assert f"is 0.24 of the time in which a pressure wave crosses its elements, {across:.3g} s" in (
         warned.text
     )
-    assert not said(0.26 * across)
-    assert not said(0.24 * across, griffith())  # at rest
+    assert not warnings(0.26 * across)
+    assert not warnings(0.24 * across, griffith())  # at rest
 
 
 @pytest.mark.parametrize(
@@ -371,7 +371,7 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field_and_found_at
 
 @pytest.mark.parametrize("degrees", [20.0, 131.0])
 def test_the_energy_at_a_straight_front_is_that_of_sihs_densities_within_its_half_width(degrees):
-    """The density is S(θ)/r, so that ∫ S R dθ is that of a slice that ends at R(θ); to 1e-4.
+    """The density is S(θ)/r, so that a slice which ends at R(θ) has ∫ S R dθ; to 1e-4.
 
     G. C. Sih, Int. J. Fract. 10 (1974), eq. 5, with 16 πμ S in place of k = K/√π.
     """
