@@ -80,7 +80,7 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
         return Answer(question, missing + "reference is finer would tell.")
     parts = [_spread(name, own) for name, own in list(errors.items())[:_NAMED]]
     if rest := list(errors.values())[_NAMED:]:
-        worst = max(max(_values(own)) for own in rest)
+        worst = max(one.high for own in rest for one in own.values())
         parts.append(f"{len(rest)} more at most {number(worst, 2)}")
     first = next(iter(errors.values()))
     example = sorted(first.items(), key=lambda one: one[1].value)[(len(first) - 1) // 2][0]
@@ -120,7 +120,7 @@ def energy(results: Sequence[CaseResult]) -> Answer:
         bounds = [f"at most {most}"] * (most != value) + [where] * (len(cases) > 1)
         inside = f" ({', '.join(bounds)})" if bounds else ""
         parts.append(f"{solver_title(name)} {value}{inside}")
-    if rest := [worst[name][0].value for name in order[_NAMED:]]:
+    if rest := [d.value + d.uncertainty for d, _ in (worst[name] for name in order[_NAMED:])]:
         parts.append(f"{len(rest)} more at most {number(max(rest), 2)}")
     where = min(cases) if len(cases) == 1 else f"{len(cases)} cases in motion"
     said_of = f"Largest relative change of the total energy in {where}"
@@ -135,9 +135,10 @@ def slivers(results: Sequence[CaseResult]) -> Answer:
         return Answer("Slivers", missing)
     parts = []
     order = sorted(dict.fromkeys(c.solver for c in curves), key=lambda name: name == BASELINE)
-    rest = order[_NAMED:]
     shown = {solver_title(name): [name] for name in order[:_NAMED]}
-    for title, names in {**shown, **({f"{len(rest)} more": rest} if rest else {})}.items():
+    if rest := order[_NAMED:]:
+        shown[f"{len(rest)} more"] = rest
+    for title, names in shown.items():
         own = [c for c in curves if c.solver in names]
         errors = [y for c in own if c.measure == "error" for _, y in c.places[1:]]
         steps = [y for c in own if c.measure != "error" for _, y in c.places[1:]]
