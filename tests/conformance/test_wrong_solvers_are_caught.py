@@ -72,6 +72,7 @@ def forked():
         ("TakesOnePoissonRatio", "two-materials", "displacement off by"),
         ("MisstatesTheEnergyByAThousandth", "energy-account", "ledger"),
         ("HalvesTheStiffness", "traction", "displacement off by 1.0"),
+        ("ForgetsACell", "traction", "the cells do not cover the body once"),
         ("TakesTheWrongDensity", "weight", "Galerkin"),
         ("StretchesWhatTurns", "rigid-rotation-2d", "displacement off by"),
         ("LinearisesFiniteRotation", "finite-rotation-2d", "displacement off by"),

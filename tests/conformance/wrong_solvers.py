@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from verify.compare.hooke import hooke, strain_energy
+from verify.compare.simplices import simplices
 from verify.result import Regularisation
 from verify.solvers.xfem import XfemSolver
 
@@ -218,6 +219,30 @@ class OverstatesVelocities(XfemSolver):
         if solution.velocity is None:
             return solution
         return replace(solution, velocity=1.1 * solution.velocity)
+
+
+class ForgetsACell(XfemSolver):
+    """Lacks its smallest cell; as much of the largest one is there twice."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        volume = simplices(solution.points, solution.cells).volume
+        small, large = volume.argmin(), volume.argmax()
+        cells, (a, b, *rest) = solution.cells.copy(), solution.cells[large]
+        cells[small] = a, len(solution.points), *rest
+        share = volume[small] / volume[large]
+
+        def with_one_more(nodal):
+            one = nodal[..., [a], :] + share * (nodal[..., [b], :] - nodal[..., [a], :])
+            return np.concatenate([nodal, one], axis=-2)
+
+        return replace(
+            solution,
+            points=with_one_more(solution.points),
+            displacement=with_one_more(solution.displacement),
+            cells=cells,
+            cell_sides=None,
+        )
 
 
 class LosesHorizontalTractions(XfemSolver):

@@ -183,7 +183,7 @@ def test_a_solution_of_another_body_is_not_measured_but_named():
     holes = np.concatenate([whole.cells[:125], whole.cells[:3]])  # three are twice there
     for points, cells, u, said in (
         (whole.points, whole.cells[:64], whole, "cover 0.5 of the body"),
-        (whole.points, holes, whole, "of the volume of the solution is there twice"),
+        (whole.points, holes, whole, "of the body is in no cell of the solution"),
         (whole.points + 3.0, whole.cells, whole, "1 of the volume of the solution lies outside"),
         (many.points + 0.3 * np.eye(2)[0], many.cells, many, "of the volume of the solution lies"),
     ):

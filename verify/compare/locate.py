@@ -18,6 +18,7 @@ from verify.compare.cell_tree import (
     axes_of,
     build_cell_tree,
     find_cells,
+    holding_cells,
     nearest_triangles,
     no_sides,
 )
@@ -359,6 +360,17 @@ class SolutionField:
         other = copy(self)
         other._set_nodal(displacement)
         return other
+
+    def missing(self, points: Array, weights: Array, off: float = 0.0) -> float:
+        """Share of the weights (n,) of points (n, d) of a body that lie in no cell.
+
+        They may lie `off` the cells of a membrane, in metres.
+        """
+        if self._across is not None:
+            away = self._on_surface(points)[1] > max(off, ROUND_OFF * self.scale)
+        else:
+            away = holding_cells(points, self._searched, ROUND_OFF * self.scale, nearest=False) < 0
+        return float(weights[away].sum() / weights.sum())
 
     def cells_at(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
         """Find the cell (n,) that holds each of `points` (n, d).

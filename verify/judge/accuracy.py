@@ -28,7 +28,7 @@ from verify.compare.errors import (
     spread_of,
 )
 from verify.compare.hooke import Law, law_of
-from verify.compare.locate import ROUND_OFF
+from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.motion import SolutionMotion
 from verify.compare.motion_account import motion_account
 from verify.compare.part_account import (
@@ -303,7 +303,7 @@ def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rule
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
     scene, reference = one.scene, held.reference
     record, other = with_cut(record, one, rules)
-    if defect := _defect(scene, one):
+    if defect := _defect(scene, one, rules):
         return _noted(record, _named(scene, defect))
     covered = one.coverage
     if abs(covered - 1) > 1e-9:
@@ -345,7 +345,7 @@ def _measure(record: SolveRecord, one: Measured, held: _HeldAgainst, rules: Rule
     return _noted(replace(record, metrics=metrics), notes)
 
 
-def _defect(scene: Scene, one: Measured) -> str:
+def _defect(scene: Scene, one: Measured, rules: Rules) -> str:
     """Say why a solution is of another body or of another time than the scene."""
     covered, times = one.coverage, one.solution.times
     if abs(covered - 1) > _COVERED:
@@ -354,8 +354,12 @@ def _defect(scene: Scene, one: Measured) -> str:
         return f"the solution lies up to {one.motion.off_surface:.3g} m off the surface of the body"
     if (outside := one.outside) > _COVERED:
         return f"{outside:.4g} of the volume of the solution lies outside the body"
-    if (twice := one.twice) > _COVERED:
-        return f"{twice:.4g} of the volume of the solution is there twice, and so much is missing"
+    rule, off = rules.one("body", COARSER[-1]), _ON_SURFACE * one.body.size
+    missing = SolutionField(one.solution).missing(rule.points, rule.weights, off)
+    if missing > _COVERED:
+        return (
+            f"{missing:.4g} of the body is in no cell of the solution; as much is there twice"
+        )
     duration = scene.analysis.duration
     if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
         return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"

@@ -15,7 +15,7 @@ from verify.compare.body import AnyBody
 from verify.compare.cut_deviation import RealisedCut
 from verify.compare.cut_profile import cut_place, opening, point_displacement
 from verify.compare.hooke import Law, strain_energy
-from verify.compare.locate import Field, SolutionField
+from verify.compare.locate import Field
 from verify.compare.motion import SolutionMotion, step_at
 from verify.compare.part_account import part_quantity, part_unit
 from verify.compare.simplex_bodies import MembraneBody
@@ -97,19 +97,6 @@ class Measured:
         some = slice(None, None, 1 + len(shape.volume) // _LOOKED_AT)
         inside, volume = self.body.inside(shape.corners[some].mean(axis=1)), shape.volume[some]
         return float(volume[~inside].sum() / volume.sum())
-
-    @property
-    def twice(self) -> float:
-        """Share of the volume of the cells whose centres lie in other cells too.
-
-        As much of the body is in no cell, if all of it is covered by volume. Of many cells, some
-        are looked at.
-        """
-        shape = cells_of(self.solution)
-        some = np.arange(0, len(shape.volume), 1 + len(shape.volume) // _LOOKED_AT)
-        holds = SolutionField(self.solution).cells_at(shape.corners[some].mean(axis=1))
-        volume = shape.volume[some]
-        return float(volume[holds != some].sum() / volume.sum())
 
     def quantity(self, asked: Quantity) -> float:
         """Value of a quantity of interest, in the unit that `unit_of` gives.
