@@ -8,7 +8,7 @@ forces were in balance: momentum is kept, and no acceleration jumps.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from reference.boundary_conditions import load_forces, nodes_on_part
 from reference.contact import FaceContact, TurningContact
-from reference.large_strain import solve_large_strain
-from reference.law import energy_of, law_of, mass_matrix
+from reference.inside_out import OrientationCheck
+from reference.large_strain import quadrature_points, solve_large_strain
+from reference.law import ENERGIES, energy_of, law_of, mass_matrix
 from reference.linear_solvers import Kind
 from reference.meshing import ConformingMesh, open_cut
 from reference.nodal_algebra import NodalMatrix, NodalSolver, TiedSolver
@@ -319,6 +320,23 @@ class MovingBody:
         node, component = np.divmod(self.held, d)
         at = np.searchsorted(found, self.ties.leader[node] * d + component)
         self._holder = self._own_held[first[at]]
+
+    @cached_property
+    def _orientation(self) -> OrientationCheck:
+        held, points = self._own_held, quadrature_points(self.space)
+        return OrientationCheck(self.space, held, self.law.state.J, points, opening=True)
+
+    def orientation(self, displacement: Array) -> OrientationCheck:
+        """Return the check of det F, at a displacement (k,)."""
+        self.law.energy(displacement)
+        return self._orientation
+
+    def inside_out(self, displacement: Array) -> str:
+        """Say where a displacement (k,) is inside out though it must not be; "" if nowhere."""
+        if self.law.linear:
+            return ""
+        most = ENERGIES[energy_of(self.scene.material)].inverted
+        return self.orientation(displacement).fault(most)
 
     def external(self, time: float) -> Array:
         """Return the forces of all loads and ties at a time, N; after a jump there."""

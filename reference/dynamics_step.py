@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.dynamics_body import MovingBody
-from reference.inside_out import OrientationCheck, place_text
-from reference.large_strain import quadrature_points
+from reference.inside_out import place_text
 from reference.nodal_algebra import NodalSolver, TiedSolver
 from verify.errors import InputError
 
@@ -272,11 +271,7 @@ class Stepper:
 
     def _inside_out(self, start: State, a: Array) -> str:
         """Say where the end of a step is inside out, so that it has no energy."""
-        body = self.body
-        body.law.energy(self._end(start, a)[0])
-        points = quadrature_points(body.space)
-        held = np.asarray(body.held, dtype=np.int32)
-        found = OrientationCheck(body.space, held, body.law.state.J, points)()
+        found = self.body.orientation(self._end(start, a)[0])()
         return (
             f"the step from {start.time:.6g} s by {self.size:.6g} s is not solved: it would end "
             f"with det F = {found.least:.2g} at {place_text(found.place)}, inside out, where "

@@ -63,14 +63,21 @@ class OrientationCheck:
     determinant : ufl expression
     points : (q, d) array
         Quadrature points of the reference cell.
+    opening : bool
+        Whether cuts open on the way, so that any place of theirs may be a tip.
     """
 
     def __init__(
-        self, space: ConformingSpace, unknowns: NDArray[np.int32], determinant: Any, points: Array
+        self,
+        space: ConformingSpace,
+        unknowns: NDArray[np.int32],
+        determinant: Any,
+        points: Array,
+        opening: bool = False,
     ) -> None:
         from dolfinx import fem
 
-        self._space, self._unknowns = space, unknowns
+        self._space, self._unknowns, self._opening = space, unknowns, opening
         self._determinant = fem.Expression(determinant, points)
         domain = space.function_space.mesh
         here = np.flatnonzero(space.dolfinx_cell >= 0)
@@ -80,7 +87,10 @@ class OrientationCheck:
 
     @cached_property
     def _singular(self) -> Array:
-        return self._space.node_points[singular_nodes(self._space, self._unknowns)]
+        space = self._space
+        found = space.node_points[singular_nodes(space, self._unknowns)]
+        tips = space.mesh.realised_cut.reshape(-1, space.dimension)
+        return np.concatenate([found, tips]) if self._opening else found
 
     def __call__(self) -> Orientation:
         """Judge the displacement as it is; on all ranks together."""
@@ -107,6 +117,25 @@ class OrientationCheck:
         whole = float(space.measures.sum())
         said = "" if not where else f"det F is {lost:.2g} at {place_text(where)}"
         return Orientation(value, place, sum(shares) / whole, said)
+
+    def fault(self, most: float) -> str:
+        """Say where the displacement is inside out though it must not be; "" if nowhere.
+
+        Around singular places a share `most` of the body may be.
+        """
+        found = self()
+        if found.stray:
+            return (
+                f"{found.stray}, away from tips, corners and ends of supports: the body is turned "
+                "inside out there; expected det F > 0, so a smaller load or a finer mesh"
+            )
+        if found.share > most:
+            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
+            return (
+                f"{found.share:.2g} of the {part} is turned inside out, with a least det F of "
+                f"{found.least:.2g} at {place_text(found.place)}; at most {most:g} may be"
+            )
+        return ""
 
     def _worst(self, least: Array, among: Ints) -> tuple[float, tuple[float, ...]]:
         """Compute the least value of some cells, and the centroid of its cell."""

@@ -154,7 +154,7 @@ class StrainEquations:
         self._predict(values[self._at])
         if lost := self._solved() if self.faces is None else self._pressed(self.faces):
             return lost
-        if lost := self._inside_out():
+        if lost := self.orientation.fault(self._most_inverted):
             return lost
         return self._imbalance(stored, before, moved, is_short or rests)
 
@@ -237,23 +237,6 @@ class StrainEquations:
         self._force = float(np.sqrt(size)) + float(self._load.norm())
         self._factor = 1.0
         return self.advance(1.0, values)
-
-    def _inside_out(self) -> str:
-        """Say where a state is turned inside out that must not be; or nothing."""
-        found = self.orientation()
-        if found.stray:
-            return (
-                f"{found.stray}, away from tips, corners and ends of supports: the body is turned "
-                "inside out there; expected det F > 0, so a smaller load or a finer mesh"
-            )
-        if found.share > self._most_inverted:
-            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
-            return (
-                f"{found.share:.2g} of the {part} is turned inside out, with a least det F of "
-                f"{found.least:.2g} at {place_text(found.place)}; at most {self._most_inverted:g} "
-                "may be"
-            )
-        return ""
 
     def _judge(self, _snes: Any, iteration: int, norms: tuple[float, float, float]) -> Any:
         """Give PETSc's reason to end the iterations: balance up to round-off, or divergence."""

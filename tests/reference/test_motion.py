@@ -171,6 +171,23 @@ def test_a_body_that_its_supports_press_inside_out_is_an_error_that_names_place_
         solved(pressed(1.1, 0.1, 4))
 
 
+@pytest.mark.parametrize("cuts", [[], [polyline("inclined", [-0.1, 0.31], [0.62, 0.54])]])
+def test_a_body_that_flies_through_itself_is_an_error_that_names_place_and_time(cuts):
+    """Without stiffness det F = 1 − 20 t: the corotated energy has no barrier at zero."""
+    tissue = {"young": 1e-3, "poisson": 0.3, "plane": "strain", "density": 1000.0}
+    thrown = {"kind": "field", "velocity": ["-20 * x", 0.0]}
+
+    def flying(duration):
+        return moving(cuts, "corotational", duration, 3, material=tissue, initial=thrown)
+
+    until = solved(flying(0.048))
+    np.testing.assert_allclose(
+        until.displacement[-1], until.points * [-0.96, 0.0], rtol=0.0, atol=1e-5
+    )
+    with pytest.raises(RuntimeError, match=r"at 0\.06 s det F is -0\.2 at \(.*inside out"):
+        solved(flying(0.06))
+
+
 def test_a_corner_of_a_millionth_of_an_element_that_is_cut_off_on_the_way_is_solved():
     """The compliance of ties beside it is lost in round-off: then each opening factorises anew."""
     scene = load_scene("benchmark/c8_slivers_corner[epsilon=1e-06]")

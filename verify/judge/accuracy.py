@@ -357,9 +357,7 @@ def _defect(scene: Scene, one: Measured, rules: Rules) -> str:
     rule, off = rules.one("body", COARSER[-1]), _ON_SURFACE * one.body.size
     missing = SolutionField(one.solution).missing(rule.points, rule.weights, off)
     if missing > _COVERED:
-        return (
-            f"{missing:.4g} of the body is in no cell of the solution; as much is there twice"
-        )
+        return f"{missing:.4g} of the body is in no cell of the solution; as much is there twice"
     duration = scene.analysis.duration
     if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
         return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"

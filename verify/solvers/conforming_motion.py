@@ -245,6 +245,8 @@ class TiedMotion:
         """
         found = self.state.copy()
         linear = self.scene.analysis.kinematics == "linear"
+        if fault := self.body.inside_out(found.displacement):
+            raise RuntimeError(f"at {found.time:.6g} s {fault}")
         other = self.body.moves or self.scheme.alpha_m != self.scheme.alpha_f
         if linear and other and not self.begun:
             unbalanced = self._unbalanced(found.time)
