@@ -188,6 +188,47 @@ def test_a_program_that_cuts_elements_loads_and_holds_each_side_for_itself(d, pr
     assert ((near[held.any(axis=1)] @ drawn.across < drawn.offset) == below).all()
 
 
+def test_a_program_loads_and_holds_the_part_between_two_cuts_for_itself(program, tmp_path):
+    """On facets with one end beside a cut and the other beside none, or beside another cut."""
+    rng = np.random.default_rng(3)
+    for trial in range(6):
+        low, high = 0.25 + 0.1 * rng.random(2), 0.7 + 0.1 * rng.random(2)
+        lines = [[[-0.1, a], [1.1, b]] for a, b in (low, high)]
+        ends = np.sort(0.4 + 0.25 * rng.random(2))
+        middle = f"x < 1e-9 and y > {ends[0]} and y < {ends[1]}"
+        scene = scenes.scene(
+            [{"kind": "polyline", "name": str(k), "points": p} for k, p in enumerate(lines)],
+            mesh={"cells": [[5, 11 + trial]]},
+            supports=[
+                {"where": where, "displacement": [0.1 * k, 0.0]}
+                for k, where in enumerate(("bottom", middle, "top"))
+            ],
+            loads=[{"kind": "traction", "where": "right", "traction": [1.0, -2.0]}],
+        )
+        export_case(scene, tmp_path / str(trial), [0])
+        case = program.files.Case(tmp_path / str(trial), 0)
+        body, answer = program.body.divided(case)
+        force = program.body.forces(case, body)
+        held, value = program.body.prescribed(case, body)
+        height = np.zeros(body.count)
+        height[body.group] = case.points[:, 1]
+        middles = answer.points[answer.cells].mean(axis=1)
+        over = [a + (b - a) * (middles[:, 0] + 0.1) / 1.2 for (_, a), (_, b) in lines]
+        part = (middles[:, 1] > over[0]).astype(int) + (middles[:, 1] > over[1])
+        at = [a + (b - a) * 1.1 / 1.2 for (_, a), (_, b) in lines]
+        bounds = [0.0, *at, 1.0]
+        for k in range(3):
+            mine = np.zeros(len(answer.points), dtype=bool)
+            mine[answer.cells[part == k]] = True
+            groups = np.unique(answer._groups[mine])
+            length, centre = bounds[k + 1] - bounds[k], 0.5 * (bounds[k + 1] + bounds[k])
+            load = length * np.array([1.0, -2.0])
+            np.testing.assert_allclose(force[groups].sum(axis=0), load)
+            np.testing.assert_allclose(height[groups] @ force[groups], centre * load)
+            assert held[groups].any()
+            np.testing.assert_allclose(value[groups, 0][held[groups, 0]], 0.1 * k)
+
+
 PARTED = {
     "mesh": {"cells": [[5, 5]]},
     "material": {"young": 1.0, "poisson": 0.0, "plane": "strain"},

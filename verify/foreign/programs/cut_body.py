@@ -188,6 +188,20 @@ class CutBody:
             found[mine] = one.level(middle[mine])[1]
         return found
 
+    def between(self, facets):
+        """Which facets (f, k) have nodes beside different cuts, or beside one and none.
+
+        No cut crosses them, whatever the signs of their levels.
+        """
+        owner = self.owner[facets]
+        return (owner != owner[:, :1]).any(axis=1)
+
+    def rows(self, facets):
+        """Row of `group` for each node (f, k) of facets that no cut crosses."""
+        levels = self.phi[facets]
+        low = np.where(self.between(facets)[:, None], levels, levels.min(axis=1, keepdims=True))
+        return np.where(low < 0, 0, 1)
+
     def on_a_cut(self, at):
         """Which points (k, d) lie on the level set of a cut, within the cut."""
         found = np.zeros(len(at), dtype=bool)
@@ -246,7 +260,10 @@ def prescribed(case, body, time=0.0):
         # a node is held on the sides that its held facets reach, one without such on its own
         alone = np.setdiff1d(nodes, reached)
         chosen = {(node, 0 if body.phi[node] < 0 else 1): values[node] for node in alone}
-        for facet in reached:
+        apart = body.between(reached)
+        for facet, rows in zip(reached[apart], body.rows(reached[apart]), strict=True):
+            chosen |= {(node, s): values[node] for node, s in zip(facet, rows, strict=True)}
+        for facet in reached[~apart]:
             for s, sign in enumerate((-1, 1)):
                 if _reaches(case, body, facet, support, sign):
                     chosen |= {(node, s): values[node] for node in facet}
@@ -288,16 +305,17 @@ def forces(case, body, loads=None):
             continue
         facets = np.array(load["facets"])
         values = body.phi[facets]
-        crossed = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
+        crossed = (values.min(axis=1) < 0) & (values.max(axis=1) > 0) & ~body.between(facets)
         value = np.array(load.get("uniform", load.get("value", [])))
         if not len(value) and crossed.any():
             raise RefusedError("loads in formulas on facets that a cut crosses are not offered")
+        rows = body.rows(facets)
         for row, facet in enumerate(facets):
             if crossed[row]:
                 piece = np.array(load["corners"][row]) if "corners" in load else case.points[facet]
                 _split_traction(case, body, facet, piece, value, force)
                 continue
-            groups = body.group[0 if values[row].min() < 0 else 1, facet]
+            groups = body.group[rows[row], facet]
             if "uniform" in load:
                 share = np.full(len(facet), measure(case.points[facet]) / len(facet))
                 force[groups] += share[:, None] * load["uniform"]
