@@ -10,6 +10,7 @@ An engine is a class, called with the case and a `Stage`, with the methods
 - ``begin(u, v, force)``: the state at the start of a step, with the forces right then
 - ``step(dt, values, force)``: one time step; values and forces are of its end
 - ``state()``: displacement, velocity and, if it has one, the acceleration in balance with them
+- ``penalty()``, if it penalises anything: the energy in that, J
 """
 
 import time
@@ -156,6 +157,8 @@ def run_engine(case, engine, mass=None, **said):
         }
         said = {"times": case.content["output_times"], "iterations": {"steps": steps}, **said}
         said["mass"] = lumped_mass(case) if mass == "lumped" else mass
+        if hasattr(engine, "penalty"):
+            said["ledger"] = {"penalty": marched[0].penalty}
         if any(cut["kind"] == "tool_path" for cut in case.content["cuts"]):
             said["notes"] = {**said.get("notes", {}), "a tool path opens": _LATE}
     case.answer(case.points, case.cells, **fields, unknowns=case.points.size,
@@ -176,7 +179,7 @@ class _March:
 
     Attributes
     ----------
-    outputs : list
+    outputs, penalty : list
         What the engine says at each output, on the nodes of the case.
     steps : int
     seconds : dict
@@ -184,7 +187,8 @@ class _March:
     """
 
     def __init__(self, case, engine):
-        self.case, self.engine, self.outputs, self.steps = case, engine, [], 0
+        self.case, self.engine, self.steps = case, engine, 0
+        self.outputs, self.penalty = [], []
         self.times, self.largest = np.array(case.content["output_times"]), _largest_step(case)
         self.slack, parts = _SAME * self.times[-1], case.problem["held"] + case.problem["loads"]
         jumps = (t for part in parts for t, _ in part.get("history") or ())
@@ -203,6 +207,8 @@ class _March:
             self.open(stop, k == 0 or np.abs(self.breaks - stop).min() < self.slack)
             if np.abs(self.times - stop).min() < self.slack:
                 self.outputs.append([field[self.stage.node] for field in self.body.state()])
+                if hasattr(self.body, "penalty"):
+                    self.penalty.append(self.body.penalty())
             if k + 1 < len(self.stops):
                 self.advance(stop, self.stops[k + 1], trial)
             if trial:
