@@ -99,7 +99,7 @@ class Body:
         def matrix(stiffness, mass, ghost=ghost):
             return turned @ case.forms.matrix(stiffness, mass * density, ghost) @ joined
 
-        # made when asked for, beside what is timed
+        # made on demand, outside of the timed steps
         self.plain = cache(lambda: matrix(1.0, 0.0, 0.0)) if ghost else None
         self.matrix, self.free = matrix, bits(~stage.held.T.ravel())
         self.stiffness, self.mass, self.inverse = matrix(1.0, 0.0), matrix(0.0, 1.0), {}
