@@ -3,8 +3,8 @@
 How large are the displacement errors, does the energy drift, what do slivers do, and what does
 accuracy cost? Numbers come from the results alone. An error and a time are divided by the error
 and time of conforming elements (`BASELINE`) in the same case, if solved. The error itself
-depends on the case more than on the method. A median over cases carries the interval between the
-medians of the cases' lower and upper ends: whatever the truth of each case, its median lies there.
+depends on the case more than on the method. The interval of a median holds the spread over cases
+and the uncertainty of each.
 """
 
 import math
@@ -21,6 +21,7 @@ from verify.result import (
     CaseResult,
     SolveRecord,
     Status,
+    Verdict,
     finest_of,
     times_at_equal_error,
 )
@@ -69,8 +70,13 @@ def accuracy(results: Sequence[CaseResult]) -> Answer:
     """Answer how large displacement errors are, beside conforming elements."""
     question, found = "Accuracy", dict(_ratios(results, _error_ratio))
     if found:
+        found = {name: _over_cases(own) for name, own in found.items()}
         said = _compared(found, "has", "displacement error of {} at equal element size")
-        return Answer(question, said + _left_out(results, found), _example(results, found))
+        alone = all(len(own) == 1 for own in found.values())
+        of_what = "of the reference" if alone else "over cases and of their references"
+        said += f" The interval is that {of_what}."
+        more = _left_out(results, found) + _failing(results, found)
+        return Answer(question, said + more, _example(results, found))
     errors = {s: own for s, own in _finest_errors(results).items() if own}
     if not errors:
         known = [p for r in results for c in compared_curves(r) for p in c.points]
@@ -177,8 +183,8 @@ def cost(results: Sequence[CaseResult]) -> Answer:
 def _over_cases(own: Mapping[str, Ratio]) -> dict[str, Ratio]:
     """Widen the ends of each ratio so that the ends of the median hold the spread over cases too.
 
-    Repetitions in one run share its load. Cases are measured at other moments: between the k-th
-    and the k-th last of them the median lies with 90 %, whatever the distribution (sign test).
+    Repetitions in one run share its load, and the error depends on the case. Between the k-th and
+    the k-th last of the cases the median lies with 90 %, whatever the distribution (sign test).
     """
     values, n = sorted(_values(own)), len(own)
     tails = [2 * sum(math.comb(n, i) for i in range(k)) / 2**n for k in range(1, n // 2 + 1)]
@@ -191,7 +197,7 @@ def _of_times(results: Sequence[CaseResult]) -> str:
     """Say what the interval of times holds."""
     contended = any(s.notes.get("timing", "").startswith("contended")
                     for r in results for s in r.solves)  # fmt: skip
-    beside = ", whose solves ran side by side" if contended else ""
+    beside = " on a machine with other work" if contended else ""
     return f"The interval is that over cases and repetitions of one run{beside}."
 
 
@@ -336,11 +342,25 @@ def _compared(found: Mapping[str, Mapping[str, Ratio]], verb: str, what: str) ->
         ((name, middle),) = medians.items()
         return f"{name} {verb} {middle} {beside}, {_over(len(found[name]))}."
     parts = [f"{name} {middle} ({len(found[name])})" for name, middle in medians.items()]
-    more = f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else ""
+    more = ""
+    if rest := [one.high for own in list(found.values())[_NAMED:] for one in own.values()]:
+        more = f"; {len(parts) - _NAMED} more at most {number(max(rest), 3)} in a case"
     return (
         f"Solvers that {verb.replace('has', 'have').replace('takes', 'take')} so many {beside}, "
         f"median (of cases): {', '.join(parts[:_NAMED])}{more}."
     )
+
+
+def _failing(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Ratio]]) -> str:
+    """Name the compared solvers that fail a check: errors of theirs may cancel."""
+    failed = {
+        solver_title(verdict.solver)
+        for result in results
+        for verdict in result.verdicts
+        if verdict.verdict is Verdict.FAIL and not verdict.known
+    }
+    names = [name for name in found if name in failed]
+    return f" A check fails of {', '.join(names)}: see below." if names else ""
 
 
 def _left_out(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Ratio]]) -> str:
