@@ -206,7 +206,7 @@ def test_all_runs_of_the_hand_are_told_and_the_slowest_decides():
                    if s.name == "real time")  # fmt: skip
     found = sentence.of(made(hand={**made().hand, "slowest": 0.016, "runs": runs}))
     assert "does not cut" in found.text
-    assert "slowest step 12 to 36 ms of processor time (3 runs)." in found.text
+    assert "slowest step 12 to 36 ms of processor time, 16.7 allowed (3 runs)." in found.text
 
 
 def test_times_beside_other_programs_are_not_drawn(tmp_path):
@@ -258,7 +258,7 @@ def test_a_sentence_without_support_stops_the_publication(name, evidence):
 
 
 @pytest.mark.parametrize(("slowest", "busy", "words"), [
-    (0.016, "load 3", " cuts a"), (0.017, "", "does not cut"), (0.017, "load 3", "may cut"),
+    (0.016, "load 3", "engine cuts a"), (0.017, "", "does not cut"), (0.017, "load 3", "undecided"),
 ])  # fmt: skip
 def test_real_time_is_told_with_the_speed_of_the_machine(slowest, busy, words):
     hand = {**made().hand, "slowest": slowest, "kernel": 0.0189, "contended": busy}
@@ -413,7 +413,7 @@ def test_two_scenes_whose_positions_contradict_each_other_are_told_one_by_one():
         for name, value in (("xfem", factor), ("conforming", 1.0))
     ]  # fmt: skip
     text = sentence.of(made(changed({"xfem": (2.6, 1.0)}), benchmark_positions=rows)).text
-    both = "dynamics/1 0.50 (0.50 to 0.50); dynamics/2 1.5 (1.5 to 1.5)"
+    both = "dynamics/1 0.50 (0.50 to 0.50), below 1; dynamics/2 1.5 (1.5 to 1.5), above 1"
     assert text.endswith(f"Over positions: {both}; the scene decides.")
 
 

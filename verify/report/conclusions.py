@@ -212,9 +212,11 @@ def _real_time(evidence: Evidence) -> Found | None:
     busy = hand.get("contended") and worst > FRAME
     how = [f"{len(slowest)} runs"] * (len(slowest) > 1) + ["busy machine"] * bool(busy)
     took = " to ".join(dict.fromkeys(number(1e3 * one, 2) for one in (slowest[0], worst)))
+    does = "Whether XFEM's engine cuts" if busy else f"XFEM's engine {cuts}"
+    untold = " is undecided" if busy else ""
     text = (
-        f"XFEM's engine {'may cut' if busy else cuts} a hand of {number(cells)} tetrahedra at 60 "
-        f"frames a second: slowest step {took} ms of processor time"
+        f"{does} a hand of {number(cells)} tetrahedra at 60 frames a second{untold}: slowest step "
+        f"{took} ms of processor time, {number(1e3 * FRAME, 3)} allowed"
         f"{f' ({told})' if (told := ', '.join(how)) else ''}."
     )
     numbers = (
