@@ -214,10 +214,13 @@ def test_times_beside_other_programs_are_not_drawn(tmp_path):
     busy = case("benchmark/c2_meeting", "inner")
     for solve in busy.solves:
         solve.notes["timing"] = "contended: load 4 on 2 cores"
+        if solve.solver == "kratos":
+            solve.notes["a tool path opens"] = "facets as a whole, when the blade has passed them"
     write_benchmark(evidence_of([case("benchmark/c1_slit", "inner"), busy]), tmp_path)
     page = (tmp_path / "index.md").read_text("utf-8")
     assert page.count("](benchmark-pictures/") == 1
     assert "timed beside other programs: C2." in page
+    assert "C2: facets of kratos open when the blade has passed them" in page
 
 
 def test_a_scene_in_space_is_no_member_of_the_one_in_the_plane():

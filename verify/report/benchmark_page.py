@@ -62,7 +62,8 @@ def write_benchmark(evidence: Evidence, folder: Path) -> None:
     lines = [
         "# Benchmark: the table of the whole", "",
         "[Scenes, to set up from one page each](../../benchmark/index.md)", "",
-        *whole_table(evidence), "", " ".join([_LEGEND, *_without_row(evidence)]), "",
+        *whole_table(evidence), "",
+        " ".join([_LEGEND, *_opened_late(evidence), *_without_row(evidence)]), "",
         "## Time against error", "",
         "Wall time of what each cut costs anew, from the coarsest level to the finest; lower left "
         "is better. C5 and C8 show the middle of their members. Grey: the other discretisations."
@@ -101,6 +102,19 @@ def _without_row(evidence: Evidence) -> list[str]:
             if solve.solver not in {*answered, REFERENCE}:
                 reasons.setdefault(solve.solver, {})[solve.reason] = None
     return [f"No row: {solver_title(name)} ({' · '.join(own)})." for name, own in reasons.items()]
+
+
+def _opened_late(evidence: Evidence) -> list[str]:
+    """Name the solvers whose facets open behind a blade, beside others that open as it sweeps."""
+    said = []
+    for label, members in benchmark_scenes(evidence.results).items():
+        late = {s.solver: None for r in members for s in r.solves
+                if s.metrics and "has passed" in s.notes.get("a tool path opens", "")}  # fmt: skip
+        if late:
+            names = ", ".join(map(solver_title, late))
+            said.append(f"{label}: facets of {names} open when the blade has passed them, others "
+                        "as it sweeps them: an error of its own.")  # fmt: skip
+    return said
 
 
 def title_of(group: Sequence[str]) -> str:

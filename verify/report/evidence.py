@@ -260,8 +260,8 @@ class Beside:
             return ""
         told = {name_of(n): own for n, own in self.by_scene.items()}
         if len(told) == 2 and any(map(_side, told.values())):
-            sides = {-1: "below 1", 0: "not told apart", 1: "above 1"}
-            words = (f"{n} {_over(o)}, {sides[_side(o)]}" for n, o in told.items())
+            tells = {-1: "below 1", 0: "not told apart", 1: "above 1"}
+            words = (f"{n} {_over(o)}, {tells[_side(o)]}" for n, o in told.items())
             return f" Over positions: {'; '.join(words)}"
         if len(told) == 2:
             both = ", ".join(f"{n} {_over(o)}" for n, o in told.items())
