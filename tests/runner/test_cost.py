@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 from scenes import catalogue
 
 from verify.cli import main
-from verify.cli.run_text import suites_line
-from verify.result import SolveRecord, Status
+from verify.cli.run_text import costs_of, suites_line
+from verify.result import REFERENCE, SolveRecord, Status
 from verify.runner.cost import (
     case_cost,
     coarser_reference,
@@ -205,6 +206,14 @@ def test_the_smallest_suite_comes_first():
     assert said.index("-k demo") < said.index("--quick")
     assert f"{sum('demo' in scene.tags for scene in every)} cases" in said
     assert suites_line([], jobs=2) == ""
+
+
+def test_a_reference_that_comes_with_its_case_costs_nothing_unless_it_is_to_be_solved() -> None:
+    """Its solve alone takes an hour: a forecast of the demo says what a run of it does."""
+    scene = SCENES["cutting/hanging_block_quick"]
+    for cache in (Path("anywhere"), None):
+        rows = costs_of(scene, Options(cache=cache))
+        assert (REFERENCE in {row.solver for row in rows}) is (cache is None)
 
 
 def test_check_says_the_cost_and_warns_in_one_line_of_a_mesh_that_no_machine_holds(

@@ -257,6 +257,7 @@ def _checked(file: str) -> dict[str, Any]:
     from verify.cli.run_text import costs_of
     from verify.runner.checking import check_scene
     from verify.runner.cost import body_text
+    from verify.runner.fingerprint import cache_folder
     from verify.runner.mesh_faults import body_notes, mesh_warnings
     from verify.runner.selection import Options
     from verify.scene import load_scenes
@@ -269,6 +270,7 @@ def _checked(file: str) -> dict[str, Any]:
         blank = {"body": "", "notes": [], "warnings": [], "cost": []}
         return {"file": file, "title": None, "error": one_line(error), **blank}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
+    options = Options(cache=cache_folder())
     return {
         "file": file,
         "title": f"{scenes[0].title}{rows}",
@@ -276,7 +278,7 @@ def _checked(file: str) -> dict[str, Any]:
         "body": body_text(scenes[0]),
         "notes": body_notes(scenes[0]),
         "warnings": mesh_warnings(scenes[0]),
-        "cost": [asdict(one) for scene in scenes for one in costs_of(scene, Options())],
+        "cost": [asdict(one) for scene in scenes for one in costs_of(scene, options)],
     }
 
 

@@ -8,7 +8,7 @@ from itertools import groupby
 from verify.printable import duration_text, memory_text, one_line
 from verify.result import LOG, CaseResult, Notice, Status, Verdict, VerdictRecord
 from verify.runner.cost import REFERENCE, LevelCost, case_cost
-from verify.runner.plan import solvers_of
+from verify.runner.plan import solvers_of, stored_beside
 from verify.runner.selection import Options
 from verify.scene import Scene
 
@@ -17,8 +17,11 @@ _START = 0.8  # s: half of what a run takes before and after its cases; comparin
 
 
 def costs_of(scene: Scene, options: Options) -> list[LevelCost]:
-    """Estimate the solves that a run of `scene` plans."""
-    return case_cost(scene, solvers_of(scene, options), options.repetitions)
+    """Estimate the solves that a run of `scene` plans; a reference stored beside it costs none."""
+    solvers = solvers_of(scene, options)
+    if REFERENCE in solvers and stored_beside(scene, options) is not None:
+        solvers.remove(REFERENCE)
+    return case_cost(scene, solvers, options.repetitions)
 
 
 def case_lines(costs: Sequence[LevelCost]) -> list[str]:

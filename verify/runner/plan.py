@@ -224,7 +224,8 @@ def start_order(plans: Sequence[CasePlan], options: Options) -> Callable[[Job], 
     one_by_one = options.jobs == 1 and not options.cluster
 
     def spent(plan: CasePlan) -> float:
-        return sum(row.seconds for row in case_cost(plan.scene, plan.solvers, options.repetitions))
+        solved = [name for name in plan.solvers if name != REFERENCE or plan.bundle is None]
+        return sum(row.seconds for row in case_cost(plan.scene, solved, options.repetitions))
 
     ordered = plans if one_by_one else sorted(plans, key=spent, reverse=True)
     place = {p.scene.name: (i, [*p.solvers, REFERENCE]) for i, p in enumerate(ordered)}
