@@ -14,6 +14,7 @@ from verify.methods.tip_nodes import with_tip_nodes
 from verify.scene import Scene, load_scene
 from verify.solution import Regularisation
 from verify.solvers import find_solver
+from verify.xfem.mesh import Diagonal
 
 SOFT = xfem.isotropic(1.0, 0.3, "plane strain")
 SEEDS = [*range(4), *(pytest.param(n, marks=pytest.mark.heavy) for n in range(4, 50))]
@@ -200,3 +201,67 @@ def test_an_end_beside_another_part_of_its_cut_does_not_close_it_to_a_loop(diago
     for end in nodes.cuts[0].ends:
         (node,) = np.flatnonzero((nodes.mesh.points == end).all(axis=1))
         assert np.count_nonzero(phantom.node_parent == node) == 1
+
+
+def moved(points, cells, cuts, axes, random):
+    """A mesh and its cuts with other axes, nodes and cells numbered anew."""
+    order = random.permutation(len(points))
+    cells = random.permuted(random.permutation(np.argsort(order)[cells]), axis=1)
+    return xfem.SimplexMesh((points @ axes.T)[order], cells), [
+        xfem.Polyline(cut @ axes.T) for cut in cuts
+    ]
+
+
+def in_general_position(random):
+    """Two cuts of about an element, close to each other."""
+    count = int(random.integers(4, 8))
+    mesh = shaken(xfem.rectangle_mesh((count, count)), int(random.integers(100)), 0.3)
+    cuts = []
+    for _ in range(2):
+        along = random.uniform(0.2, 0.8) / count * np.exp(1j * random.uniform(0.0, np.pi))
+        along = np.array([along.real, along.imag])
+        centre = 0.5 + random.uniform(-0.7, 0.7, 2) / count
+        kink = centre + random.uniform(-0.3, 0.3) * along[::-1] * [-1.0, 1.0]
+        cuts.append(np.array([centre - along, kink, centre + along]))
+    return mesh, cuts
+
+
+def on_a_lattice(random):
+    """One or two cuts between nodes and places on edges, along the edges too."""
+    count, parts = int(random.integers(4, 8)), int(random.integers(1, 6))
+    diagonals: tuple[Diagonal, ...] = ("right", "left", "alternating", "crossed")
+    mesh = xfem.rectangle_mesh((count, count), diagonal=diagonals[random.integers(4)])
+    cuts: list[np.ndarray] = []
+    while len(cuts) < 2:
+        cut = random.integers(1, count * parts, (random.integers(2, 4), 2)) / (parts * count)
+        cut[1, random.integers(2)] = cut[0, 0]
+        try:
+            xfem.Polyline(cut)
+        except xfem.XfemError:  # no length, or it meets itself
+            continue
+        cuts.append(cut)
+    return mesh, cuts
+
+
+@pytest.mark.parametrize("bodies", [in_general_position, on_a_lattice])
+def test_ends_depend_neither_on_numbers_nor_on_the_axes(bodies):
+    """Each end is the same place of the body in mirrored axes and in a mesh numbered anew."""
+    random = np.random.default_rng(1)
+    for _ in range(40):
+        mesh, cuts = bodies(random)
+        found = []
+        for axes in (np.eye(2), np.diag([-1.0, 1.0]), np.eye(2)[::-1]):
+            nodes = with_tip_nodes(*moved(mesh.points, mesh.cells, cuts, axes, random))
+            ends = [np.reshape(cut.ends, (-1, 2)) @ axes for cut in nodes.cuts]
+            found.append([one[np.lexsort(one.round(9).T)] for one in ends])
+        for other in found[1:]:
+            for given, same in zip(found[0], other, strict=True):
+                np.testing.assert_allclose(same, given, rtol=0.0, atol=1e-9)
+
+
+def test_an_end_at_a_node_stays_there_beside_another_one():
+    """A cut along one edge of the mesh: both of its ends are at the nodes of that edge."""
+    mesh = xfem.rectangle_mesh((4, 4))
+    nodes = with_tip_nodes(mesh, [xfem.Polyline([[0.5, 0.5], [0.5, 0.25]])])
+    assert np.array_equal(nodes.mesh.points, mesh.points)
+    assert sorted(nodes.cuts[0].ends.tolist()) == [[0.5, 0.25], [0.5, 0.5]]

@@ -106,6 +106,23 @@ class _Chord(NamedTuple):
     exit: Floats
 
 
+class _Met(NamedTuple):
+    """What a cut meets.
+
+    Attributes
+    ----------
+    cells : (m,) bool array
+    nodes : (n,) bool array
+        Nodes on it.
+    chords : list of _Chord
+        Two of an end on an edge along which the cut runs.
+    """
+
+    cells: Bools
+    nodes: Bools
+    chords: list[_Chord]
+
+
 def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     """Make the ends of cuts inside elements nodes of the mesh.
 
@@ -129,13 +146,10 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     values = nodal_values(mesh, cuts)[0]
     met = [_met(mesh, cut, values[:, k]) for k, cut in enumerate(cuts)]
     times_met = np.zeros(len(mesh.cells), dtype=int)
-    for cells, _ in met:
-        times_met += cells
+    for one in met:
+        times_met += one.cells
     division = _Division(mesh, times_met > 1)
-    ends = [
-        np.array([at for chord in chords if (at := division.end_at(chord, cells)) is not None])
-        for cells, chords in met
-    ]
+    ends = division.ends(met)
     divided = division.mesh()
     nodes = divided.points[len(mesh.points) :]
     levels = division.interpolated(values)
@@ -146,12 +160,18 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     return TipNodes(divided, ending, np.array(division.moved))
 
 
-def _met(mesh: SimplexMesh, cut: Cut, values: Floats) -> tuple[Bools, list[_Chord]]:
-    """Which cells (m,) a cut with nodal values (n,) meets, and its way through those it ends in."""
-    plus = values[mesh.cells] >= 0.0
-    cells = np.flatnonzero(plus.any(axis=1) & ~plus.all(axis=1))
-    plus, rows = plus[cells], np.arange(len(cells))
-    lone = (plus == (plus.sum(axis=1) == 1)[:, None]).argmax(axis=1)
+def _met(mesh: SimplexMesh, cut: Cut, values: Floats) -> _Met:
+    """Find the cells a cut with nodal values (n,) meets, and its way through those it ends in.
+
+    It meets cells that it crosses, and both of an edge along which it runs. Those that it touches
+    in a node alone it does not.
+    """
+    at_nodes = values[mesh.cells]
+    above, below = at_nodes > 0.0, at_nodes < 0.0
+    along = (at_nodes == 0.0).sum(axis=1) == 2
+    cells = np.flatnonzero(above.any(axis=1) & below.any(axis=1) | along)
+    above, below, rows = above[cells], below[cells], np.arange(len(cells))
+    lone = np.where((above.sum(axis=1) == 1)[:, None], above, below).argmax(axis=1)
     corners, size = mesh.points[mesh.cells[cells]], mesh.longest_edges(cells)
     ways, within = np.zeros((2, len(cells), 3)), np.zeros((2, len(cells)), dtype=bool)
     near = np.zeros_like(within)
@@ -165,19 +185,62 @@ def _met(mesh: SimplexMesh, cut: Cut, values: Floats) -> tuple[Bools, list[_Chor
     meets[cells] = (near & within).any(axis=0)
     some = np.flatnonzero(near.all(axis=0) & (within[0] != within[1]))
     if len(some) == 0:
-        return meets, []
+        return _Met(meets, values == 0.0, [])
     first = np.where(within[0, some], 0, 1)
     low, out = ways[first, some], ways[1 - first, some]
     entry, high = low, out
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        level, depth = level_and_depth(cut, np.einsum("qi,qid->qd", middle, corners[some]))
+        depth = level_and_depth(cut, np.einsum("qi,qid->qd", middle, corners[some]))[1]
         inner = (depth >= 0.0)[:, None]
         low, high = np.where(inner, middle, low), np.where(inner, high, middle)
-    # beside a kink the depth may change its sign off the cut
+    # beside a kink the depth may change its sign off the cut, where the level set jumps, too
+    level = level_and_depth(cut, np.einsum("qi,qid->qd", low, corners[some]))[0]
     ends = np.abs(level) <= _NEAR * size[some]
     found = zip(cells[some].tolist(), entry, low, out, strict=True)
-    return meets, [_Chord(*each) for each, is_end in zip(found, ends, strict=True) if is_end]
+    chords = [_Chord(*each) for each, is_end in zip(found, ends, strict=True) if is_end]
+    return _Met(meets, values == 0.0, chords)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A place at which a cut may end.
+
+    Attributes
+    ----------
+    cut : int
+    end : (2,) float array
+        Where the cut was to end, in metres.
+    cell : int
+    at : (3,) float array
+        Barycentric coordinates in that cell.
+    place : (2,) float array
+        The same in metres.
+    cells : set of int
+        Cells that change: they are divided, or their node moves onto the cut.
+    cost, close : float
+        Distance from the end, more where the place is behind it; difference up to which costs,
+        and places, are equal, in metres.
+    """
+
+    cut: int
+    end: Floats
+    cell: int
+    at: Floats
+    place: Floats
+    cells: set[int]
+    cost: float
+    close: float
+
+    def same_end(self, other: "_Place") -> bool:
+        """Tell whether it is for the same end of the same cut."""
+        return self.cut == other.cut and bool(np.abs(self.end - other.end).max() <= self.close)
+
+    def excludes(self, other: "_Place") -> bool:
+        """Tell whether it is another one for the same end, or needs the same cells."""
+        return other is not self and (
+            self.same_end(other) or not self.cells.isdisjoint(other.cells)
+        )
 
 
 class _Division:
@@ -211,52 +274,81 @@ class _Division:
         found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
         return np.array(found).reshape(len(found), values.shape[1])
 
-    def end_at(self, chord: _Chord, met: Bools) -> Floats | None:
-        """Divide cells where a cut ends; the place of its end, if there is a good one.
+    def ends(self, met: Sequence[_Met]) -> list[Floats]:
+        """Divide cells where cuts end; the places (k, 2) at which each of the cuts then ends.
 
-        `met` (m,) are the cells that this cut meets: it must not end on another part of itself.
+        The least cost comes first and takes its cells from others. Of places that exclude each
+        other at one cost none is taken: numbers of cells or the axes would have to choose.
         """
+        left: list[_Place] = []
+        for cut, one in enumerate(met):
+            for chord in one.chords:
+                for new in self._possible(cut, chord, one):
+                    known = [old for old in left if old.same_end(new)]
+                    if all(np.abs(old.place - new.place).max() > new.close for old in known):
+                        left.append(new)
+        found: list[list[Floats]] = [[] for _ in met]
+        while left:
+            most = min(one.cost + one.close for one in left)
+            equal = [one for one in left if one.cost <= most]
+            taken = [one for one in equal if not any(map(one.excludes, equal))]
+            for one in taken:
+                found[one.cut].append(self._divide(one))
+            left = [one for one in left if one.cost > most and not any(map(one.excludes, taken))]
+        return [np.array(places) for places in found]
+
+    def _possible(self, cut: int, chord: _Chord, met: _Met) -> Iterator[_Place]:
+        """Find places for an end of a cut; it must not end on another part of itself."""
         corners = self._mesh.points[self._mesh.cells[chord.cell]]
-        ahead = (chord.exit - chord.entry) @ corners
-        best, least = None, np.inf
+        ahead, end = (chord.exit - chord.entry) @ corners, chord.end @ corners
+        close = float(_ROUND_OFF * np.linalg.norm(ahead))
         for at in _places(chord, corners):
-            cells = self._around(chord.cell, at)
+            off = (at - chord.end) @ corners
+            cost = float(np.linalg.norm(off))
+            # at the end itself the cells ahead are touched, and not met; a node there stays
+            exact, at_node = cost <= close, (at > 0.0).sum() == 1
+            if off @ ahead < -close * cost:
+                cost *= _BEHIND
+            cells = [] if exact and at_node else self._around(chord.cell, at)
             if cells is None or self._taken[cells].any():
                 continue
             if at[at > 0.0].min() < (1.0 - _ROUND_OFF) * _LEAST:
                 continue
-            off = (at - chord.end) @ corners
-            cost = np.linalg.norm(off) * (_BEHIND if off @ ahead < 0.0 else 1.0)
-            # at the end itself the cells ahead are touched, and not met
-            exact = cost <= _ROUND_OFF * np.linalg.norm(ahead)
-            if cost < least and (exact or not self._joins(chord, cells, met)):
-                best, least = (at, cells), cost
-        if best is None:
-            return None
-        at, cells = best
-        self._taken[cells] = True
-        self.moved.append(float(np.linalg.norm((at - chord.end) @ corners)))
+            if exact or not self._joins(chord, cells, met):
+                yield _Place(cut, end, chord.cell, at, at @ corners, set(cells), cost, close)
+
+    def _divide(self, chosen: _Place) -> Floats:
+        """Divide the cells of a place and return it, or the node that is there, in metres."""
+        nodes, at = self._mesh.cells[chosen.cell], chosen.at
+        self.moved.append(float(np.linalg.norm(chosen.place - chosen.end)))
         if (at > 0.0).sum() == 1:
-            return np.asarray(corners[at.argmax()])
-        nodes = self._mesh.cells[chord.cell]
+            return self._mesh.points[nodes[at.argmax()]]
         replaced, number = nodes[at > 0.0], len(self._inner) + len(self._places)
-        self._places.append(at @ corners)
-        self._from.append((chord.cell, at))
-        for cell in cells:
+        self._places.append(chosen.place)
+        self._from.append((chosen.cell, at))
+        for cell in chosen.cells:
             ends = np.intersect1d(self._cells[cell], replaced)
             parts = _parts(self._cells[cell], ends, number)
             self._cells[cell] = parts[0]
             self._more.append(parts[1:])
-        return self._places[-1]
+        return chosen.place
 
-    def _joins(self, chord: _Chord, cells: list[int], met: Bools) -> bool:
+    def _joins(self, chord: _Chord, cells: list[int], met: _Met) -> bool:
         """Tell whether the cut is in some of the cells otherwise than on its way to its end."""
-        before = int(self._mesh.neighbours[chord.cell, chord.entry.argmin()])
-        others = {cell for cell in cells if met[cell]} - {chord.cell}
-        waiting = [before] if before in others else []
+        nodes = {cell: set(self._mesh.cells[cell].tolist()) for cell in {*cells, chord.cell}}
+        others = {cell for cell in cells if met.cells[cell]} - {chord.cell}
+        enters = set(self._mesh.cells[chord.cell][chord.entry > 0.0].tolist())
+        waiting = [cell for cell in others if enters <= nodes[cell]]
+        others -= set(waiting)
         while waiting:
-            others.discard(here := waiting.pop())
-            waiting += [int(cell) for cell in self._mesh.neighbours[here] if cell in others]
+            here = nodes[waiting.pop()]
+            beside = {
+                cell
+                for cell in others
+                if len(shared := here & nodes[cell]) == 2 or met.nodes[list(shared)].any()
+            }
+            others -= beside
+            waiting += beside
         return bool(others)
 
     def _around(self, cell: int, at: Floats) -> list[int] | None:
