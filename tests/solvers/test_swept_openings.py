@@ -123,6 +123,19 @@ def test_a_share_is_the_integral_of_a_shape_function_over_what_is_swept(corners)
         np.testing.assert_array_equal(fading.at(end), 0.0)
 
 
+def test_a_cut_along_an_edge_opens_it_from_either_side_at_one_time():
+    """The element beside an edge has one node off the cut, whose own cut is swept long before."""
+    found = []
+    for off in (2, 3):  # on one side, on the other
+        shares = SweptShares(2)
+        points = np.array([[[0.0, 0.0], [1.0, 0.0]], [[-2.0, 1.0], [-1.0, 1.0]]])
+        node = np.array([[0, 1, off], [2, 4, 5]])
+        shape = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.4, 0.6, 0.0], [0.4, 0.0, 0.6]]])
+        passage = shares.add(CutSimplices(points, np.arange(2), node, shape), lambda at: at[:, 0])
+        found.append(passage.let_go.tolist())
+    assert found == [[0.0, -2.0]] * 2
+
+
 def test_parts_of_a_kinked_path_are_divided():
     """Half of a facet is swept at twice the speed: off by at most (1/6)²/8 of a part."""
     shares = SweptShares(1)

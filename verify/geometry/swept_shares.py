@@ -157,12 +157,16 @@ class SweptShares:
         starts = np.full(count, np.inf)
         np.minimum.at(starts, nodes[held], np.broadcast_to(begin[..., None], held.shape)[held])
         let_go, passed = np.full((2, self._pieces), np.nan)
-        np.fmin.at(let_go, cut.piece, starts[cut.node].min(axis=1))
+        # of a piece along whose edge or face the cut runs the nodes off the cut have no share: on
+        # which side of the cut it lies does not matter
+        on_cut = cut.shape.max(axis=1) > 0.0
+        np.fmin.at(let_go, cut.piece, np.where(on_cut, starts[cut.node], np.inf).min(axis=1))
         np.fmax.at(passed, cut.piece, end.max(axis=1))
         free = starts
         if not self._by_node_alone:
             free = np.full(count, -np.inf)
-            np.maximum.at(free, cut.node, np.broadcast_to(let_go[cut.piece, None], cut.node.shape))
+            opens = np.broadcast_to(let_go[cut.piece, None], cut.node.shape)
+            np.maximum.at(free, cut.node[on_cut], opens[on_cut])
 
         node, order = nodes[held], np.argsort(times, axis=2)[:, :, None]
         sorted_times = np.take_along_axis(times[:, :, None], order, axis=3)
