@@ -84,3 +84,25 @@ def test_an_element_that_another_cut_meets_is_left_to_the_rule_inside(d, seed):
     found, whole = (divided(mesh, cuts, tip) for tip in ("extended", "inside"))
     assert np.array_equal(found[both], whole[both])
     assert len(set(xfem.cut_mesh(mesh, cuts, "extended").bodies.tolist())) == 2
+
+
+def test_it_divides_the_same_elements_whatever_the_axes_and_the_numbers_of_nodes():
+    """Two cuts to a depth of 0.6 that end near the outline: edges of cells ahead are bisected."""
+    random = np.random.default_rng(0)
+    for seed in range(14):
+        mesh = moved_box(3, seed, 3)
+        ends = random.uniform([0.6, 0.3], [0.95, 0.6], (2, 2))
+        slopes = random.uniform(-0.2, 0.2, 2)
+        found = []
+        for axes in (np.eye(3), np.eye(3), np.diag([-1.0, 1.0, 1.0])):
+            order = random.permutation(len(mesh.points))
+            cells = random.permuted(np.argsort(order)[mesh.cells], axis=1)
+            cuts = []
+            for k, ((x, height), slope) in enumerate(zip(ends, slopes, strict=True)):
+                corners = plane_to(x, 3, height, slope).corners.copy()
+                corners[2:, 2] = 0.6
+                cuts.append(PolygonPatch(np.roll(corners, k, axis=1) @ axes))
+            moved = xfem.SimplexMesh((mesh.points @ axes)[order], cells)
+            found.append([divided(moved, cuts, "extended", k) for k in range(2)])
+        assert np.array_equal(found[0], found[1])
+        assert np.array_equal(found[0], found[2])

@@ -315,6 +315,10 @@ def _split_by(
     if rules.tip in MEETING and len(rules.cuts) > 1:
         on_others = partial(reached, rules.cuts, rules.boxes, points)
     if rules.outline is not None:
+        # of a bisected cell: the point on an edge of the cell, not an edge from there to a corner
+        half = np.flatnonzero(edges.max(axis=1) >= points.nodes)
+        half = half[crossing.zero[half] >= points.nodes]
+        edges[half] = points.ends[crossing.zero[half] - points.nodes]
         extensible = partial(rules.outline.extensible, parent, edges, piece)
     active, ending = crossed_through(
         rules.cuts, points.positions, crossing, rules.tip, on_others, extensible
