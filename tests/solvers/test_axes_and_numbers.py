@@ -99,7 +99,7 @@ def moments(solution, axes):
 def test_an_answer_depends_neither_on_the_axes_nor_on_numbers(kind, seed, tmp_path):
     name, d, moving, parameters = KINDS[kind]
     points, cells, cuts, random = body(seed, d)
-    answers = []
+    answers: list[tuple[np.ndarray, np.ndarray]] = []
     for axes in (np.eye(3), np.eye(3), MIRRORED, TURNED, SWAPPED):
         axes = axes[:d, :d]
         if answers:

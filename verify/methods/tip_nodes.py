@@ -281,9 +281,9 @@ class _Division:
         other at one cost none is taken: numbers of cells or the axes would have to choose.
         """
         left: list[_Place] = []
-        for cut, one in enumerate(met):
-            for chord in one.chords:
-                for new in self._possible(cut, chord, one):
+        for cut, meets in enumerate(met):
+            for chord in meets.chords:
+                for new in self._possible(cut, chord, meets):
                     known = [old for old in left if old.same_end(new)]
                     if all(np.abs(old.place - new.place).max() > new.close for old in known):
                         left.append(new)
