@@ -279,8 +279,8 @@ def _step_kept(evidence: Evidence) -> Found | None:
         if row["claim"] == "uncut_step" and row["number"].startswith("bodies with moved nodes")
     ]  # fmt: skip
     text = (
-        "Not quite the uncut body's: a mass lumped on each side of the cut leaves XFEM "
-        f"{number(least, 3)} of it, however close to nodes"
+        f"With a mass lumped on each side of the cut XFEM keeps {number(least, 3)} of the uncut "
+        "body's step, however close to nodes"
     )
     text += f", {number(min(moved), 2)} on meshes with moved nodes" if moved else ""
     text += ", [less at ends of cuts](../theory/xfem.md)"
@@ -381,9 +381,8 @@ QUESTIONS: dict[str, tuple[Sentence, ...]] = {
     "A moving body, a blade, real time": (
         Sentence("motion", _RUN_BOTH, partial(
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=MEASURE,
-            factor=QUARTER, words=("XFEM: in motion its error is {} times a conforming mesh's.",
-             "XFEM needs no new mesh: in motion its error is {} times a conforming mesh's.",
-             "XFEM needs no new mesh, but in motion its error is {} times a conforming mesh's."))),
+            factor=QUARTER, words=3 * (
+             "In motion XFEM's error, without a new mesh, is {} times a conforming mesh's.",))),
         Sentence("motion, remeshed", "XFEM beside remeshing on three such scenes", partial(
             _weighed, kind="motion", metric="displacement_l2", solver="xfem", rival=_REMESHED,
             factor=QUARTER, words=(

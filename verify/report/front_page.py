@@ -98,8 +98,8 @@ def arena_head(evidence: Evidence, answers: Sequence[Answer], folder: Path) -> l
 
 
 def combined(evidence: Evidence) -> list[str]:
-    """Return the lines of a table of what scenes combine; where no scene does, nothing is known."""
-    lines = ["Scenes by what they combine, a sweep counted once; of **none** nothing is known:", "",
+    """Return the lines of a table of what scenes combine."""
+    lines = ["Scenes by what they combine, a sweep counted once; **none**: not tested:", "",
              f"| scenes | {' | '.join(_KINDS)} |", "|---" * (len(_KINDS) + 1) + "|"]  # fmt: skip
     for where, dimension in _WHERE.items():
         for mechanics in _MECHANICS:
