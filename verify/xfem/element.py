@@ -363,19 +363,22 @@ def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floa
     slope : (p, d, d, d, d) float array
     without : (p,) bool array
     """
-    spins = SPINS[F.shape[1]]
-    U = R.transpose(0, 2, 1) @ F
-    trace = np.einsum("pkk->p", U)
-    # H_ab = S_a,ij sym(U)_ik S_b,kj sums to tr(U) I − U in space, to tr(U) in the plane
-    H = np.einsum("aij,bik,pkj->pab", spins, spins, 0.5 * (U + U.transpose(0, 2, 1)), optimize=True)
-    cofactors, determinant = adjugate(H) if len(spins) == 3 else (np.ones_like(H), H[:, 0, 0])
+    (count, d, _), spins = F.shape, SPINS[F.shape[1]]
+    trace = np.einsum("pkl,pkl->p", R, F)
+    cofactors, determinant = np.ones((count, 1, 1)), trace
+    if d == 3:
+        U = R.transpose(0, 2, 1) @ F
+        H = trace[:, None, None] * np.eye(3) - 0.5 * (U + U.transpose(0, 2, 1))
+        cofactors, determinant = adjugate(H)
     without = ~(determinant > singular * np.abs(trace) ** len(spins))
     inverse = cofactors / np.where(without, 1.0, determinant)[:, None, None]
     inverse[without] = 0.0
-    # ∂R/∂F = Σ G_a (H⁻¹)_ab G_b, G_a = R S_a
-    G = np.einsum("pka,san->pskn", R, spins)
-    half = np.einsum("pst,ptlm->pslm", inverse, G)
-    return np.einsum("pskn,pslm->pknlm", G, half), without
+    # Σ G_a (H⁻¹)_ab G_b, G_a = R S_a: one large product for all of R S_a
+    turns = len(spins)
+    G = R.reshape(-1, d) @ spins.swapaxes(0, 1).reshape(d, -1)
+    G = G.reshape(count, d, turns, d).swapaxes(1, 2).reshape(count, turns, d * d)
+    slope = np.einsum("psi,psj->pij", G, inverse @ G)
+    return slope.reshape(count, d, d, d, d), without
 
 
 def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats, int]:
@@ -384,21 +387,22 @@ def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats,
     Cells whose rotation is not differentiable have the rotation-fixed moduli; the second value
     is how many they are.
     """
-    identity = np.eye(F.shape[1])
     lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
     trace = np.einsum("pkl,pkl->p", R, F) - (len(elements.corners) - 1)
     # A = 2μ δ_kl δ_nm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm + λ R_kn R_lm
     A, without = polar_slope(R, F)
     A *= (lam * trace - 2.0 * mu)[:, None, None, None, None]
-    A += (2.0 * mu)[:, None, None, None, None] * np.einsum("kl,nm->knlm", identity, identity)
+    rows = R.reshape(len(R), R[0].size)
+    square = A.reshape(*rows.shape, -1)  # rows kn, columns lm
+    np.einsum("pii->pi", square)[:] += (2.0 * mu)[:, None]
     if without.any():
         turned = R[without] @ restricted(elements)[without if elements.is_membrane else [0]]
         plane = turned @ turned.transpose(0, 2, 1)
         # μ (δ_kl δ_nm + R_km R_ln), of membranes δ_kl in the turned tangent plane
-        fixed = np.einsum("pkl,nm->pknlm", plane, identity)
+        fixed = np.einsum("pkl,nm->pknlm", plane, np.eye(F.shape[1]))
         fixed += np.einsum("pkm,pln->pknlm", R[without], R[without])
         A[without] = mu[without, None, None, None, None] * fixed
-    A += np.einsum("pkn,plm->pknlm", lam[:, None, None] * R, R)
+    square += np.einsum("pi,pj->pij", lam[:, None] * rows, rows)
     return A, int(without.sum())
 
 

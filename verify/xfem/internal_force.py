@@ -38,7 +38,7 @@ from verify.xfem.polar import rotations_in_plane, rotations_in_space
 Kinematics = Literal["corotational", "linear"]
 TangentKind = Literal["rotation-fixed", "geometric", "consistent", "tension"]
 
-_CHUNK = 512  # cells whose moduli are held at once
+_HELD = 512 * 3**4  # moduli at once
 
 
 class Configuration(NamedTuple):
@@ -337,8 +337,9 @@ class InternalForce:
                 added,
             )
         if kind == "consistent":
-            for start in range(0, len(at.F), _CHUNK):
-                some = slice(start, start + _CHUNK)
+            count = _HELD // self._shape[1] ** 4
+            for start in range(0, len(at.F), count):
+                some = slice(start, start + count)
                 elements = self.elements.part(some)
                 if self.law == "hooke":
                     moduli, singular = consistent_moduli(elements, at.R[some], at.F[some])

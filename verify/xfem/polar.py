@@ -39,16 +39,14 @@ def adjugate(A: Floats) -> tuple[Floats, Floats]:
     return cofactors, np.einsum("pk,pk->p", A[:, 0], cofactors[:, 0])
 
 
-def rotations_in_plane(F: Floats, R: Floats) -> None:
+@njit(cache=True)
+def rotations_in_plane(F, R):
     """Write the rotations nearest to F (p, 2, 2) to R; the identity where none is nearest."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        along, across = F[:, 0, 0] + F[:, 1, 1], F[:, 1, 0] - F[:, 0, 1]
+    for p in range(len(F)):
+        along, across = F[p, 0, 0] + F[p, 1, 1], F[p, 1, 0] - F[p, 0, 1]
         length = np.hypot(along, across)
-        defined = length > 0.0
-        length[~defined] = 1.0
-        R[:, 0, 0] = R[:, 1, 1] = np.where(defined, along / length, 1.0)
-        R[:, 1, 0] = across / length
-        R[:, 0, 1] = -R[:, 1, 0]
+        c, s = (along / length, across / length) if length > 0.0 else (1.0, across)
+        R[p, 0, 0], R[p, 1, 1], R[p, 1, 0], R[p, 0, 1] = c, c, s, -s
 
 
 @njit(cache=True)
