@@ -396,6 +396,9 @@ class StepForces:
     loaded_at : tuple of (share, weight)
         Instants of the step, as shares of it, at which it takes the external forces of the body,
         and the weight of each.
+    strain : float, optional
+        Strain energy at the end of the step, without contact, where the scheme has found it, in
+        joules.
     """
 
     internal: Floats
@@ -403,6 +406,7 @@ class StepForces:
     viscous: Floats
     inertia: Floats | None = None
     loaded_at: tuple[tuple[float, float], ...] = ((0.0, 0.5), (1.0, 0.5))
+    strain: float | None = None
 
     @property
     def unbalanced(self) -> Floats:

@@ -97,6 +97,7 @@ class BalanceRecorder:
     def __init__(self, body: DynamicBody, state: MotionState) -> None:
         self.body = body
         self._last = state.copy()
+        self._momenta = body.mass.apply(state.velocity)
         self.strain, self._penalty = self._stored(state)
         space = body.shape[1]
         self._work = np.zeros(6)  # load, support, damping, algorithmic, unbalanced, cut
@@ -117,18 +118,19 @@ class BalanceRecorder:
         if h == 0.0:
             raise XfemError(f"no time has passed since the last entry, t = {state.time:g} s")
         change = state.displacement - last.displacement
-        gained = body.mass.apply(state.velocity - last.velocity)
+        before, self._momenta = self._momenta, body.mass.apply(state.velocity)
+        gained = self._momenta - before
         inertia = gained / h if forces.inertia is None else forces.inertia
         residual = inertia - forces.external + forces.internal + forces.viscous
         reaction = np.where(body.fixed, residual, 0.0)
-        strain, self._penalty = self._stored(state)
+        strain, self._penalty = self._stored(state, forces.strain)
         # the two parts nearly cancel: what they differ by is taken first
         slips = (change / h - 0.5 * (last.velocity + state.velocity)) * gained
-        slip = np.sum(slips)
+        slip = slips.sum()
         # supports that take up another velocity at once do that work, whatever step they do it in
         taken = np.sum(slips[body.fixed]) if body.moving else 0.0
         if forces.inertia is not None:
-            slip += np.sum(change * (inertia - gained / h))
+            slip += np.vdot(change, inertia - gained / h)
         assert body.weight is not None
         tie = np.zeros(body.shape)
         if body.tie is not None:
@@ -136,12 +138,12 @@ class BalanceRecorder:
             middle = 0.5 * (last.displacement + state.displacement)
             self._turn = self._turn + h * _cross(body.force.phantom.node_points + middle, tie)
         self._work += [
-            np.sum(change * (forces.external - body.weight - tie)),
-            np.sum(change * reaction) - taken,
-            np.sum(change * forces.viscous),
-            slip - taken + np.sum(change * forces.internal) - (strain - self.strain),
-            np.sum(change * (residual - reaction)),
-            -np.sum(change * tie),
+            np.vdot(change, forces.external - body.weight - tie),
+            np.vdot(change, reaction) - taken,
+            np.vdot(change, forces.viscous),
+            slip - taken + np.vdot(change, forces.internal) - (strain - self.strain),
+            np.vdot(change, residual - reaction),
+            -np.vdot(change, tie),
         ]
         self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(
             axis=0
@@ -160,17 +162,19 @@ class BalanceRecorder:
             Whether the last entry shall be of after that.
         """
         last = self._last
-        gained = self.body.mass.apply(velocity - last.velocity)
+        before, self._momenta = self._momenta, self.body.mass.apply(velocity)
+        gained = self._momenta - before
         self._work[1] += 0.5 * np.sum((velocity + last.velocity) * gained)
         self._impulse = self._impulse + gained.sum(axis=0)
         self._last = MotionState(last.displacement, velocity.copy(), last.time)
         if again:
             self._rows[-1] = self._row(self._last)
 
-    def _stored(self, state: MotionState) -> tuple[float, float]:
+    def _stored(self, state: MotionState, strain: float | None = None) -> tuple[float, float]:
         """Compute the strain energy, and the share of a ghost penalty or of contact in it."""
         force = self.body.force
-        _, strain = force.evaluate(state.displacement)
+        if strain is None:
+            _, strain = force.evaluate(state.displacement)
         penalty, contact = force.penalty_energy(state.displacement), self.body.contact
         pressed = 0.0 if contact is None else contact.energy(state.displacement)
         return strain + pressed, penalty + pressed
@@ -178,13 +182,13 @@ class BalanceRecorder:
     def _row(self, state: MotionState) -> Floats:
         body = self.body
         assert body.weight is not None
-        momenta = body.mass.apply(state.velocity)
+        momenta = self._momenta
         position = body.force.phantom.node_points + state.displacement
         energies = [
             state.time,
-            0.5 * np.sum(state.velocity * momenta),
+            0.5 * np.vdot(state.velocity, momenta),
             self.strain,
-            -np.sum(body.weight * state.displacement),
+            -np.vdot(body.weight, state.displacement),
         ]
         angular = _cross(position, momenta)
         vectors = (momenta.sum(axis=0), angular, self._impulse)
@@ -201,10 +205,10 @@ class BalanceRecorder:
 
 
 def _cross(position: Floats, momenta: Floats) -> Floats:
-    if position.shape[1] == 2:
-        angular = position[:, 0] * momenta[:, 1] - position[:, 1] * momenta[:, 0]
-        return np.array([angular.sum()])
-    return np.cross(position, momenta).sum(axis=0)
+    """Sum cross products: what the sum of tensor products has off its diagonal."""
+    S = position.T @ momenta
+    turns = S - S.T
+    return turns[:1, 1] if len(S) == 2 else np.array([turns[1, 2], turns[2, 0], turns[0, 1]])
 
 
 def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: int) -> EnergyBalance:
