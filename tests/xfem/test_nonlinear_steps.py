@@ -8,11 +8,14 @@ from cut_bodies import DENSITY, isotropic, material, rotation
 from swings import aggregated, cube, let_go, plate, uniform
 
 import verify.xfem as xfem
+from verify.accelerated import FAST
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import StepFailedError
 from verify.xfem.explicit import RESONANCE_FREE, element_critical_steps
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.subdivision import subdivide
+from verify.xfem.turning_faces import TurningFaces
 
 
 def deformed(random, mesh, strain):
@@ -136,3 +139,58 @@ def test_slivers_that_ring_cost_few_corrections_more_with_a_consistent_mass():
             scheme.step(state)
         solves.append(scheme.solves)
     assert solves[1] <= 1.25 * solves[0]
+
+
+class Counted(Trapezoidal):
+    """Counts its matrices."""
+
+    matrices = 0
+
+    def _assemble(self, end, kind):
+        self.matrices += 1
+        super()._assemble(end, kind)
+
+
+class Anew(Counted):
+    """Makes and factorises its matrix for every correction."""
+
+    _again = property(lambda self: False, lambda self, value: None)
+
+
+@pytest.mark.parametrize("contact", [False, True])
+@pytest.mark.parametrize("dim, fraction", [(2, 0.3), (2, 1e-6), (3, 1e-3)])
+def test_a_matrix_that_is_kept_leads_to_the_same_ends_of_steps(dim, fraction, contact):
+    """A body that turns by a radian, cut beside a node; with contact its halves are pressed."""
+    mesh = xfem.rectangle_mesh((5, 4)) if dim == 2 else xfem.box_mesh((3, 2, 2))
+    node = mesh.points[np.argmin(np.linalg.norm(mesh.points - 0.5, axis=1))]
+    cut = xfem.Plane(node + fraction * np.eye(dim)[-1] / 4.0, [0.1, 0.0, 1.0][-dim:])
+    v = xfem.cut_mesh(mesh, [cut])
+    force, found = xfem.InternalForce(v, material(dim)), []
+    faces = TurningFaces(v, material(dim)) if contact else None
+    body = xfem.DynamicBody(force, consistent_mass(v, DENSITY), contact=faces)
+    schemes = Counted(body, 0.0025), Anew(body, 0.0025)
+    for scheme in schemes:
+        state, x = body.rest(), v.node_points - 0.5
+        state.velocity[:] = x @ (4.0 * rotation(dim, np.pi / 2) - 0.1 * np.eye(dim))
+        for _ in range(100):
+            scheme.step(state)
+        found.append(subdivide(v).interpolation @ state.displacement)
+    assert np.abs(found[0] - found[1]).max() < 1e-8 * np.abs(found[1]).max()  # 100 of 1e-10
+    assert schemes[1].matrices == schemes[1].solves
+    assert contact or schemes[0].matrices < schemes[0].solves
+
+
+def test_a_linear_body_takes_one_correction_a_step_whatever_its_linear_solver():
+    """Its forces are linear: conjugate gradients go on until the step is solved."""
+    v = xfem.cut_mesh(
+        xfem.rectangle_mesh((12, 12)), [xfem.Plane([0.4, 0.52], [0.2, 1.0])], "inside"
+    )
+    force = xfem.InternalForce(v, material(2), "linear", FAST)
+    body = xfem.DynamicBody(force, consistent_mass(v, DENSITY))
+    state = body.rest()
+    state.velocity[:] = np.sin(3.0 * v.node_points[:, ::-1])
+    for step in (1e-3, 3e-3, 1e-2):  # a scheme anew iterates
+        scheme = Trapezoidal(body, step)
+        for _ in range(3):
+            scheme.step(state)
+        assert scheme.solves == 3

@@ -191,10 +191,11 @@ def find_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> tuple[Ints,
     return at, keys[at] == wanted
 
 
-def add_mass(blocks: Floats, places: Ints, values: Floats, scale: float) -> None:
+def add_mass(blocks: Floats, places: Ints | slice, values: Floats, scale: float) -> None:
     """Add `scale` times mass entries (k,) to the diagonals of the nodal blocks at `places` (k,)."""
+    added = scale * values
     for component in range(blocks.shape[1]):
-        blocks[places, component, component] += scale * values
+        blocks[places, component, component] += added
 
 
 def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
@@ -238,8 +239,10 @@ def constrain(
     held : (k,) int array, optional
         From `held_entries`, if that is known.
     """
-    blocks.reshape(-1)[held_entries(pattern, fixed) if held is None else held] = 0.0
     nodes, axes = np.nonzero(fixed)
+    if not len(nodes):
+        return
+    blocks.reshape(-1)[held_entries(pattern, fixed) if held is None else held] = 0.0
     own = np.einsum("nkk->nk", blocks[pattern.diagonal[nodes]])
     least = _ROUND_OFF * own.max(axis=1, initial=0.0)
     none = own[np.arange(len(nodes)), axes] <= least

@@ -300,8 +300,7 @@ class EnergyMomentum(NewtonIntegrator):
         middle = self._start.time + 0.5 * self.step_size
         mean = 0.5 * (self._start.velocity + velocity)
         viscous = self.body.viscous(mean, end.configuration)
-        external = self.body.external(middle)
-        return StepForces(end.force, external, viscous, loaded_at=((0.5, 1.0),))
+        return StepForces(end.force, self._load(middle), viscous, loaded_at=((0.5, 1.0),))
 
     def _ends(self, after: Configuration) -> StepEnds:
         """Return both ends of the step."""

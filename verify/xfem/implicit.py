@@ -24,7 +24,7 @@ _HALVINGS = 10
 _SLOW = 0.5  # of the residual: what a correction leaves that takes too little off
 _JUST = 1e-9  # of a step: more than the round-off of a time summed over some thousand steps
 _INEXACT = 1e-6  # residual of conjugate gradients for a correction without a former one
-_COARSE, _FINE = 1e-2, 1e-10  # most and least of it
+_COARSE, _FINE = 1e-2, 1e-12  # most and least of it
 _SPARE = 0.05  # of the residual expected after the correction: conjugate gradients may leave it
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
@@ -41,12 +41,15 @@ class Resistance(NamedTuple):
     blocks : (B, d, d) float array or None
         Derivative by the displacement where one pass finds both, in the memory of the integrator:
         until the next evaluation, or until a matrix is made of it.
+    strain : float or None
+        Strain energy at the end, where it was found too, in joules.
     """
 
     displacement: Floats
     force: Floats
     configuration: Configuration | None
     blocks: Floats | None = None
+    strain: float | None = None
 
 
 class Iterate(NamedTuple):
@@ -133,10 +136,14 @@ class NewtonIntegrator(ABC):
         # weight ε³ where its stiffness is ε²: over the former these, 1/ε and more, would be the
         # scale, beside which nothing else is left to solve. Over its share of volumes they are not
         mass = np.maximum(body.mass.matrix.diagonal(), body.mass.weights)
-        self._inverse_mass = (1.0 / np.maximum(mass, self._shared_mass()))[:, None]
+        inverse = 1.0 / np.maximum(mass, self._shared_mass())
+        self._inverse_mass = np.repeat(inverse, space).reshape(body.shape)
         self._noise = self._round_off()
         self._factorised: tuple[float, RayleighDamping, bytes] | None = None
         self._left: list[float] = []  # of the residual by each correction of the last step
+        self._again = False  # whether the matrix of the last correction serves for the next
+        self._rate = 0.0  # share of the residual that one left when it last did
+        self._loads: dict[float, Floats] = {}  # external forces in this step, by their time
         self._end: Resistance | None = None  # of the last step
         self._mean_velocity = np.zeros(body.shape)  # in it
         self._speed = np.zeros(body.shape)  # of the supports at the end of the step
@@ -155,14 +162,21 @@ class NewtonIntegrator(ABC):
 
     def _load_at_end(self, time: float) -> Floats:
         """Compute external force (N, d) of a step that ends at a time, before what jumps then."""
-        return self.body.external(time - _JUST * self.step_size)
+        return self._load(time - _JUST * self.step_size)
+
+    def _load(self, time: float) -> Floats:
+        """Compute the external force (N, d) at a time once in a step."""
+        if time not in self._loads:
+            self._loads[time] = self.body.external(time)
+        return self._loads[time]
 
     def _resistance(self, displacement: Floats) -> Resistance:
         """Evaluate the internal force of a step that ends there."""
         body, force = self.body, self.body.force
         if not (force.has_one_pass and force.is_corotational):
             at = force.configuration(displacement)
-            return Resistance(displacement, force.evaluate_at(at)[0], at)
+            found, strain = force.evaluate_at(at)
+            return Resistance(displacement, found, at, strain=strain)
         found = np.empty(body.shape)
         force.linearise(
             body.pattern, displacement, displacement, 0.0, self._stiffness_share, found,
@@ -202,7 +216,8 @@ class NewtonIntegrator(ABC):
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
         check_state(state, self.body.shape)
-        self._start = state.copy()
+        self._start, self._again = state.copy(), False
+        self._loads.clear()
         self._prepare()
         velocity = state.velocity
         # velocities of slivers, which have hardly any mass to keep them, ring from step to step:
@@ -220,7 +235,7 @@ class NewtonIntegrator(ABC):
         state.displacement[:], state.velocity[:] = end.displacement, end.velocity
         state.time = self._start.time + self.step_size
         self._end = end.resistance._replace(blocks=None)
-        return end.forces
+        return replace(end.forces, strain=end.resistance.strain)
 
     def _velocity(self, displacement: Floats) -> Floats:
         velocity = (self.rate / self.step_size) * (displacement - self._start.displacement)
@@ -256,7 +271,8 @@ class NewtonIntegrator(ABC):
         return self.rate if self.weight is None else self.weight
 
     def _size(self, force: Floats) -> float:
-        return float(np.linalg.norm(self._inverse_mass * force))
+        acceleration = self._inverse_mass * force
+        return float(np.sqrt(np.vdot(acceleration, acceleration)))
 
     def _newton(self, displacement: Floats) -> Iterate:
         """End of the step, from a first guess (N, d).
@@ -272,27 +288,31 @@ class NewtonIntegrator(ABC):
         for number in range(self.iterations):
             if np.isnan(now.norm):  # inside out, where the energy is infinite
                 break
+            goal = self.tolerance * now.scale
             # round-off of positions, seen through the stiffness
             reach = np.abs(body.force.phantom.node_points + now.displacement).max()
             noise = reach * self._noise
-            if self._excess(now.residual, noise) <= self.tolerance * now.scale:
+            if self._excess(now.residual, noise) <= goal:
                 self._left = left
                 return now
-            aim = self._aim(number, self.tolerance * now.scale / now.norm)
+            # a matrix of before leaves twice what it left, or more: kept where that will do
+            self._again = bool(left) and max(2.0 * left[-1], self._rate) * now.norm <= goal
+            aim = self._aim(number, goal / now.norm)
             correction = self._correction(now.resistance, now.residual, aim, is_slow)
-            # within what round-off may keep from falling
-            nearly = self._excess(now.residual, 100.0 * noise) <= 1e3 * self.tolerance * now.scale
             for halving in range(_HALVINGS):
                 trial = self._iterate(now.displacement + 0.5**halving * correction)
                 if trial.norm < now.norm:
                     break
             else:
-                if nearly:  # once more, as schemes keep what the last evaluation found
+                # within what round-off may keep from falling
+                if self._excess(now.residual, 100.0 * noise) <= 1e3 * goal:
+                    # once more, as schemes keep what the last evaluation found
                     return self._iterate(now.displacement)
                 # a dead end of the residual, not a root: leap over it
                 leaps += 1
                 trial = self._iterate(now.displacement + correction)
             left.append(trial.norm / now.norm)
+            self._rate = left[-1] if self._again else self._rate
             is_slow = not trial.norm < _SLOW * now.norm
             now = trial
         raise StepFailedError(
@@ -316,7 +336,11 @@ class NewtonIntegrator(ABC):
         enough : float
             Share of the residual with which the step is solved.
         """
-        expected = self._left[number] if number < len(self._left) else _INEXACT / _SPARE
+        body = self.body
+        if not body.force.is_corotational and body.contact is None:
+            expected = 0.0  # forces are linear: one correction will do
+        else:
+            expected = self._left[number] if number < len(self._left) else _INEXACT / _SPARE
         return min(max(_FINE, _SPARE * max(expected, enough)), _COARSE)
 
     def _shared_mass(self) -> Floats:
@@ -327,7 +351,7 @@ class NewtonIntegrator(ABC):
         return np.asarray(body.mass.weights.sum() / shared.sum() * shared)
 
     def _round_off(self) -> Floats:
-        """Bound the error (N, 1) of the acceleration of each node, for positions of size one."""
+        """Bound the error (N, d) of the acceleration of each node, for positions of size one."""
         body = self.body
         self._blocks[:] = 0.0
         rest = body.force.configuration(np.zeros(body.shape))
@@ -390,7 +414,8 @@ class NewtonIntegrator(ABC):
         if not self.body.force.is_corotational:
             closed = b"" if contact is None else contact.touching(end.displacement).tobytes()
             given = (self.step_size, self.body.damping, closed)
-        if given is None or given != self._factorised:  # else K is the last one
+        kept = self._again and not self._solver.is_iterative
+        if not kept and (given is None or given != self._factorised):  # else K is the last one
             self._factorised = None
             self._assemble(end, kind)
             self._solver.factorize(self._blocks)

@@ -145,8 +145,8 @@ class Mass:
             own = np.concatenate([own, pairs[~found]])
         return body_pattern(phantom, own)
 
-    def places(self, pattern: BlockPattern) -> Ints:
-        """Find the block of each of the `entries` in a pattern.
+    def places(self, pattern: BlockPattern) -> Ints | slice:
+        """Find the block of each of the `entries` in a pattern: all of them in its own.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Mass:
         """
         rows, columns, _ = self.entries
         if pattern is self.sparsity:
-            return np.arange(len(rows))
+            return slice(None)
         if self.diagonal is not None and len(rows) == pattern.node_count:
             return pattern.diagonal.astype(np.int64)
         return pattern_places(pattern, rows, columns)
