@@ -273,6 +273,7 @@ class Newton:
         self._internal = np.empty(fixed.shape)
         self._held = held_entries(self._pattern, fixed)
         self._solver = StaticSolver(force, self._pattern, fixed, inexact)
+        self._inverted: Floats | None = None  # blocks that were factorised last
 
     @property
     def solvers(self) -> frozenset[str]:
@@ -439,7 +440,11 @@ class Newton:
             If the tangent is found not to be positive definite, here or when it solves.
         """
         constrain(self._pattern, self.fixed, self._blocks, self._held)
-        self._solver.factorize(self._blocks)
+        # of a linear body the same again tells whether it is stable
+        if self._inverted is None or not np.array_equal(self._inverted, self._blocks):
+            self._inverted = None
+            self._solver.factorize(self._blocks)
+            self._inverted = self._blocks.copy()
         return self._solver
 
 
