@@ -23,6 +23,7 @@ _DIVISIONS = 6  # of each edge of a simplex of the cut
 _STILL = 1e-30  # s: a simplex that is swept at once
 _LINEAR = 1e-13  # of the longest time in which a simplex is swept
 _ROUND_OFF = 16 * np.finfo(float).eps  # of a time
+_KNOWN = 8  # times whose factors are kept: a step and its account take four
 
 
 class CutSimplices(NamedTuple):
@@ -89,9 +90,10 @@ class Fading:
     _known: dict[float, Array] = field(default_factory=dict, repr=False, compare=False)
 
     def at(self, time: float) -> Array:
-        """Return the factors (count,) at a time; repeated calls at one time evaluate them once."""
+        """Return the factors (count,) at a time; repeated calls at few times evaluate them once."""
         if time not in self._known:
-            self._known.clear()
+            if len(self._known) == _KNOWN:
+                self._known.clear()
             left = _left(self.times, self.values, time)
             self._known[time] = np.bincount(self.row, left, self.count)
         return self._known[time]

@@ -345,6 +345,8 @@ class CutMotion:
         """Advance the state by a time, s, and account for it."""
         if size not in self._integrators:
             self._integrators[size] = self._integrator(size)
+        if isinstance(self.body.tie, TieForces):
+            self.body.tie = self.body.tie.still(self.state.time)
         tie = self.body.tie if len(self._by_cut) > 1 else None  # one has all of `cut_work`
         before = self.state.displacement.copy() if tie is not None else self.state.displacement
         with self.record.timed("steps"):
