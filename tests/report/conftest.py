@@ -19,9 +19,9 @@ def plain_run(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def pictured_run(tmp_path_factory):
-    """Return a rendered run of three cases with pictures."""
+    """Return a rendered run of three cases with pictures, as a page and as Markdown."""
     root = make_run(tmp_path_factory.mktemp("pictured") / "run")
-    render(root)
+    render(root, "markdown")
     return root
 
 

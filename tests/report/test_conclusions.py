@@ -33,6 +33,7 @@ from verify.result import CaseResult, Metric, ReferenceRecord, SolveRecord, Stat
 SCRIPT = Path(__file__).parents[2] / ".ci/results"
 PUBLISHER = ModuleType("results")
 exec(compile(SCRIPT.read_text("utf-8"), str(SCRIPT), "exec"), PUBLISHER.__dict__)
+NAMED = {s.name: s for own in conclusions.QUESTIONS.values() for s in own}
 REMESHED, FUNCTIONS = "conforming mesh=remeshed", "getfem tip=functions"
 # factor of the error on the errors of `conforming`, seconds on the coarsest level
 SOLVERS = {
@@ -155,7 +156,7 @@ def changed(factors):
 def test_made_numbers_support_every_sentence_and_stand_in_it():
     answers = answer(made())
     found = {name: one for own in answers for name, one in own.found.items()}
-    assert set(found) == {s.name for own in conclusions.QUESTIONS.values() for s in own}
+    assert set(found) == set(NAMED)
     assert not any(own.lacking for own in answers)
     assert "1.1 times a conforming mesh's" in found["through"].text
     assert "over 4 scenes" in found["through"].numbers  # the sweep is one of them
@@ -202,9 +203,7 @@ def test_steps_are_held_at_one_distance_and_a_lumped_mass_has_its_price():
 
 def test_all_runs_of_the_hand_are_told_and_the_slowest_decides():
     runs = [{"slowest": one} for one in (0.036, 0.016, 0.012)]
-    (sentence,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                   if s.name == "real time")  # fmt: skip
-    found = sentence.of(made(hand={**made().hand, "slowest": 0.016, "runs": runs}))
+    found = NAMED["real time"].of(made(hand={**made().hand, "slowest": 0.016, "runs": runs}))
     assert "does not cut" in found.text
     assert "slowest step 12 to 36 ms of processor time, 16.7 allowed (3 runs)." in found.text
 
@@ -265,17 +264,14 @@ def test_a_sentence_without_support_stops_the_publication(name, evidence):
 ])  # fmt: skip
 def test_real_time_is_told_with_the_speed_of_the_machine(slowest, busy, words):
     hand = {**made().hand, "slowest": slowest, "kernel": 0.0189, "contended": busy}
-    (sentence,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                   if s.name == "real time")  # fmt: skip
-    found = sentence.of(made(hand=hand))
+    found = NAMED["real time"].of(made(hand=hand))
     assert words in found.text
     assert "kernel 19 ms" in found.numbers
 
 
 def test_the_error_in_space_is_absolute_and_bounded_where_the_reference_is_no_better():
     """Of the third level: 0.01 (k + 1)/3, the fourth with a half-width of 0.02."""
-    (sentence,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                   if s.name == "motion in space")  # fmt: skip
+    sentence = NAMED["motion in space"]
     found = sentence.of(made(in_space()))
     said = (
         "In 3 cut solids in motion XFEM's error is 0.33 to 1.0 %, a conforming mesh's 0.33 to 1.0 %"
@@ -290,23 +286,16 @@ def test_the_error_in_space_is_absolute_and_bounded_where_the_reference_is_no_be
     assert sentence.of(made([whole, *in_space()[2:]])) is None
     assert sentence.of(made(in_space(known=2))) is None
     assert sentence.of(made(others())) is None  # in the plane
-    (frames,) = (s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                 if s.name == "frames")  # fmt: skip
-    assert frames.of(made()).text == "There the engine's step of 1/60 s is wrong by 3.3 to 13 %."
+    said = "There the engine's step of 1/60 s is wrong by 3.3 to 13 %."
+    assert NAMED["frames"].of(made()).text == said
 
 
 def test_every_sentence_has_numbers_that_refute_it():
     marks = test_a_sentence_without_support_stops_the_publication.pytestmark
     tried = {name for name, _ in marks[0].args[1]}
-    weighed = {
-        "frames",
-        "real time",
-        "motion",
-        "motion in space",
-        "motion, remeshed",
-        "remeshing time",
-    }  # say which of several things is so
-    assert tried | weighed == {s.name for own in conclusions.QUESTIONS.values() for s in own}
+    weighed = {"frames", "real time", "motion", "motion in space", "motion, remeshed",
+               "remeshing time"}  # fmt: skip
+    assert tried | weighed == set(NAMED)  # these say which of several things is so
 
 
 def shifted(factor):
@@ -329,9 +318,8 @@ def shifted(factor):
     ("remeshing time", {REMESHED: (1.0, 0.2)}, 1.0, "takes only 0.18 (0.18 to 0.18) times"),
 ])  # fmt: skip
 def test_a_weighed_sentence_says_which_is_better(name, cases, positions, words):
-    sentence = next(s for own in conclusions.QUESTIONS.values() for s in own if s.name == name)
     evidence = made(changed({"xfem": (1.1, 1.0), **cases}), positions=shifted(positions))
-    found = sentence.of(evidence)
+    found = NAMED[name].of(evidence)
     assert words in found.text
     assert found.holds
 
@@ -373,17 +361,21 @@ def test_scatter_is_the_range_over_positions_of_scenes_of_the_kind():
     assert beside(again, "rest", METRIC, "xfem").meshes == 42
 
 
+def placed(factors):
+    """Return errors of XFEM over a conforming mesh's at 16 positions: by scene two, in turn."""
+    return [
+        {"scene": scene, "position": str(k), "solver": name, "metric": METRIC,
+         "value": str(value), "low": "0.1"}
+        for scene, pair in factors.items() for k in range(16)
+        for name, value in (("xfem", pair[k % 2]), ("conforming", 1.0))
+    ]  # fmt: skip
+
+
 def test_a_difference_in_motion_has_to_show_over_positions_of_moving_scenes_of_the_benchmark():
-    sentence = next(s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                    if s.name == "motion")  # fmt: skip
     cases = changed({"xfem": (2.6, 1.0)})
     for factors in ((2.0, 3.0), (0.7, 3.0)):
-        rows = [
-            {"scene": "dynamics/2", "position": str(k), "solver": name, "metric": METRIC,
-             "value": str(value), "low": "0.1"}
-            for k in range(16) for name, value in (("xfem", factors[k % 2]), ("conforming", 1.0))
-        ]  # fmt: skip
-        found = sentence.of(made(cases, benchmark_positions=rows))
+        evidence = made(cases, benchmark_positions=placed({"dynamics/2": factors}))
+        found = NAMED["motion"].of(evidence)
         told = "(0.70 to 3.0), not told apart." in found.text
         assert told is (min(factors) < 1.0)
         assert found.holds
@@ -391,27 +383,15 @@ def test_a_difference_in_motion_has_to_show_over_positions_of_moving_scenes_of_t
 
 def test_of_many_scenes_those_are_counted_that_positions_of_the_mesh_tell_apart():
     factors = {"benchmark/c1_slit": 1.0, "benchmark/c4_disc": 1.4, "fracture/front": 2.0}
-    rows = [
-        {"scene": scene, "position": str(k), "solver": name, "metric": METRIC,
-         "value": str(value), "low": "0.1"}
-        for scene, factor in factors.items() for k in range(16)
-        for name, value in (("xfem", factor * (0.9 + 0.2 * (k % 2))), ("conforming", 1.0))
-    ]  # fmt: skip
+    rows = placed({scene: (0.9 * factor, 1.1 * factor) for scene, factor in factors.items()})
     evidence = made(positions=rows[:32], benchmark_positions=rows[32:], tips=frozenset(factors))
     text = beside(evidence, "tip", METRIC, "xfem").over_positions
     assert text.endswith(", above 1 in 2 of 3 scenes (C4 1.4, fracture/front 2.0)")
 
 
 def test_two_scenes_whose_positions_contradict_each_other_are_told_one_by_one():
-    sentence = next(s for s in conclusions.QUESTIONS["A moving body, a blade, real time"]
-                    if s.name == "motion")  # fmt: skip
-    rows = [
-        {"scene": scene, "position": str(k), "solver": name, "metric": METRIC,
-         "value": str(value), "low": "0.1"}
-        for scene, factor in (("dynamics/1", 0.5), ("dynamics/2", 1.5)) for k in range(16)
-        for name, value in (("xfem", factor), ("conforming", 1.0))
-    ]  # fmt: skip
-    text = sentence.of(made(changed({"xfem": (2.6, 1.0)}), benchmark_positions=rows)).text
+    rows = placed({"dynamics/1": (0.5, 0.5), "dynamics/2": (1.5, 1.5)})
+    text = NAMED["motion"].of(made(changed({"xfem": (2.6, 1.0)}), benchmark_positions=rows)).text
     both = "dynamics/1 0.50 (0.50 to 0.50), below 1; dynamics/2 1.5 (1.5 to 1.5), above 1"
     assert text.endswith(f"Over positions: {both}; the scene decides.")
 

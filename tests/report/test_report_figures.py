@@ -112,7 +112,7 @@ TIMES = [0.0, 0.25, 0.5, 0.75, 1.0]
 
 def moving_run(root, solvers=("xfem", "conforming"), opens_at=0.4):
     """Make the first case of a run move; every solver has its own energies."""
-    make_run(root, pictures=False)
+    make_run(root, False, "f3_inclined")
     file = root / "cases" / "statics__f3_inclined" / "result.json"
     result = json.loads(file.read_text())
     model = max((s for s in result["solves"] if s["solver"] == "xfem"), key=lambda s: s["level"])
@@ -176,7 +176,7 @@ NO_TIP = "the end of the arc (0.1, 0) m is no tip"
 
 @pytest.fixture(scope="module")
 def warned(tmp_path_factory):
-    root = make_run(tmp_path_factory.mktemp("warned") / "run", pictures=False)
+    root = make_run(tmp_path_factory.mktemp("warned") / "run", False, "f3_inclined")
     file = root / "cases" / "statics__f3_inclined" / "result.json"
     notices = [
         Notice(NoticeKind.WARNING, "cut 0", "xfem", CLOSED),

@@ -110,9 +110,11 @@ def suite(monkeypatch):
     return asked
 
 
-def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(tmp_path):
+def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(
+    tmp_path, plain_run
+):
     root = make_run(tmp_path / "run", pictures=False)
-    assert "solvers on" not in text_of(root)
+    assert "solvers on" not in (plain_run / "report.html").read_text(encoding="utf-8")
     ranked(root)
     said = text_of(root)
     assert "solvers on 3 scenes at rest, compared two by two" in said
@@ -122,7 +124,7 @@ def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(
 
 
 def test_conformance_is_taken_over_until_the_solver_changes(tmp_path, suite, monkeypatch):
-    root = make_run(tmp_path / "run", pictures=False)
+    root = make_run(tmp_path / "run", False, "griffith_inside")
     ranked(root, conformance=True)
     assert "two halves contract each for itself" in text_of(root)
     first = list(suite)

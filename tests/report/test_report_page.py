@@ -96,7 +96,7 @@ def test_junit_has_one_test_case_per_verdict_with_its_outcome(plain_run):
 def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_beside_its_pass(
     tmp_path,
 ):
-    root = make_run(tmp_path / "run", pictures=False)
+    root = make_run(tmp_path / "run", False, "f3_inclined")
     file = root / "cases/statics__f3_inclined/result.json"
     result = read_result(file)
     (at, passed) = next((i, v) for i, v in enumerate(result.verdicts) if v.verdict is Verdict.PASS)
@@ -169,7 +169,7 @@ def test_a_mesh_that_conforms_to_the_cut_is_part_of_the_time_that_is_compared(pl
 
 def test_every_table_has_rows_of_one_width_and_holds_the_numbers_of_the_page(pictured_run):
     root = pictured_run
-    text = render(root, "markdown").read_text(encoding="utf-8")
+    text = (root / "report.md").read_text(encoding="utf-8")
     render(root, "summary")
     page = parsed((root / "report.html").read_text(encoding="utf-8"))
     tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)

@@ -145,14 +145,20 @@ def test_a_number_that_is_swept_costs_nothing_up_to_a_twentieth_more(worst, firs
     assert f"at most: displacement, L² {worst[0]:.2f}" in lead.caption
 
 
-def test_curves_that_nobody_can_tell_apart_are_one_and_end_where_unknowns_change(monkeypatch):
-    kept = {}
+@pytest.fixture
+def kept(monkeypatch):
+    """Hold the curves of what is drawn, by their labels."""
+    found = {}
 
     def keep(figure, alt):
-        kept.update({line.get_label(): line.get_xydata() for line in figure.axes[0].lines})
+        found.update({line.get_label(): line.get_xydata() for line in figure.axes[0].lines})
         return alt
 
     monkeypatch.setattr(figures, "drawing", keep)
+    return found
+
+
+def test_curves_that_nobody_can_tell_apart_are_one_and_end_where_unknowns_change(kept):
     steps = {"xfem": (2.0, 2.0, 2.0), "xfem slivers=merge": (1.98, 2.0, 2.0),
              "subdivision": (0.2, 2e-3, 2.0)}  # fmt: skip
     unknowns = {"xfem": (50, 50, 50), "xfem slivers=merge": (50, 50, 50),
@@ -170,14 +176,7 @@ def test_curves_that_nobody_can_tell_apart_are_one_and_end_where_unknowns_change
     ((2.0, 0.02, 2.0), True),  # the cut is on nodes
     ((2.0, 2.0, 1.97), False), ((2.0, 2.0, 0.02), True),
 ])  # fmt: skip
-def test_a_curve_goes_on_where_unknowns_change_and_its_law_does_not(monkeypatch, values, gap):
-    kept = {}
-
-    def keep(figure, alt):
-        kept.update({line.get_label(): line.get_xydata() for line in figure.axes[0].lines})
-        return alt
-
-    monkeypatch.setattr(figures, "drawing", keep)
+def test_a_curve_goes_on_where_unknowns_change_and_its_law_does_not(kept, values, gap):
     steps = {"xfem mass=consistent": values, "xfem": (2.0, 2.0, 1.0)}
     unknowns = {"xfem mass=consistent": (198, 198, 196), "xfem": (50, 50, 50)}
     sliver_lead(record(EQUAL, steps, unknowns))
