@@ -179,6 +179,7 @@ def test_noise_far_below_the_errors_breaks_repeatability_only(solver, check):
 
 
 @pytest.mark.parametrize("solver, check", [("CrashesOnCuts", "cut-patch")])
+@pytest.mark.usefixtures("forked")
 def test_a_crash_is_a_finding_and_the_checks_after_it_still_run(solver, check):
     found = state(solver, check, "closed-cut", "uncut-2d", "uncut-3d")
     for name in (check, "closed-cut"):
