@@ -48,7 +48,6 @@ BROKEN_LINES = {
     "negative memory": (["--memory", "-1"], "--memory"),
     "half a repetition": (["--repetitions", "1.5"], "--repetitions"),
     "solver": (["--solver", "xfen"], "'xfem'"),
-    "solver module": (["statics/f1_patch", "--solver", "no_module:S"], "'no_module'"),
     "parameter": (["statics/f1_patch", "--set", "xfem.masss=evs"], "'mass'"),
     "removed parameter": (["statics/f1_patch", "--set", "xfem.basis=shifted"], "leave it out"),
     "cluster": (["statics/f1_patch", "--cluster", "dask.json"], "'dask.json'"),

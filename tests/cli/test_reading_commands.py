@@ -58,8 +58,9 @@ def test_list_names_every_case_with_its_title_and_wraps_at_the_width(capsys, mon
 
 
 @pytest.mark.parametrize("case", NAMES)
-def test_describe_says_the_requirement_and_every_check(case, capsys):
+def test_describe_says_the_requirement_and_every_check(case, capsys, monkeypatch):
     """All defaults are written out, nothing is lost."""
+    monkeypatch.setattr("verify.scene.load_scene", SCENES.__getitem__)
     assert main(["describe", case]) == 0
     text = " ".join(capsys.readouterr().out.split())
     scene = SCENES[case]
@@ -77,6 +78,9 @@ def loaded():
     print("loaded", *sorted({name.partition(".")[0] for name in sys.modules}))
 from verify.cli import main
 loaded()
+import verify.scene
+first = dict(list(verify.scene.list_cases().items())[:3])
+verify.scene.list_cases = lambda: first  # what reads three cases reads all
 for words in (["list"], ["describe", "statics/f1_patch"], ["schema"]):
     main(words)
     loaded()
