@@ -42,8 +42,10 @@ def declared(*groups):
 @cache
 def imported_by(file):
     """Return the top-level names that a Python file imports."""
-    names = set()
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    names, nodes = set(), [ast.parse(file.read_bytes())]
+    while nodes:  # statements alone: most nodes are of expressions, which hold none
+        node = nodes.pop()
+        nodes += [n for n in ast.iter_child_nodes(node) if not isinstance(n, ast.expr)]
         if isinstance(node, ast.Import):
             names |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
