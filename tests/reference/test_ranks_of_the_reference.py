@@ -78,8 +78,8 @@ def squeezed():
         loads=[{"kind": "traction", "where": "top", "traction": [50.0, -200.0]}])
 
 rest = [
-    answer_on(world, 1, "direct", 0.3), answer_on(world, 2, "multigrid", 0.4),
-    answer_on(world, 2, "multigrid", 0.6, pressure=True), turned(),
+    answer_on(world, 1, "direct", 0.3), answer_on(world, 2, "multigrid", 0.6),
+    answer_on(world, 2, "multigrid", 0.8, pressure=True), turned(),
 ]
 motions = {}
 for name, scene, solver, given in [
