@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from verify.result import Verdict
+from verify.simulator import thesis as tables
 from verify.simulator.thesis import (
     CUTS,
     LIMITS,
@@ -52,9 +53,14 @@ def strips():
     return count_strips((1, 2, 7))
 
 
+FRAME = 0.05  # s: a delay does not depend on it, and steps of 1/60 s are three times as many
+
+
 @pytest.fixture(scope="module")
 def crossed():
-    return delays((200, 400))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tables, "_FRAME", FRAME)
+        return delays((200, 400))
 
 
 def test_a_strip_of_n_cut_triangles_enriches_n_plus_2_nodes(strips) -> None:
@@ -87,7 +93,7 @@ def test_a_delay_is_a_length_over_the_speed_of_the_tool(crossed) -> None:
     for row in crossed[:3]:
         assert row.delay == pytest.approx(row.thesis, rel=1e-9)
     for row in crossed:
-        assert row.delay < row.seen < row.delay + 1.0 / 60.0
+        assert row.delay < row.seen < row.delay + FRAME
         assert 0.4 < row.delay * row.speed / row.edge < 0.6
 
 
