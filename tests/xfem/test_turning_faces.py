@@ -1,6 +1,7 @@
 """Faces of cuts that touch at finite rotation: objectivity, momenta, energy and equilibria."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from cut_bodies import rotation, shaken
 from xfem_bodies import boundary_nodes
 
 import verify.xfem as xfem
+from verify.accelerated import FAST
 from verify.xfem.body import MovingSupports
 from verify.xfem.closing import ClosingFaces, solve_closed
 from verify.xfem.energy_balance import BalanceRecorder
@@ -255,8 +257,8 @@ def collision(dim, R, scheme=xfem.EnergyMomentum, n=12, spin=0.15, steps=40):
     mesh = shaken(make((n, *across), (-1.0, *[-0.25] * (dim - 1)), (1.0, *[0.25] * (dim - 1))), 1)
     plane = xfem.Plane([0.103, *[0.02] * (dim - 1)], [1.0, *[0.25] * (dim - 1)])
     phantom = xfem.cut_mesh(mesh, [plane])
-    force, mass = xfem.InternalForce(phantom, elastic(dim)), xfem.side_wise_mass(phantom, 1.0)
-    faces = TurningFaces(phantom, elastic(dim))
+    force = xfem.InternalForce(phantom, elastic(dim), kernels=FAST)
+    mass, faces = xfem.side_wise_mass(phantom, 1.0), TurningFaces(phantom, elastic(dim))
     body = xfem.DynamicBody(force, mass, contact=faces)
     state, x = body.rest(), phantom.node_points
     state.displacement[:] = x @ R.T - x
@@ -273,11 +275,16 @@ def collision(dim, R, scheme=xfem.EnergyMomentum, n=12, spin=0.15, steps=40):
     return (x + state.displacement) @ R, recorder.close(), np.array(pressures), integrator.solves
 
 
+@cache
+def collided(dim, angle):
+    size = {"n": 12, "steps": 40} if dim == 2 else {"n": 8, "steps": 30}
+    return collision(dim, rotation(dim, np.radians(angle)), **size)[:3]
+
+
 @pytest.mark.parametrize("dim, angle", [(2, 37.0), (2, 90.0), (2, 180.0), (3, 127.0)])
 def test_turned_halves_collide_as_unturned_ones(dim, angle):
-    size = {"n": 12, "steps": 40} if dim == 2 else {"n": 8, "steps": 30}
-    straight, _, pressures, _ = collision(dim, np.eye(dim), **size)
-    found, balance, others, _ = collision(dim, rotation(dim, np.radians(angle)), **size)
+    straight, _, pressures = collided(dim, 0.0)
+    found, balance, others = collided(dim, angle)
     # p = E (0.02 t − ω² t²/2) until waves come back from the ends: 0.0089 at most
     assert pressures.max() > 0.006
     assert pressures[-1] == 0.0
@@ -314,7 +321,8 @@ def held_and_turned(spin, n=21):
     mesh = xfem.rectangle_mesh((n, 3), (-1.0, -0.05), (1.0, 0.05))
     phantom = xfem.cut_mesh(mesh, [xfem.Plane([0.003, 0.0], [1.0, 0.0])])
     material = elastic(2, 0.0)
-    force, mass = xfem.InternalForce(phantom, material), consistent_mass(phantom, 1.0)
+    force = xfem.InternalForce(phantom, material, kernels=FAST)
+    mass = consistent_mass(phantom, 1.0)
     x, side = phantom.node_points, phantom.node_side[:, 0]
     side = np.where(side == 0, np.sign(x[:, 0]), side)
     s, drawn = x[:, 0], spin**2 / 6.0 - 0.01
