@@ -369,13 +369,12 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field_and_found_at
     )
 
 
-@pytest.mark.parametrize("degrees", [20.0, 131.0])
-def test_the_energy_at_a_straight_front_is_that_of_sihs_densities_within_its_half_width(degrees):
+def test_the_energy_at_a_straight_front_is_that_of_sihs_densities_within_its_half_width():
     """The density is S(θ)/r, so that a slice which ends at R(θ) has ∫ S R dθ; to 1e-4.
 
     G. C. Sih, Int. J. Fract. 10 (1974), eq. 5, with 16 πμ S in place of k = K/√π.
     """
-    turn, point, poisson, shear = np.deg2rad(degrees), np.array([0.04, -0.03, 0.0]), 0.3, 1 / 2.6
+    turn, point, poisson, shear = np.deg2rad(131.0), np.array([0.04, -0.03, 0.0]), 0.3, 1 / 2.6
     ahead, normal = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0]])
     k_1, k_2, k_3 = intensity = [1.0, 0.6, -0.8]
     exact = {"point": point.tolist(), "normal": normal.tolist(), "axis": ahead.tolist(),
