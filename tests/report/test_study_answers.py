@@ -147,7 +147,7 @@ def test_a_number_that_is_swept_costs_nothing_up_to_a_twentieth_more(worst, firs
 
 @pytest.fixture
 def kept(monkeypatch):
-    """Hold the curves of what is drawn, by their labels."""
+    """Hold the drawn curves, by their labels."""
     found = {}
 
     def keep(figure, alt):
