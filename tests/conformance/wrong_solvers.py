@@ -10,6 +10,7 @@ import numpy as np
 from verify.compare.hooke import hooke, strain_energy
 from verify.compare.simplices import simplices
 from verify.result import Regularisation
+from verify.scene.tables import Equilibrium
 from verify.solvers.xfem import XfemSolver
 
 
@@ -219,6 +220,15 @@ class OverstatesVelocities(XfemSolver):
         if solution.velocity is None:
             return solution
         return replace(solution, velocity=1.1 * solution.velocity)
+
+
+class BeginsInEquilibrium(XfemSolver):
+    """Lets a scene that begins at rest begin in equilibrium under its loads."""
+
+    def solve(self, scene, level, repetitions=1):
+        if scene.analysis.kind == "dynamic":
+            scene = changed(scene, initial=Equilibrium(kind="equilibrium"))
+        return super().solve(scene, level, repetitions)
 
 
 class ForgetsACell(XfemSolver):
