@@ -216,6 +216,8 @@ class Metric:
     source : str
         What the reference is, e.g. ``"exact: griffith"`` or
         ``"conforming P2, 3 levels, GCI"``.
+    width_from : str
+        What most of the half-width is from; empty if it is from the reference.
     """
 
     name: str
@@ -224,6 +226,7 @@ class Metric:
     reference: float | None = None
     uncertainty: float = 0.0
     source: str = ""
+    width_from: str = ""
 
     def relative_distance(self) -> tuple[float, float, float]:
         """Return |value/reference − 1| of a quantity, and its bounds for every true reference.

@@ -37,10 +37,15 @@ def plate():
     return case, XfemSolver().solve(case, 0, 0, mass="sidewise")
 
 
+def judged_by(case, solution, check=DRIFT):
+    """Judge a copy of the case with that one check."""
+    asked = case.model_dump(mode="json", by_alias=True) | {"acceptance": [check]}
+    return judged(Scene.model_validate(asked), {"xfem": {0: solution}})
+
+
 def judgement_of(case, solution, check=DRIFT):
     """Verdict and record of a copy of the case with that one check."""
-    asked = case.model_dump(mode="json", by_alias=True) | {"acceptance": [check]}
-    found = judged(Scene.model_validate(asked), {"xfem": {0: solution}})
+    found = judged_by(case, solution, check)
     return found.verdicts[0].verdict, found.solves[0]
 
 
@@ -147,9 +152,12 @@ def test_an_honest_mass_that_is_not_declared_is_within_the_interval(plate):
     drift = found["energy_drift"]
     assert "no mass is declared" in drift.source
     assert 1e-6 < drift.value <= drift.uncertainty
-    assert verdict_of(case, replace(honest, mass=None), {**DRIFT, "at_most": 1e-6}) is (
-        Verdict.UNDECIDED
-    )
+    assert "(no mass is declared); expected the `mass` of the solution" in drift.width_from
+    check = {**DRIFT, "at_most": 1e-6}
+    (found,) = judged_by(case, replace(honest, mass=None), check).verdicts
+    assert found.verdict is Verdict.UNDECIDED
+    assert "reference" not in found.reason
+    assert drift.width_from in found.reason
     assert verdict_of(case, honest, {**DRIFT, "at_most": 1e-6}) is Verdict.PASS
 
 
@@ -251,7 +259,10 @@ def test_work_of_supports_with_a_kink_at_each_output_time_is_a_word():
     found, sources = energies_of(case, honest)
     assert "kink" in sources["work_of_supports"]
     assert found["energy_drift"].value < 1e-10  # as it is, without the interpolated rest
-    assert verdict_of(case, honest) is Verdict.UNDECIDED
+    (verdict,) = judged_by(case, honest).verdicts
+    assert verdict.verdict is Verdict.UNDECIDED
+    said = f"it is from the work of supports: {sources['work_of_supports']}"
+    assert said in verdict.reason
 
 
 def test_work_of_supports_with_kinks_between_output_times_has_what_is_taken_up_at_once():
@@ -262,6 +273,7 @@ def test_work_of_supports_with_kinks_between_output_times_has_what_is_taken_up_a
     drift = energies_of(case, XfemSolver().solve(case, 0, 0))[0]["energy_drift"]
     assert drift.value < 2e-3  # of the energy in play, which the scheme keeps
     assert drift.value < drift.uncertainty < 0.02
+    assert drift.width_from.startswith("the work of supports between outputs")
 
 
 CURVED = {

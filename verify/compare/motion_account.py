@@ -41,6 +41,17 @@ Ledger = Mapping[str, Array]
 _SAFETY, _ORDERS = 3.0, (1.0, 4.0)
 
 
+# What a half-width of each part is from; `mass` says which mass was taken.
+_WIDTH_FROM = {
+    "kinetic": "the kinetic energy, which is {mass}; expected the `mass` of the solution",
+    "gravity": "the weight, whose mass is {mass}; expected the `mass` of the solution",
+    "damping": "the energy damped between outputs; expected more of them",
+    "work_of_loads": "the work of loads between outputs; expected more of them, and at kinks",
+    "work_of_supports": "the work of supports between outputs, of which more are expected, and by "
+    "a mass that is {mass}",
+}
+
+
 @dataclass(frozen=True)
 class Energies:
     """Parts of an energy balance over the output times (2D: per metre of thickness).
@@ -67,6 +78,16 @@ class Energies:
         """Half-width (t,) of the sum of all parts, J."""
         count = len(next(iter(self.parts.values()), ()))
         return np.sum(list(self.widths.values()), axis=0) if self.widths else np.zeros(count)
+
+    @property
+    def width_from(self) -> str:
+        """Say where most of the half-width is from, and what makes it smaller; empty if zero."""
+        if not self.widths:
+            return ""
+        widest = max(self.widths, key=lambda name: float(self.widths[name].max()))
+        if widest in self.sources:  # by the solver's word alone
+            return f"the {widest.replace('_', ' ')}: {self.sources[widest]}"
+        return _WIDTH_FROM[widest].format(mass=self.sources["kinetic_energy"])
 
 
 def measured_energies(

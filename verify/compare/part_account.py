@@ -4,6 +4,7 @@ No metric here needs a reference: energy and momentum of the parts, and of the b
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -294,10 +295,15 @@ def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[
         "energy_oscillation": (found.oscillation, off.oscillation),
     }
     notes = dict(energies.sources)
+    from_of = dict.fromkeys([*values, "energy_jump", MISMATCH], energies.width_from)
+    if 2 * found.slope_error > off.slope:
+        from_of["energy_slope"] = "a line through energies that oscillate"
     source = f"fields of the solution; kinetic energy by {notes.pop('kinetic_energy')}"
     if len(found.jumps):
         jump = float(np.abs(found.jumps).max())
         values["energy_jump"] = jump, found.oscillation + float(off.jumps.max())
+        if found.oscillation > off.jumps.max():
+            from_of["energy_jump"] = "a step between energies that oscillate"
     else:
         notes["energy_jump"] = "nothing is cut between the first and the last output time"
     if account.stated:
@@ -311,7 +317,10 @@ def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[
     else:
         notes[MISMATCH] = "the solution has no ledger of its own"
     return [
-        _relative(name, *value, scale, float(width.max()), source) for name, value in values.items()
+        replace(
+            _relative(name, *value, scale, float(width.max()), source), width_from=from_of[name]
+        )
+        for name, value in values.items()
     ], notes
 
 

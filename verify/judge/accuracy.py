@@ -426,8 +426,10 @@ def _errors(
         if name not in reference.norms:
             notes[name] = "the reference's own error in this norm is not known"
             continue
-        width = _known_to(name, found.norm, reference) + found.integration_error
-        metrics.append(Metric(name, value, "1", None, width, reference.source))
+        known = _known_to(name, found.norm, reference)
+        width = known + found.integration_error
+        of = "the integration over cells" if found.integration_error > known else ""
+        metrics.append(Metric(name, value, "1", None, width, reference.source, of))
     record = with_other_errors(record, other, reference.motion, times, rules, one.law)
     return metrics, notes, replace(record, series=history.series())
 

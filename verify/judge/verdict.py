@@ -168,8 +168,9 @@ def _judged(
         case RateCheck():
             return _judge_rate(check, records, rates)
         case BoundCheck():
-            error = _error(_levels(records, check.solver)[-1], check.metric)
-            return _decide(check, error, 0.0, check.at_most, "error on the finest level")
+            finest = _levels(records, check.solver)[-1]
+            error, of = _error(finest, check.metric), _metric(finest, check.metric).width_from
+            return _decide(check, error, 0.0, check.at_most, "error on the finest level", of)
         case ValueCheck():
             return _judge_value(check, records)
         case RatioCheck(row=None):
@@ -295,7 +296,10 @@ def _reference_share(check: Check, records: Sequence[SolveRecord]) -> float | No
     return max((share for share in shares if share is not None), default=None)
 
 
-def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:
+def _decide(
+    check: Check, found: Interval, low: float, high: float, text: str, of: str = ""
+) -> VerdictRecord:
+    """Judge an interval; `of` says what its half-width is from, if not from a reference."""
     if not isfinite(found.value):
         return verdict_record(check, Verdict.FAIL, f"{text}: not finite")
     if low <= found.low and found.high <= high:
@@ -308,9 +312,11 @@ def _decide(check: Check, found: Interval, low: float, high: float, text: str) -
     )
     if isinstance(check, BoundCheck) and found.half_width > 0.1 * found.value:
         reason = (
-            f"{text}: reference uncertainty {found.half_width:.1e} is not clearly below the "
-            f"error {found.value:.1e} it judges"
+            f"{text}: {'' if of else 'reference '}uncertainty {found.half_width:.1e} is not "
+            f"clearly below the error {found.value:.1e} it judges"
         )
+    if of:
+        reason += f"; it is from {of}"
     return verdict_record(check, Verdict.UNDECIDED, reason, found)
 
 
