@@ -152,6 +152,7 @@ REFERENCE = "reference"  #: solver that judges the others, where no exact soluti
 SUFFICIENT = 0.1  #: half-width of a reference over the error it judges, that it shall not exceed
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 FORECAST = "finer levels"  #: of the notes of a reference: expected time of the levels to come
+WITHIN = "within"  #: of the notes of a reference: how much larger its elements are by --within
 MESHING = "meshing"  #: of the phases of a solve: the first mesh that it makes
 HANDED_OVER = "mesh handed over"  #: phase of who solves on a conforming mesh that others made
 _CUTTING = ("cutting", "enrichment")  # phases that cut a mesh which does not know the cut

@@ -165,6 +165,22 @@ def test_a_reference_of_two_levels_judges_nothing_and_says_why():
     assert result.solves[0].metric("strain_energy").reference is None
 
 
+def test_a_level_of_the_reference_that_was_left_out_is_the_first_cause():
+    solved = {"xfem": {0: LEVELS[0]}, "reference": reference((6, 12))}
+    rows = [
+        SolveRecord("a test", name, level, Status.SOLVED, size=one.size)
+        for name, own in solved.items()
+        for level, one in own.items()
+    ]
+    reason = "left out: --within asks for 60 s"
+    rows.append(SolveRecord("a test", "reference", 2, Status.REFUSED, reason))
+    scene = case([BOUND], False)
+    result = with_verdicts(scene, assess_accuracy(scene, rows, solved))
+    (found,) = result.verdicts
+    assert found.verdict is Verdict.UNDECIDED
+    assert f": level 2 of the reference: {reason}; the reference has 2 solved" in found.reason
+
+
 def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():
     rows = [SolveRecord("a test", "xfem", i, Status.SOLVED, size=0.125 / 2**i) for i in range(3)]
     rows[2] = replace(rows[2], status=Status.TIMEOUT, reason="stopped after 1 s")

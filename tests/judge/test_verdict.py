@@ -257,6 +257,16 @@ def test_what_a_reference_misses_that_was_left_out_is_undecided():
         assert verdicts(BOUND, records)[0].verdict is expected
 
 
+def test_larger_elements_of_the_reference_are_the_first_cause():
+    own = solve(0, 0.04, 0.02)
+    own = replace(own, metrics=[replace(metric, source="it") for metric in own.metrics])
+    coarse = replace(solve(0, 1.0, solver="reference"), notes={"within": "elements 4 times"})
+    for records, begins in (([own], "error"), ([own, coarse], "a reference of elements 4 times;")):
+        (found,) = verdicts(BOUND, records)
+        assert found.verdict is UNDECIDED
+        assert found.reason.startswith(begins)
+
+
 def test_a_solver_that_refuses_the_case_is_not_judged_and_one_that_failed_is():
     refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
     failed = SolveRecord("a test", "broken", 0, Status.FAILED, "singular")

@@ -145,7 +145,7 @@ def assess_accuracy(
     if body is not None:
         rules_for = cache(partial(Rules, body))
         measured, solutions = _fit(scene, records, solutions)
-        reference, missing = _reference(scene, solutions, exact, body, law, rules_for)
+        reference, missing = _reference(scene, records, solutions, exact, body, law, rules_for)
         held = _HeldAgainst(reference, missing, exact, rules_for, announce, kept)
         for level in sorted({record.level for record in records}):
             own = {i: s for i, r in enumerate(measured)
@@ -221,6 +221,7 @@ def _body(scene: Scene, exact: ExactField | None) -> tuple[AnyBody | None, str]:
 
 def _reference(
     scene: Scene,
+    records: Sequence[SolveRecord],
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None,
     body: AnyBody,
@@ -239,7 +240,9 @@ def _reference(
         others = solutions.get(OTHER)
         return conforming_reference(scene, levels, body, law, rules_for(finest), others), ""
     except InputError as problem:
-        return None, str(problem)
+        out = (one for one in records if one.solver == REFERENCE and one.reason)
+        cause = next((f"level {one.level} of the reference: {one.reason}; " for one in out), "")
+        return None, f"{cause}{problem}"
 
 
 def _fit(

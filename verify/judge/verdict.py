@@ -19,6 +19,7 @@ from verify.judge.intervals import (
 )
 from verify.result import (
     REFERENCE,
+    WITHIN,
     CaseResult,
     Metric,
     Rate,
@@ -67,12 +68,15 @@ def judge(
         whether forces at a cut have taken more than a blade releases, of each solver that has such.
     """
     verdicts = []
+    coarser = next((r.notes[WITHIN] for r in records if WITHIN in r.notes), "")
     for applied in applied_checks(scene.acceptance, records, judge_only):
         check, found = applied.check, None
         try:
             if not applied.not_judged:
                 found = _judged(check, records, rates, rows)
                 found = replace(found, reference_share=_reference_share(check, records))
+                if coarser and found.verdict is Verdict.UNDECIDED and found.reference_share:
+                    found = replace(found, reason=f"a reference of {coarser}; {found.reason}")
         except NotMeasuredError as problem:
             verdict = Verdict.UNDECIDED if _left_out(check, records) else Verdict.ERROR
             found = verdict_record(check, verdict, str(problem))
@@ -265,6 +269,7 @@ def _judge_rate(
             raise NotMeasuredError(text)
     rate = next((r for r in rates if (r.solver, r.metric) == (check.solver, check.metric)), None)
     if rate is None:
+        _metric(_levels(records, check.solver)[-1], check.metric)  # says why there is none
         raise NotMeasuredError(f"no rate of {check.metric} for {check.solver}")
     low, high = -float("inf"), float("inf")
     if check.at_least is not None:

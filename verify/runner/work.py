@@ -12,7 +12,7 @@ from verify.errors import InputError
 from verify.files import read_json, write_json, write_whole
 from verify.printable import one_line
 from verify.processes import memory_limit
-from verify.result import FORECAST, LOG, CaseResult, SolveRecord, Status, write_result
+from verify.result import FORECAST, LOG, WITHIN, CaseResult, SolveRecord, Status, write_result
 from verify.runner.child import POLL_SECONDS, Child, Ending, death
 from verify.runner.comparing import Comparison, comparison_label, stored_result
 from verify.runner.cost import forecast_text
@@ -289,7 +289,7 @@ class Work:
             record.notes[FORECAST] = forecast_text(plan.scene, finer, *limits)
         if plan.coarser > 1 and job.solver == REFERENCE:
             times = f"elements {plan.coarser} times as large as the case asks"
-            record.notes["within"] = f"{times}: --within {self.options.within:g}"
+            record.notes[WITHIN] = f"{times}: --within {self.options.within:g}"
 
     def _kept(self, job: Job, record: SolveRecord) -> SolveRecord:
         """Store a record; its solution may be gone, or be removed by a solver later."""
