@@ -118,6 +118,21 @@ def test_a_reference_that_is_not_clearly_better_than_what_it_judges_stands_besid
     assert said not in next(iter(verdict_lines([result])))
 
 
+def test_a_line_of_the_terminal_has_the_interval_of_the_report(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    file = root / "cases/statics__f3_inclined/result.json"
+    result = read_result(file)
+    failed = replace(
+        result.verdicts[0], verdict=Verdict.FAIL, check="error", observed=0.27912, low=0.2777,
+        high=0.2805,
+    )  # fmt: skip
+    write_result(replace(result, verdicts=[failed]), file)
+    page = render(root, "markdown").read_text(encoding="utf-8")
+    assert "0.2791 [0.2777, 0.2805]" in page.replace("\\", "")
+    _, line, *_ = verdict_lines([replace(result, verdicts=[failed], notices=[])])
+    assert ": 0.2791 [0.2777, 0.2805], wanted " in line
+
+
 @pytest.mark.parametrize("many", [False, True])
 def test_few_failures_are_told_in_words_and_many_are_counted(tmp_path, many):
     """Of 40 solvers that fail in a case the first screen has a short line, no list of checks."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
 from verify.printable import duration_text, memory_text, one_line
+from verify.report.notation import observed_text
 from verify.result import LOG, CaseResult, Notice, Status, Verdict, VerdictRecord
 from verify.runner.cost import REFERENCE, LevelCost, case_cost
 from verify.runner.plan import solvers_of, stored_beside
@@ -130,6 +131,6 @@ def notice_text(notice: Notice) -> str:
 
 
 def _check(record: VerdictRecord) -> str:
-    observed = "not observed" if record.observed is None else f"{record.observed:.6g}"
+    observed = "not observed" if record.observed is None else observed_text(record)
     whose = record.solver or "nobody"
     return f"{record.check} of {record.metric} ({whose}): {observed}, wanted {record.limit}"

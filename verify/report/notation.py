@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from verify.printable import memory_text
+from verify.result import Verdict, VerdictRecord
 
 
 @dataclass(frozen=True)
@@ -246,6 +247,16 @@ def error_text(value: float, uncertainty: float) -> str:
     most = abs(value) + uncertainty
     step = 10.0 ** (math.floor(math.log10(most)) - 1)
     return f"not resolved (< {number(math.ceil(most / step * (1 - 1e-9)) * step, 2)})"
+
+
+def observed_text(record: VerdictRecord) -> str:
+    """Return an observed value with its interval; an error that may be 0, as what it is below."""
+    value, low, high = record.observed, record.low, record.high
+    if record.check == "error" and record.verdict is Verdict.PASS and (value or 0.0) < ROUND_OFF:
+        return f"round-off ({number(value, 2)})" if value else number(value)
+    if record.check in ("error", "ratio") and low == 0.0 and value is not None and high is not None:
+        return error_text(value, high - value)
+    return with_interval(value, low, high)
 
 
 def printable(text: Any) -> str:

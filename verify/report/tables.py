@@ -17,11 +17,11 @@ from verify.report.notation import (
     is_error,
     metric_title,
     number,
+    observed_text,
     scientific,
     seconds_text,
     solver_title,
     spread_text,
-    with_interval,
 )
 from verify.result import (
     CRITICAL_STEP,
@@ -66,7 +66,7 @@ def check_text(record: VerdictRecord, named: bool = True) -> str:
 
 def check_row(record: VerdictRecord, unit: str = "") -> list[Any]:
     """Return the row of one check; a value is in `unit`."""
-    observed, limit = _observed(record), record.limit
+    observed, limit = observed_text(record), record.limit
     if record.check == "value" and record.observed is not None:
         unit = f" {unit}" if unit not in ("", "1") else ""
         observed = number(record.observed, _digits_to_judge(record)) + unit
@@ -84,16 +84,6 @@ def _digits_to_judge(record: VerdictRecord) -> int:
         return 4
     off = abs((record.observed or 0.0) - wanted)
     return max(digits_beside(wanted, max(off, abs(wanted) * tolerance), 10), 4)
-
-
-def _observed(record: VerdictRecord) -> str:
-    """Return an observed value with its interval; an error that may be 0, as what it is below."""
-    value, low, high = record.observed, record.low, record.high
-    if record.check == "error" and record.verdict is Verdict.PASS and (value or 0.0) < ROUND_OFF:
-        return f"round-off ({number(value, 2)})" if value else number(value)
-    if record.check in ("error", "ratio") and low == 0.0 and value is not None and high is not None:
-        return error_text(value, high - value)
-    return with_interval(value, low, high)
 
 
 def _units(result: CaseResult) -> dict[str, str]:
