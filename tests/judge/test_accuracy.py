@@ -178,7 +178,7 @@ def test_a_level_of_the_reference_that_was_left_out_is_the_first_cause():
     result = with_verdicts(scene, assess_accuracy(scene, rows, solved))
     (found,) = result.verdicts
     assert found.verdict is Verdict.UNDECIDED
-    assert f": level 2 of the reference: {reason}; the reference has 2 solved" in found.reason
+    assert f": level 2 of the reference: {reason}; it needs at least 3 levels" in found.reason
 
 
 def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():

@@ -243,9 +243,12 @@ def _reference(
         others = solutions.get(OTHER)
         return conforming_reference(scene, levels, body, law, rules_for(finest), others), ""
     except InputError as problem:
-        out = (one for one in records if one.solver == REFERENCE and one.reason)
-        cause = next((f"level {one.level} of the reference: {one.reason}; " for one in out), "")
-        return None, f"{cause}{problem}"
+        for one in records:
+            if one.solver == REFERENCE and one.reason:
+                cause = f"level {one.level} of the reference: {one.reason}; "
+                refused = one.status is Status.REFUSED  # another size would not help
+                return None, f"{cause}{'it needs at least 3 levels' if refused else problem}"
+        return None, str(problem)
 
 
 def _fit(
