@@ -52,7 +52,6 @@ from verify.judge.notices import (
     doubtful_errors,
     inside_out_notices,
     locking_notices,
-    rate_notices,
     ringing_factors,
     unavailable_quantities,
 )
@@ -159,14 +158,12 @@ def assess_accuracy(
         levels = len(record.levels or ())
         record = replace(record, **sufficiency(scene, measured, REFERENCE, levels))
     judged = [record for record in measured if record.solver != REFERENCE]
-    others = {name: each for name, each in solutions.items() if each and name != REFERENCE}
     notices = [
         *unavailable_quantities(scene, measured),
         *ledger_notices(judged),
         *doubtful_errors(scene, judged),
         *inside_out_notices(judged),
-        *locking_notices(scene, others),
-        *rate_notices(scene, others),
+        *locking_notices(scene, {n: s for n, s in solutions.items() if s and n != REFERENCE}),
         *(absurd_strain(scene, measured, solutions, law, body.measure) if body else []),
         *ringing_factors(scene, solutions.get(REFERENCE, {})),
     ]

@@ -6,7 +6,6 @@ import numpy as np
 
 from reference.deformation import wave_speed
 from verify.compare.hooke import Law, strain_energy
-from verify.compare.rates import persistent_mismatch
 from verify.judge.intervals import NotMeasuredError, error_interval
 from verify.result import Notice, NoticeKind, SolveRecord, Status, finest_of
 from verify.scene import RatioCheck, Scene
@@ -129,31 +128,6 @@ def locking_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]
                 "mesh; expected a finer mesh, or a method with a pressure or an averaged dilatation"
             )
             found.append(Notice(NoticeKind.WARNING, "locking", name, text))
-    return found
-
-
-def rate_notices(scene: Scene, solutions: Mapping[str, Mapping[int, Solution]]) -> list[Notice]:
-    """Warn of velocities that are not the rates of displacements, by each solver's finest answer.
-
-    Parameters
-    ----------
-    scene : Scene
-        In motion. Without a time step one of it is an interval between outputs.
-    solutions : mapping of solver to mapping of level to Solution
-    """
-    found, times = [], scene.analysis.output_times
-    for name, levels in solutions.items():
-        finest = levels[max(levels)]
-        if finest.velocity is None or len(times) < 2:
-            continue
-        off = persistent_mismatch(finest, scene.analysis.time_step or times[1])
-        if off is not None:
-            text = (
-                f"they are not the rates of its displacements: off by {off[0]:.2g} of the largest "
-                f"velocity at t = {off[1]:.4g} s, which more outputs do not lessen; expected both "
-                "at the output times, in m and m/s"
-            )
-            found.append(Notice(NoticeKind.WARNING, "velocities", name, text))
     return found
 
 
