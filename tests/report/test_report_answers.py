@@ -73,7 +73,7 @@ def test_solvers_that_are_not_named_are_bounded_and_those_that_fail_a_check_are_
     checks.append(replace(checks[0], solver="xfem", known="a known finding"))
     said = answers([replace(result, verdicts=checks)])[0].sentence
     assert "soft 0.500 (1), other 2.00 (1); 1 more at most 87.0 in a case." in said
-    assert said.endswith("A check fails of soft: see below.")
+    assert said.endswith("Solvers that fail a check: soft.")
 
 
 def test_time_is_compared_at_an_equal_error_between_levels_by_a_power_law():

@@ -360,7 +360,7 @@ def _failing(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Rat
         if verdict.verdict is Verdict.FAIL and not verdict.known
     }
     names = [name for name in found if name in failed]
-    return f" A check fails of {', '.join(names)}: see below." if names else ""
+    return f" Solvers that fail a check: {', '.join(names)}." if names else ""
 
 
 def _left_out(results: Sequence[CaseResult], found: Mapping[str, Mapping[str, Ratio]]) -> str:
